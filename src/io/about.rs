@@ -1,11 +1,11 @@
-//! A file's description of itself beside its points: for people, and for no picture.
+//! A file's description of itself, for users; rendering does not use it.
 
 use serde::Serialize;
 
 /// A file's description of itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct About {
-    /// The format with its version and variant.
+    /// The format, with version and variant.
     pub format: String,
     /// The coordinate system, if the file names one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -16,31 +16,31 @@ pub struct About {
     /// The program that wrote the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub software: Option<String>,
-    /// Scans, of a format that has several.
+    /// The number of scans, for formats with several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<u64>,
     /// The attributes of each point.
     pub attributes: Vec<Attribute>,
-    /// The meaning that numbers of colours are given, if colours show.
+    /// The interpretation of the colour numbers, if colours are drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colors: Option<String>,
-    /// Black and white of the intensities, if they show in the place of colours.
+    /// The intensities that become black and white, if they are drawn instead of colours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intensities: Option<[f64; 2]>,
 }
 
-/// One attribute of each point.
+/// An attribute of each point.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Attribute {
-    /// As the file calls it.
+    /// The name in the file.
     pub name: String,
-    /// Whether anything is made of it.
+    /// Whether the attribute is used.
     pub used: bool,
     #[serde(skip)]
     pub(super) role: Role,
 }
 
-/// Attributes of which it is known late whether they are used.
+/// The role of an attribute: whether colours and intensities are used is decided after reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Role {
     Color,
@@ -51,7 +51,7 @@ pub(super) enum Role {
 
 impl Attribute {
     pub(super) fn new(name: impl Into<String>, used: bool, role: Role) -> Self {
-        // A terminal obeys some characters.
+        // Control characters would be executed by a terminal.
         let name = name.into().replace(char::is_control, "\u{fffd}");
         Self { name, used, role }
     }

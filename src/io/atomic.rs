@@ -7,24 +7,26 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What a file's bytes are written to: buffered, and seekable even where the final path is not.
+/// The writer of an output file: buffered, and seekable even if the final path is not.
 pub type Output<'a> = BufWriter<&'a mut File>;
 
-/// Writes the file at `path` through `fill`, into a temporary file beside it that takes its name at the end.
+/// Writes the file at `path` through `fill`, into a temporary file beside it that is renamed at the
+/// end.
 ///
-/// A reader of `path` sees the old file or the finished new one; after a failure no part of the new one is left, nor after
-/// [`abandon`]. A file that is replaced keeps its mode. Symbolic links are followed: what they lead to is replaced, and they
-/// stay. A path that names something other than a file (a device, a pipe, what a program has open) is written to and not
-/// replaced.
+/// A reader of `path` sees the old file or the complete new one. After a failure or [`abandon`], no
+/// part of the new one is left. A replaced file keeps its mode. Symbolic links are followed: their
+/// target is replaced, and they stay. A path that is not a file (a device, a pipe, an open file in
+/// /proc) is written to and not replaced.
 ///
 /// # Errors
 ///
-/// [`Error::Write`] with `path` and what the system or `fill` said; a file that is read-only is not replaced.
+/// [`Error::Write`] with `path` and the reason from the system or `fill`. A read-only file is not
+/// replaced.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> Result<()> {
     finish(filled(path, fill)?.into_iter().collect())
 }
 
-/// Writes several files as [`write_whole`] does, of which none takes its name before all are finished.
+/// Writes several files as [`write_whole`] does; none is renamed before all are written.
 ///
 /// # Errors
 ///
@@ -34,7 +36,8 @@ pub fn write_together<'a>(files: impl IntoIterator<Item = (PathBuf, &'a [u8])>) 
     finish(filled.filter_map(Result::transpose).collect::<Result<_>>()?)
 }
 
-/// Makes sure that [`write_whole`] may write at `path`, by making a file beside it and removing that again.
+/// Checks that [`write_whole`] can write at `path`, by creating a temporary file beside it and
+/// removing it again.
 ///
 /// # Errors
 ///
@@ -47,11 +50,12 @@ pub fn try_output(path: &Path) -> Result<()> {
     tried().map_err(|source| Error::write(path, source))
 }
 
-/// Makes sure that files can be made in `folder`, or, where it is missing, in the folder that it would be made in.
+/// Checks that files can be created in `folder`, or if it is missing in its nearest existing
+/// ancestor.
 ///
 /// # Errors
 ///
-/// [`Error::Write`] with `folder` and what the system said.
+/// [`Error::Write`] with `folder` and the reason from the system.
 pub fn try_folder(folder: &Path) -> Result<()> {
     let there = folder.ancestors().map(or_current).find(|folder| fs::symlink_metadata(folder).is_ok());
     let there = there.unwrap_or(folder);
@@ -64,8 +68,10 @@ pub fn try_folder(folder: &Path) -> Result<()> {
     tried().map_err(|source| Error::write(folder, source))
 }
 
-/// The file that [`write_whole`] would make or replace for `path`: past all symbolic links, with a canonical folder as far as
-/// that exists. None for what would not be replaced.
+/// The file that [`write_whole`] would create or replace for `path`.
+///
+/// Symbolic links are followed, and the existing part of the folder is canonical. None for a path
+/// that is written to but not replaced.
 pub fn place_of(path: &Path) -> Option<PathBuf> {
     let end = match end_of_links(path) {
         Ok(end) => end?,
@@ -77,37 +83,38 @@ pub fn place_of(path: &Path) -> Option<PathBuf> {
     let canonical = |folder: &Path| {
         let rest = end.strip_prefix(folder).ok()?;
         let canonical = or_current(folder).canonicalize().ok()?;
-        // Nothing joined to the path of a file would make it that of a folder.
+        // Joining an empty path would append a slash and turn the path of a file into that of a
+        // folder.
         Some(if rest.as_os_str().is_empty() { canonical } else { canonical.join(rest) })
     };
     Some(end.ancestors().find_map(canonical).unwrap_or(end))
 }
 
-/// Removes the temporary files of all that is being written, and lets nothing more begin or take its name: for a program that
-/// ends at once, whatever its other threads are doing.
+/// Removes all temporary files, and blocks every later creation or renaming. For a program that is
+/// about to exit while other threads may still write.
 pub fn abandon() {
     let mut unfinished = lock();
     unfinished.drain(..).for_each(|path| drop(fs::remove_file(path)));
-    // Whoever waits for the list waits until the program is gone.
+    // The lock is never released: threads that need it wait until the program exits.
     std::mem::forget(unfinished);
 }
 
-/// The temporary files there are. The list is locked while one is made, removed or takes its name, so that a file is never
-/// there without being listed.
+/// The existing temporary files. The lock is held while one is created, removed or renamed, so a
+/// temporary file never exists without being listed.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn lock() -> MutexGuard<'static, Vec<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The most symbolic links that lead from one to the next, as Linux has it.
+/// The longest chain of symbolic links that is followed, as in Linux.
 const MOST_LINKS: usize = 40;
 
-/// What a path of an output names.
+/// The target of an output path.
 enum Target {
-    /// Something that is written to and not replaced.
+    /// A device, pipe or open file that is written to and not replaced.
     Stream,
-    /// A file past all symbolic links, and what is there now.
+    /// A file after following symbolic links, and its metadata if it exists.
     File { end: PathBuf, existing: Option<Metadata> },
 }
 
@@ -122,9 +129,10 @@ impl Target {
             Some(there) if there.is_dir() => {
                 return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
             }
-            // Renaming onto a device would replace the device.
+            // Renaming a file onto a device would replace the device.
             Some(there) if !there.is_file() => return Ok(Self::Stream),
-            // Renaming needs no right to the file, but whoever took that away meant it. Root has every right.
+            // Renaming needs no write permission on the file, but a read-only file is meant to
+            // stay. The mode decides, since root may write to any file.
             Some(there) if there.permissions().readonly() => {
                 return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is read-only"));
             }
@@ -135,8 +143,8 @@ impl Target {
     }
 }
 
-/// Where a chain of symbolic links ends, be anything there or not. None for what a process has open: /proc lists it as links,
-/// which lead nowhere if it has no name.
+/// Follows a chain of symbolic links to its end, whether that exists or not. None for a file that a
+/// process has open: /proc lists these as links, which lead nowhere if the file has no name.
 fn end_of_links(path: &Path) -> io::Result<Option<PathBuf>> {
     let mut end = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -158,14 +166,14 @@ fn or_current(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
 
-/// A temporary file, which goes with this unless it is finished.
+/// A temporary file that is deleted on drop unless it was renamed.
 struct Unfinished {
     file: File,
-    /// None once it has its name.
+    /// The path of the temporary file; None once it is renamed.
     temporary: Option<PathBuf>,
-    /// The name that it takes.
+    /// The path to which it is renamed.
     end: PathBuf,
-    /// The path that was asked for.
+    /// The path that the caller gave, for errors.
     asked: PathBuf,
 }
 
@@ -177,7 +185,8 @@ impl Unfinished {
         #[cfg(unix)]
         {
             use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
-            // What only its owner may read is not shown to others while it is written; the umask decides about a new file.
+            // A private file's replacement is private from the start; for a new file the umask
+            // decides.
             options.mode(existing.map_or(0o666, |existing| existing.mode() & 0o777));
         }
         let mut unfinished = lock();
@@ -186,7 +195,7 @@ impl Unfinished {
             let temporary = folder_of(&end).join(format!(".epsplat-{:x}-{number:x}", std::process::id()));
             match options.open(&temporary) {
                 Ok(file) => break (file, temporary),
-                // Of a process that had this number, and was killed.
+                // A killed process with the same process id left this file.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(error),
             }
@@ -200,7 +209,7 @@ impl Unfinished {
         Ok(whole)
     }
 
-    /// Takes over whose file it is, as far as the system allows, and who may do what with it.
+    /// Takes over mode and, as far as the system allows, owner and group of the existing file.
     fn become_like(&self, existing: &Metadata) -> io::Result<()> {
         #[cfg(unix)]
         {
@@ -220,14 +229,14 @@ impl Drop for Unfinished {
     fn drop(&mut self) {
         if let Some(temporary) = self.temporary.take() {
             let mut unfinished = lock();
-            // Nothing can be done about a file that cannot be removed.
+            // A file that cannot be removed is left.
             let _ = fs::remove_file(&temporary);
             unfinished.retain(|path| *path != temporary);
         }
     }
 }
 
-/// Gives finished files their names.
+/// Renames finished files to their final paths.
 fn finish(files: Vec<Unfinished>) -> Result<()> {
     let mut files = files;
     let mut unfinished = lock();
@@ -238,19 +247,19 @@ fn finish(files: Vec<Unfinished>) -> Result<()> {
         file.temporary = None;
         Ok(())
     });
-    // Those that failed go with `files`, which needs the list.
+    // Dropping `files` deletes those that were not renamed, which needs the lock.
     drop(unfinished);
     named
 }
 
-/// A temporary file with all that `fill` writes; none where `path` is no file, and was written to.
+/// Writes a temporary file through `fill`. None if `path` is not a file; it was written to.
 fn filled(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> Result<Option<Unfinished>> {
     let filled = || match Target::of(path)? {
         Target::Stream => {
             let mut whole = tempfile::tempfile()?;
             buffered(&mut whole, fill)?;
             whole.rewind()?;
-            // What is open may be a file that others write to as well.
+            // Append, because the open stream may be a file that others write to as well.
             io::copy(&mut whole, &mut OpenOptions::new().append(true).open(path)?)?;
             Ok(None)
         }
@@ -346,7 +355,7 @@ mod tests {
             write("old", b"new").unwrap();
             assert_eq!((mode(&at("old")), fs::read(at("old")).unwrap()), (bits, b"new".to_vec()));
         }
-        // A chain of links, the second relative to its own folder, and one to what is not there yet.
+        // A chain of links, the second relative to its own folder, and a link to a missing file.
         fs::create_dir(at("sub")).unwrap();
         symlink("sub/second", at("first")).unwrap();
         symlink("../old", at("sub/second")).unwrap();
@@ -359,7 +368,7 @@ mod tests {
         assert_eq!(place_of(&at("first")), Some(at("old").canonicalize().unwrap()));
         symlink("round", at("round")).unwrap();
         assert!(write("round", b"").unwrap_err().to_string().contains("symbolic links"));
-        // No rights but to read; root too is refused.
+        // A read-only file is refused, also for root.
         fs::set_permissions(at("old"), fs::Permissions::from_mode(0o444)).unwrap();
         for refused in [write("old", b""), write("first", b""), try_output(&at("first"))] {
             assert!(refused.unwrap_err().to_string().ends_with("it is read-only"));

@@ -1,16 +1,16 @@
-//! Names that programs give the attributes of points, in PLY and PCD files alike.
+//! Names of point attributes that programs write in PLY and PCD files.
 //!
 //! The names are those that these programs write, or read as such: PDAL (`normalx`, `intensity`,
 //! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field), the Point Cloud
 //! Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D (`normal_x` and `rgb` in PCD), MeshLab
 //! (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
-//! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`), 3D Gaussian splatting
-//! (`nxx ny nz`), and CGAL, Agisoft and Metashape with names of these.
+//! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`) and 3D Gaussian splatting
+//! (`nxx ny nz`). CGAL, Agisoft and Metashape use names from these.
 //!
-//! Capitals make no difference, but a name that is written as here comes first; `scalar_` before a
-//! name is left out.
+//! Case does not matter, but a name that matches in case comes first. A prefix `scalar_` is
+//! ignored.
 
-/// The names of each channel of a colour.
+/// Names of the red, green and blue channel.
 pub(super) const COLOR: [&[&str]; 3] = [
     &[
         "red",
@@ -83,11 +83,11 @@ pub(super) const COLOR: [&[&str]; 3] = [
     ],
 ];
 
-/// Opacities beside a colour.
+/// Names of the opacity beside a colour.
 pub(super) const ALPHA: &[&str] =
     &["alpha", "a", "diffuse_alpha", "color_alpha", "color_a", "rgba_a", "col_a", "vertex_alpha"];
 
-/// The components of a normal.
+/// Names of the components of a normal.
 pub(super) const NORMAL: [&[&str]; 3] = [
     &[
         "nx",
@@ -139,7 +139,7 @@ pub(super) const NORMAL: [&[&str]; 3] = [
     ],
 ];
 
-/// How strong the laser's echo was.
+/// Names of the strength of the laser's echo.
 pub(super) const INTENSITY: &[&str] = &[
     "intensity",
     "scalar_Intensity",
@@ -152,17 +152,18 @@ pub(super) const INTENSITY: &[&str] = &[
     "grey",
 ];
 
-/// The radius of a disk, world units.
+/// Names of a disk's radius in world units.
 pub(super) const RADIUS: &[&str] = &["radius", "scale", "pscale"];
 
-/// Attributes of three numbers or more, for formats that have such: a normal, and a colour.
+/// Names of attributes with three or more numbers, for formats that have them: normals, and
+/// colours.
 #[cfg(feature = "pcd")]
 pub(super) const NORMAL_VECTOR: &[&str] = &["normal", "normals", "N"];
 #[cfg(feature = "pcd")]
 pub(super) const COLOR_VECTOR: &[&str] = &["rgb", "rgba", "color", "colors", "colour", "Cd", "Col"];
 
-/// The first of `names` that is among `given`: as it is written, or else in capitals or without
-/// them, or else after `scalar_`.
+/// The index in `given` of the first of `names` that occurs there: in the same case, or else in any
+/// case, or else after `scalar_`.
 pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
     let first =
         |is: &dyn Fn(&str, &str) -> bool| names.iter().find_map(|name| given.clone().position(|given| is(given, name)));
@@ -175,10 +176,10 @@ pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Cl
         .or_else(|| first(&|given, name| plain(given).is_some_and(|plain| plain.eq_ignore_ascii_case(name))))
 }
 
-/// The three of which each has a name of its list.
+/// The indices of three attributes, one from each list of names.
 pub(super) fn find_triple<'a>(names: [&[&str]; 3], given: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
-    // Three that are called alike come first: a file may have `nx ny nz` and `normal_x` of
-    // something else.
+    // Three names of one spelling come first: a file may have `nx ny nz`, and `normal_x` with
+    // another meaning.
     let alike = (0..names[0].len()).find_map(|k| {
         let one = |channel: usize| find(names[channel].get(k..=k)?, given.clone());
         Some([one(0)?, one(1)?, one(2)?])

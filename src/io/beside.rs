@@ -1,15 +1,15 @@
-//! Files that a mesh names, as they are called on the disk.
+//! Lookup of the files that a mesh refers to by name.
 
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The folder of a mesh, and the names in folders that were looked through.
+/// The folder of a mesh, and the listings of the folders that were searched.
 #[derive(Debug)]
 pub(super) struct Beside {
     folder: PathBuf,
-    /// The entries of each folder by their names in lower case; of several in one case the first by
-    /// its name.
+    /// Entries of each folder by their lower-case names; the first in sorted order if several
+    /// differ only in case.
     listed: HashMap<PathBuf, HashMap<String, PathBuf>>,
 }
 
@@ -19,15 +19,15 @@ impl Beside {
         Self { folder: path.parent().unwrap_or(Path::new("")).to_owned(), listed: HashMap::new() }
     }
 
-    /// The file that is called `name`, which may be written as Windows does: with backslashes, and
-    /// in another case than on the disk. Where there is none, the path of the name as it is.
+    /// The path of the file with this `name`, which may have Windows backslashes and another case
+    /// than on disk. If there is none, the path of the name as it is.
     pub(super) fn file(&mut self, name: &str) -> PathBuf {
         let name = name.replace('\\', "/");
         let as_written = self.folder.join(&name);
         if as_written.exists() { as_written } else { self.in_any_case(Path::new(&name)).unwrap_or(as_written) }
     }
 
-    /// The file whose path differs from that of `name` in nothing but case.
+    /// The file whose path equals that of `name` except for case.
     fn in_any_case(&mut self, name: &Path) -> Option<PathBuf> {
         let mut path = self.folder.clone();
         for part in name.components() {
@@ -43,7 +43,7 @@ impl Beside {
             let names = fs::read_dir(here).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.file_name()));
             let mut names: Vec<_> = names.collect();
             names.sort_unstable();
-            // Later ones take the place of earlier ones.
+            // Later entries replace earlier ones, so the reversed order lets the first one win.
             names.iter().rev().map(|name| (lower(Path::new(name)), folder.join(name))).collect()
         })
     }

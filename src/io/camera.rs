@@ -5,9 +5,10 @@
 //!   "camera_to_world": [[1,0,0,0], [0,-1,0,0], [0,0,-1,5], [0,0,0,1]] }
 //! ```
 //!
-//! Camera space is x right, y down, z forward. The pose is `camera_to_world`, `world_to_camera` (4x4, rows) or `eye`,
-//! `target` and optionally `up`; the lens is `fx fy cx cy` or `fov` (vertical, degrees), or with `"model":
-//! "orthographic"` those in pixels per world unit, or `height_world`.
+//! Camera space is x right, y down, z forward. The pose is `camera_to_world` or `world_to_camera`
+//! (4x4, rows), or `eye`, `target` and optionally `up`. The lens is `fx fy cx cy` in pixels, or
+//! `fov` (vertical, degrees). With `"model": "orthographic"` it is `fx fy cx cy` in pixels per
+//! world unit, or `height_world`.
 
 use std::path::Path;
 
@@ -20,25 +21,25 @@ use crate::io::values::one_line;
 use crate::scene::Lens;
 use crate::scene::camera::DEFAULT_FOV;
 
-/// What a camera file says.
+/// The content of a camera file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFile {
-    /// Image size, if given.
+    /// Width and height in pixels, if given.
     pub size: Option<(u32, u32)>,
-    /// Intrinsics.
+    /// The lens: intrinsics, field of view or height of view.
     pub lens: Lens,
-    /// Pose.
+    /// Position and orientation.
     pub pose: Pose,
     /// Near depth, if given.
     pub near: Option<f64>,
 }
 
-/// Where a camera stands.
+/// Position and orientation of a camera.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pose {
-    /// World-to-camera rotation and the eye in world coordinates.
+    /// World-to-camera rotation, and the eye in world coordinates.
     Rigid(DMat3, DVec3),
-    /// Eye, target and up.
+    /// Eye, target and up, in world coordinates.
     LookAt(DVec3, DVec3, Option<DVec3>),
 }
 
@@ -78,11 +79,12 @@ pub fn read(path: &Path) -> Result<CameraFile> {
 }
 
 impl CameraFile {
-    /// The same view with `scale` times as many pixels a side, rounded; the lens keeps what it sees. A camera that gives no size
-    /// keeps all.
+    /// Scales the image by `scale` a side, with rounded sizes; the field of view stays the same. A
+    /// camera without a size is unchanged.
     pub fn scaled(self, scale: f64) -> Self {
         let Some((width, height)) = self.size else { return self };
-        // At least one pixel of some; what is too many saturates and is refused where sizes are, as none is.
+        // Rounds to at least one pixel, unless the size is 0. Sizes that are too large saturate;
+        // they and 0 are refused where sizes are checked.
         let scaled = |side: u32| if side == 0 { 0 } else { (f64::from(side) * scale).round().max(1.0) as u32 };
         let size = (scaled(width), scaled(height));
         let (x, y) = (f64::from(size.0) / f64::from(width), f64::from(size.1) / f64::from(height));
@@ -135,15 +137,15 @@ fn parse(text: &str) -> std::result::Result<CameraFile, String> {
         _ => return Err("the camera gives its pose twice".into()),
     };
     if raw.up.is_some() && matches!(pose, Pose::Rigid(..)) {
-        return Err("a pose given as a matrix has its own up".into());
+        return Err("a pose matrix contains the up direction: leave `up` out".into());
     }
     Ok(CameraFile { size, lens, pose, near: raw.near })
 }
 
-/// The rotation and the translation of a 4x4 matrix, rows, whose last is 0 0 0 1.
+/// The rotation and translation of a 4x4 matrix, given by rows; the last row must be 0 0 0 1.
 pub(super) fn rigid(rows: [[f64; 4]; 4]) -> std::result::Result<(DMat3, DVec3), String> {
     if rows[3] != [0.0, 0.0, 0.0, 1.0] {
-        return Err("the last row of a pose is 0 0 0 1".into());
+        return Err("the last row of a pose matrix must be 0 0 0 1".into());
     }
     let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
     Ok((DMat3::from_cols(column(0), column(1), column(2)), column(3)))

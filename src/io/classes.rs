@@ -1,5 +1,5 @@
-//! What the classes of a laser scan's points (LAS 1.4, table 17: 2 is ground, 3 to 5 are vegetation, 6 buildings, 7 noise) say of how they
-//! are drawn.
+//! Classes of a laser scan's points and their opacities. (LAS 1.4, table 17: 2 is ground, 3 to 5
+//! are vegetation, 6 is building, 7 is noise.)
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::scene::Colors;
 use crate::scene::color::DEFAULT_COLOR;
 
-/// The opacity of each class: the alpha of its points, which are left out if it is 0.
+/// The opacity of each class, which is the alpha of its points; points with opacity 0 are left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClassOpacities([f32; 256]);
 
@@ -19,17 +19,19 @@ impl Default for ClassOpacities {
 }
 
 impl ClassOpacities {
-    /// Whether all are 1.
+    /// Whether all opacities are 1.
     pub fn are_plain(&self) -> bool {
         *self == Self::default()
     }
 
-    /// That of a class.
+    /// The opacity of a class.
     pub fn of(&self, class: u8) -> f32 {
         self.0[usize::from(class)]
     }
 
-    /// The colours, or the default ones, of points of these `classes`, with their opacities as alphas.
+    /// Sets the alphas of points to the opacities of their `classes`.
+    ///
+    /// Points without colours get the default one. Nothing changes if all these opacities are 1.
     pub(super) fn fade(&self, colors: Option<Colors>, classes: &[u8]) -> Option<Colors> {
         if classes.iter().all(|class| self.of(*class) == 1.0) {
             return colors;
@@ -44,7 +46,7 @@ impl ClassOpacities {
                 codes.iter_mut().zip(alphas).for_each(|(code, alpha)| code[3] = (255.0 * alpha).round() as u8);
                 Some(Colors::Srgb8(codes))
             }
-            // What a byte has not.
+            // Some opacity is not a multiple of 1/255, so codes become linear light.
             Some(Colors::Srgb8(codes)) => {
                 let colors = Colors::Srgb8(codes);
                 let faded = alphas.enumerate().map(|(index, alpha)| {
@@ -57,13 +59,13 @@ impl ClassOpacities {
                 let [r, g, b, _] = DEFAULT_COLOR;
                 Some(Colors::Linear(alphas.map(|alpha| [r, g, b, alpha]).collect()))
             }
-            // A laser scan has no other colours.
+            // Laser scans have no other colours.
             other => other,
         }
     }
 }
 
-/// What the format calls a class; of most, which are cables, pylons and the like, nothing.
+/// The format's name of a class; None for most, such as cables and pylons.
 pub fn class_name(class: u8) -> Option<&'static str> {
     Some(match class {
         0 => "never classified",
@@ -84,7 +86,7 @@ pub fn class_name(class: u8) -> Option<&'static str> {
 }
 
 impl fmt::Display for ClassOpacities {
-    /// As they are read.
+    /// Writes the syntax that `from_str` reads.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (mut first, mut comma) = (0, "");
         for run in self.0.chunk_by(|a, b| a == b) {
@@ -101,7 +103,7 @@ impl fmt::Display for ClassOpacities {
     }
 }
 
-/// Whether an alpha is one of those that a byte has.
+/// Whether a byte can represent this alpha exactly.
 fn is_code(alpha: f32) -> bool {
     (255.0 * alpha).fract() == 0.0
 }
@@ -109,7 +111,8 @@ fn is_code(alpha: f32) -> bool {
 impl FromStr for ClassOpacities {
     type Err = Error;
 
-    /// `CLASS:A` or `FIRST-LAST:A`, several with commas between them; of two that name one class the later holds.
+    /// Parses `CLASS:A` or `FIRST-LAST:A`, several separated by commas; later ones override earlier
+    /// ones.
     fn from_str(text: &str) -> Result<Self, Error> {
         let mut all = Self::default();
         for rule in text.split(',') {
@@ -159,7 +162,7 @@ mod tests {
         assert_eq!(codes, Some(Colors::Srgb8(vec![[1, 2, 3, 255], [1, 2, 3, 51]])));
         let [r, g, b, _] = DEFAULT_COLOR;
         assert_eq!(of.fade(None, &[3, 1]), Some(Colors::Linear(vec![[r, g, b, 0.2], [r, g, b, 1.0]])));
-        // Where no class of the file is meant, nothing changes.
+        // No point has a class with another opacity than 1, so nothing changes.
         assert_eq!(of.fade(None, &[2, 1]), None);
     }
 }

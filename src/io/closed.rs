@@ -1,11 +1,13 @@
-//! Whether a mesh closes its surface and faces outward: then nobody outside sees a back of it.
+//! Whether a mesh is closed and faces outward, so that its back is not visible from outside.
 
 use crate::sets::Sets;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Whether every edge of the `triangles` is one of two of them, which go along it in opposite directions, and each of their
-/// connected parts encloses a positive volume. Vertices at one position are one.
+/// Whether the `triangles` form closed surfaces that face outward.
+///
+/// Each edge must belong to exactly two triangles that traverse it in opposite directions, and each
+/// connected component must enclose a positive volume. Vertices at equal positions are merged.
 pub(crate) fn is_closed(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
     if triangles.is_empty() {
         return false;
@@ -25,7 +27,7 @@ pub(crate) fn is_closed(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool 
     faces_outward(positions, &triangles)
 }
 
-/// Whether every directed edge is there once, and so is the opposite one.
+/// Whether every directed edge occurs once, and so does its opposite.
 fn pairs(triangles: &[[u32; 3]]) -> bool {
     let edge = |a: u32, b: u32| u64::from(a) << 32 | u64::from(b);
     let edges = |[a, b, c]: &[u32; 3]| [edge(*a, *b), edge(*b, *c), edge(*c, *a)];
@@ -36,9 +38,9 @@ fn pairs(triangles: &[[u32; 3]]) -> bool {
     along.windows(2).all(|pair| pair[0] != pair[1]) && along == against
 }
 
-/// For each position the first vertex that has it.
+/// For each vertex, the first vertex at the same position.
 pub(crate) fn distinct(positions: &[[f64; 3]]) -> Vec<u32> {
-    // Adding +0 makes -0 the same coordinate as 0.
+    // Adding +0 turns -0 into 0, so that both compare equal.
     let key = |vertex: u32| positions[vertex as usize].map(|c| (c + 0.0).to_bits());
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     order.par_sort_unstable_by_key(|&vertex| (key(vertex), vertex));
@@ -49,7 +51,7 @@ pub(crate) fn distinct(positions: &[[f64; 3]]) -> Vec<u32> {
     first
 }
 
-/// Whether each connected part of the `triangles` encloses a positive volume.
+/// Whether each connected component of the `triangles` encloses a positive volume.
 fn faces_outward(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
     let mut parts = Sets::new(positions.len());
     for &[a, b, c] in triangles {
@@ -61,7 +63,7 @@ fn faces_outward(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
     let at = |vertex: u32| DVec3::from(positions[vertex as usize]);
     for &[a, b, c] in triangles {
         let part = parts.least(a) as usize;
-        // Relative to a vertex of the part, so that it does not matter where in the world it is.
+        // Relative to a vertex of the component, so that large coordinates do not cost precision.
         let from = at(part as u32);
         volumes[part] += (at(a) - from).dot((at(b) - from).cross(at(c) - from));
         enclosed[part] = true;
@@ -92,7 +94,7 @@ mod tests {
         let soup: Vec<[f64; 3]> = OUTWARD.iter().flatten().map(|corner| CORNERS[*corner as usize]).collect();
         let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]];
         assert!(is_closed(&soup, &triangles));
-        // Another one beside it that faces inward.
+        // A second tetrahedron beside the first: facing outward, and facing inward.
         let both: Vec<[f64; 3]> = CORNERS.into_iter().chain(CORNERS.map(|[x, y, z]| [x, y, z + 9.0])).collect();
         let with = |other: [[u32; 3]; 4]| [OUTWARD, other.map(|corners| corners.map(|corner| corner + 4))].concat();
         assert!(is_closed(&both, &with(OUTWARD)));

@@ -1,4 +1,4 @@
-//! The files that a file names, and those that they name: meshes, material libraries, images.
+//! The files that a file refers to, directly or indirectly: meshes, material libraries, images.
 
 use std::collections::BTreeSet;
 use std::io::Seek;
@@ -7,21 +7,22 @@ use std::path::{Path, PathBuf};
 use super::{Format, Input, obj, ply};
 use crate::{Error, Result};
 
-/// All files that are read at second hand with the one at `path`, whether they exist or not: the
-/// mesh and the textures that a PLY file names, the material libraries of an OBJ file and the
-/// images that these name, and all that such a mesh names in turn. None for other files, and for
-/// what cannot be read. The file is opened as [`Input::open`] does; a pipe is read to its end, and
-/// [`Input::open`] goes on from the copy.
+/// All files that are read together with the one at `path`, whether they exist or not.
+///
+/// A PLY file may name a mesh and textures, an OBJ file material libraries, and these may name
+/// images. A named mesh is searched in turn. Empty for other files, and for files that cannot be
+/// read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the next
+/// [`Input::open`] uses the copy.
 ///
 /// # Errors
 ///
-/// The errors of [`Input::open`] for a pipe, which cannot be opened again.
+/// The errors of [`Input::open`] for a pipe, because it cannot be opened again.
 pub fn companions(path: &Path, format: Option<Format>) -> Result<Vec<PathBuf>> {
     let mut found = names_in(path, format, is_stream(path))?;
     let mut known: BTreeSet<PathBuf> = found.iter().cloned().collect();
     let mut looked_at = 0;
     while looked_at < found.len() {
-        // An image names nothing, and its first bytes say that it is no mesh.
+        // An image names no files: its first bytes show that it is no mesh.
         for named in names_in(&found[looked_at], None, false).unwrap_or_default() {
             if known.insert(named.clone()) {
                 found.push(named);
@@ -36,9 +37,9 @@ fn is_stream(path: &Path) -> bool {
     path == Path::new("-") || std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
-/// Files that a file names by itself.
+/// The files that a file names directly.
 fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<PathBuf>> {
-    // A pipe that another file names is never read.
+    // A pipe that another file names is never opened.
     if !stream && !std::fs::metadata(path).is_ok_and(|there| there.is_file()) {
         return Ok(Vec::new());
     }
@@ -47,7 +48,7 @@ fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<Pat
         Err(error) if stream => return Err(error),
         Err(_) => return Ok(Vec::new()),
     };
-    // Names are relative to the folder that readers take: for standard input the current one.
+    // Names are relative to the folder that readers use; for standard input the current folder.
     let own = if path == Path::new("-") { Path::new("") } else { path };
     let named = match input.format {
         Format::Ply => ply::companions(&mut input.file, own),
@@ -82,7 +83,7 @@ mod tests {
         assert!(of("m.las", header).is_empty() && of("bad.ply", "ply\n").is_empty());
         assert!(companions(&at("none.obj"), None).unwrap().is_empty());
         assert!(companions(folder.path(), None).unwrap().is_empty());
-        // Whatever a file is called, and in UTF-16 too.
+        // The extension does not matter if the format is given, and the text may be UTF-16.
         let utf16: Vec<u8> = "\u{feff}mtllib a.mtl\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         fs::write(at("m.dat"), utf16).unwrap();
         assert!(companions(&at("m.dat"), None).unwrap().is_empty());

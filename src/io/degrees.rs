@@ -1,13 +1,14 @@
-//! Degrees that are drawn as if they were metres.
+//! Detection of coordinates in degrees that would be drawn as if they were metres.
 
-/// Heights that reach over this many times the horizontal extent are of another unit.
+/// Heights that span at least this many times the horizontal extent are in another unit.
 const TOO_HIGH: f64 = 50.0;
 
-/// Positions this many times farther from the origin than they are wide are no object about it.
+/// Longitudes and latitudes are at least this many times farther from the origin than they are
+/// wide; an object around the origin is not.
 const FAR: f64 = 3.0;
 
-/// A sentence if the box of points looks like degrees of longitude and latitude with heights in
-/// metres, or if a coordinate system says so (`geographic`).
+/// A sentence for the user if the bounding box looks like longitude and latitude in degrees with
+/// heights in metres, or if the coordinate system says so (`geographic`).
 pub(super) fn hint(name: &str, [min, max]: [[f64; 3]; 2], geographic: Option<bool>) -> Option<String> {
     let extent = [0, 1, 2].map(|axis| max[axis] - min[axis]);
     let wide = extent[0].max(extent[1]);
@@ -20,17 +21,17 @@ pub(super) fn hint(name: &str, [min, max]: [[f64; 3]; 2], geographic: Option<boo
         return None;
     }
     let why = match geographic {
-        Some(_) => "its coordinate system is one of degrees",
+        Some(_) => "its coordinate system is in degrees",
         None => "its coordinates look like degrees of longitude and latitude",
     };
     Some(format!(
-        "{name}: {why}, and heights of {} to {} are beside them as if all were of one unit: project it to metres first, as \
-         `pdal translate` does with --filter filters.reprojection",
+        "{name}: {why}, but its heights of {} to {} are drawn in the same unit: project it to metres first, for example \
+         with `pdal translate` and --filter filters.reprojection",
         min[2], max[2]
     ))
 }
 
-/// The same of the box of points.
+/// The sentence of [`hint`] for the bounding box of the finite positions.
 pub(super) fn hint_of(name: &str, positions: &[[f64; 3]], geographic: Option<bool>) -> Option<String> {
     let finite = || positions.iter().filter(|position| position.iter().all(|c| c.is_finite()));
     let all = |of: fn(f64, f64) -> f64, start: f64| {
@@ -46,12 +47,12 @@ mod tests {
     #[test]
     fn degrees_are_told_from_metres() {
         let hinted = |min, max, geographic| hint("a", [min, max], geographic).is_some();
-        // A valley at 48 degrees north, in either order, and a whole country.
+        // A valley at 48 degrees north with either axis order, and regions of a degree.
         assert!(hinted([11.5, 48.1, 500.0], [11.51, 48.11, 520.0], None));
         assert!(hinted([48.1, 11.5, 500.0], [48.11, 11.51, 520.0], None));
         assert!(hinted([-71.2, -33.1, 0.0], [-70.1, -32.0, 3000.0], None));
         assert!(hinted([11.0, 48.0, 500.0], [12.0, 49.0, 500.0], Some(true)));
-        // A room, a tower about the origin, a drill hole, a projected system, a scan of metres.
+        // A room, a tower at the origin, a drill hole, a projected system, a scan in metres, NaN.
         assert!(!hinted([-3.0, -4.0, 0.0], [3.0, 4.0, 2.5], None));
         assert!(!hinted([-2.0, -2.0, 0.0], [2.0, 2.0, 200.0], None));
         assert!(!hinted([0.0, 0.0, -800.0], [0.3, 0.3, 0.0], None));

@@ -1,4 +1,4 @@
-//! E57 (ASTM E2807): the scans of laser scanners on the ground, through the `e57` crate.
+//! E57 (ASTM E2807), the format of terrestrial laser scanners, read by the `e57` crate.
 
 use std::fs::File;
 use std::io::{self, BufReader};
@@ -13,24 +13,25 @@ use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
 
-/// No scan has more attributes.
+/// The most attributes of a scan that is read.
 const MOST_ATTRIBUTES: usize = 64;
 
-/// Reads the points of all scans of an E57 file, in the file's own system: each scan's pose is applied, in f64.
+/// Reads the points of all scans of an E57 file, in the file's coordinate system.
 ///
-/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as
-/// invalid are left out. Normals, if any scan has the extension `nor` for them, are turned with its
-/// pose, and zero where it has none. Colours are sRGB codes, in the range that the scan gives or
-/// else its type, unless the values say otherwise ([`RawColors`]). The intensities of scans without
-/// colours become grey. Up is z.
+/// Each scan's pose is applied in f64. Coordinates are Cartesian or, where a scan has none,
+/// spherical; points that are marked as invalid are left out. If any scan has normals (extension
+/// `nor`), they are rotated with its pose, and scans without normals get zero. Colours are
+/// interpreted from their values and from the limits that the scan or its type states
+/// ([`RawColors`]). The intensities of scans without colours become grey. Up is z.
 ///
-/// A scan that has no points or cannot be read is left out, and told by [`Points::unread`], if
-/// another one can be read and [`ReadOptions::strict`] is not said.
+/// A scan that has no points or cannot be read is left out and named in [`Points::unread`], unless
+/// no scan can be read or [`ReadOptions::strict`] is set.
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
-/// is not E57, ends early, fails its checksums or cannot be decoded.
+/// [`Error::Read`](crate::Error::Read) where the system cannot read,
+/// [`Error::Malformed`](crate::Error::Malformed) where the file is not E57, ends early, fails its
+/// checksums or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
@@ -98,19 +99,20 @@ fn about(reader: &E57Reader<BufReader<File>>, scans: &[PointCloud]) -> About {
     about
 }
 
-/// An attribute as files call it.
+/// The name of an attribute as files write it.
 fn name_of(name: &RecordName) -> String {
     if let RecordName::Unknown { namespace, name } = name {
         return one_line(&format!("{namespace}:{name}"));
     }
-    // The crate's names are the format's but for the first letter.
+    // The crate's names differ from the format's only in the case of the first letter.
     let name = format!("{name:?}");
     let (first, rest) = name.split_at(1);
     first.to_ascii_lowercase() + rest
 }
 
-/// The scans that have points, by their names, and how many there are in all: those that have none,
-/// or promise more than is left of so many bits of the file, are left out.
+/// Returns the readable scans with their names, and the number of all scans.
+///
+/// Scans without points are left out, and those that [`check`] refuses.
 fn usable(
     scans: Vec<PointCloud>,
     mut left: u64,
@@ -123,7 +125,7 @@ fn usable(
             None => format!("scan {number}"),
         };
         match check(&scan, left) {
-            // One scan without points is a file without points, which is no fault.
+            // A single scan without points is an empty file, which is no fault.
             Ok(_) if scan.records == 0 && all > 1 => {
                 let fault = Fault::Malformed(format!("its scan {number} has no points"));
                 unread.add(|_| format!("{name} has no points"), 0, fault, strict)?;
@@ -142,7 +144,7 @@ fn usable(
     Ok((usable, all))
 }
 
-/// The crate's failures that are the file's fault, told from the system's.
+/// Separates a damaged file from a failure of the system.
 fn of_e57(error: ::e57::Error) -> Fault {
     if let ::e57::Error::Read { source: Some(source), .. } = &error
         && let Some(of_system) = source.downcast_ref::<io::Error>()
@@ -156,8 +158,8 @@ fn of_e57(error: ::e57::Error) -> Fault {
     Fault::Malformed(one_line(&error.to_string()))
 }
 
-/// Holds what a scan promises against the `left` bits of the file, before anything is allocated for it; the bits that it leaves
-/// to the others.
+/// Checks a scan's attributes, and its number of points against the `left` bits of the file, before
+/// memory is allocated. Returns the bits that remain for the other scans.
 fn check(scan: &PointCloud, left: u64) -> Result<u64, String> {
     if Place::of(scan).is_none() {
         return Err("has no coordinates".into());
@@ -165,7 +167,8 @@ fn check(scan: &PointCloud, left: u64) -> Result<u64, String> {
     if scan.prototype.len() > MOST_ATTRIBUTES {
         return Err(format!("has {} attributes, more than {MOST_ATTRIBUTES}", scan.prototype.len()));
     }
-    // Values that are all the same take no bits; points of which none takes any would have no end.
+    // An attribute with constant values takes no bits. If all are constant, the file's length does
+    // not limit the number of points, so `checked_div` gives none and the scan is refused.
     let bits: u64 = scan.prototype.iter().map(|record| bits(&record.data_type)).sum();
     let held = left.checked_div(bits).unwrap_or(0);
     if held < scan.records {
@@ -174,7 +177,7 @@ fn check(scan: &PointCloud, left: u64) -> Result<u64, String> {
     Ok(left - bits * scan.records)
 }
 
-/// Bits of a value in the file.
+/// Bits of one value in the file.
 fn bits(kind: &RecordDataType) -> u64 {
     match *kind {
         RecordDataType::Single { .. } => 32,
@@ -185,7 +188,7 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// Which of a scan's attributes are its coordinates, and which marks the invalid ones.
+/// Indices of a scan's coordinate attributes, and of the one that marks invalid points.
 #[derive(Clone, Copy)]
 struct Place {
     spherical: bool,
@@ -210,7 +213,7 @@ fn index(scan: &PointCloud, name: &RecordName) -> Option<usize> {
     scan.prototype.iter().position(|record| record.name == *name)
 }
 
-/// The attributes of the extension `nor` (E57_EXT_surface_normals), by whatever prefix a file has it, if by one at all.
+/// The normals of the extension `nor` (E57_EXT_surface_normals), with any namespace prefix.
 fn normal(scan: &PointCloud) -> Option<[usize; 3]> {
     let named = |wanted: &str| {
         let is = |name: &RecordName| matches!(name, RecordName::Unknown { name, .. } if name == wanted);
@@ -224,30 +227,30 @@ fn triple(scan: &PointCloud, names: &[RecordName; 3]) -> Option<[usize; 3]> {
     Some([a?, b?, c?])
 }
 
-/// The points of a file while they are being read.
+/// The points of a file while it is being read.
 #[derive(Default)]
 struct Reading {
     positions: Vec<[f64; 3]>,
-    /// If any scan has normals; zero where there is none.
+    /// None if no scan has normals; zero for scans without.
     normals: Option<Vec<[f32; 3]>>,
-    /// Colours and intensities, scan by scan.
+    /// Colours and intensities, one run per scan.
     runs: Vec<Run>,
-    /// Numbers of points that are marked as invalid, over all scans.
+    /// Indices of the points that are marked as invalid or that could not be read, over all scans.
     left_out: Vec<u64>,
 }
 
 impl Reading {
-    /// Points so far, and those that are left out.
+    /// The number of points, and the number of those left out.
     fn state(&self) -> (usize, usize) {
         (self.positions.len(), self.left_out.len())
     }
 
-    /// Leaves out all points of a scan of so many, since which this was the state.
+    /// Leaves out all `records` points of a scan, before which the state was as given.
     fn go_back(&mut self, (positions, left_out): (usize, usize), records: u64) {
         self.positions.truncate(positions);
         self.normals.iter_mut().for_each(|normals| normals.truncate(positions));
         self.left_out.truncate(left_out);
-        // Their numbers stay those of the file.
+        // Points keep the indices that they have in the file.
         let first = (positions + left_out) as u64;
         self.left_out.extend(first..first.saturating_add(records));
     }
@@ -328,13 +331,13 @@ impl Reading {
 /// The colours and intensities of a scan while it is being read.
 #[derive(Default)]
 struct Looks {
-    /// As they are in the file; not numbers where a point has none.
+    /// Numbers as they are in the file; NaN where a point has no colour.
     colors: Vec<[f32; 4]>,
-    /// Some colour is not zero.
+    /// Whether any colour is not zero.
     colored: bool,
-    /// Some point has a colour.
+    /// Whether any point has a colour.
     given: bool,
-    /// As long as no colour says anything; 0 where there is none.
+    /// Intensities, stored until the first non-zero colour; 0 where a point has none.
     intensities: Vec<f32>,
 }
 
@@ -363,12 +366,12 @@ impl Looks {
     }
 }
 
-/// A scan's colours.
+/// Indices of a scan's red, green and blue.
 fn color(scan: &PointCloud) -> Option<[usize; 3]> {
     triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue])
 }
 
-/// The kind of the numbers of a scan's colours.
+/// The kind of a scan's colour numbers.
 fn kind(scan: &PointCloud, color: [usize; 3]) -> Kind {
     let of_record = |at: usize| match scan.prototype.get(at).map(|record| &record.data_type) {
         Some(RecordDataType::Integer { min, max }) => Number::Integer(max.abs_diff(*min)),
@@ -378,7 +381,7 @@ fn kind(scan: &PointCloud, color: [usize; 3]) -> Kind {
     Kind { limits: limits(scan, color), ..Kind::of(number) }
 }
 
-/// What takes a scan's coordinates to the file's.
+/// The rotation and translation from a scan's coordinates to the file's.
 fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
     let Some(pose) = &scan.transform else { return Ok((DQuat::IDENTITY, DVec3::ZERO)) };
     let (q, t) = (&pose.rotation, &pose.translation);
@@ -390,8 +393,8 @@ fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
     Ok((rotation.normalize(), DVec3::new(t.x, t.y, t.z)))
 }
 
-/// Smallest and largest values of a scan's colours: those it gives, or else those of their types;
-/// floats have none.
+/// The smallest and largest value of each colour channel: those that the scan states, or else those
+/// of its integer type. None if a channel has neither.
 fn limits(scan: &PointCloud, color: [usize; 3]) -> Option<[(f64, f64); 3]> {
     let limits = scan.color_limits.as_ref();
     let given = [

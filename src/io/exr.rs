@@ -1,13 +1,13 @@
-//! OpenEXR: linear f32, each map a named layer of one file.
+//! OpenEXR: linear f32, with each map as a named layer of one file.
 //!
 //! | layer | channels |
 //! |---|---|
 //! | `color` | R G B A, straight alpha |
-//! | `depth` | Z, world units, +inf where nothing is |
+//! | `depth` | Z, world units, +inf for background |
 //! | `normal` | X Y Z, world space |
 //! | `weight`, `count`, `decision` | Y |
 //!
-//! Layers follow from [`MAPS`](crate::scene::MAPS).
+//! The layers follow from [`MAPS`](crate::scene::MAPS).
 
 use std::path::Path;
 
@@ -23,10 +23,10 @@ use crate::scene::Map;
 
 type Outcome<T> = crate::error::Result<T>;
 
-/// Writes all maps of `frame`.
+/// Writes the colour and all maps of `frame`.
 pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
     let size = Vec2(frame.width as usize, frame.height as usize);
-    // Scan lines in order, so that equal frames make equal files.
+    // Scan lines in increasing order, so that equal frames give equal files.
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let layer = |name: &str, channels: Vec<AnyChannel<FlatSamples>>| {
@@ -55,15 +55,16 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
     write_whole(path, |file| image.write().to_buffered(file).map_err(std::io::Error::other))
 }
 
-/// Reads the layers that [`write()`] writes. The colour is the layer `color`, or the first with R, G and B if none is
-/// called so; others are ignored.
+/// Reads the layers that [`write()`] writes; other layers are ignored.
+///
+/// The colour is the layer `color`, or else the first layer with R, G and B.
 pub fn read(path: &Path) -> Outcome<Frame> {
-    // exr reports a missing file as an I/O error of its own kind; asking first keeps the sentence plain.
+    // The exr crate wraps a missing file in its own error; checking first gives the usual message.
     check_regular(path).and_then(|()| std::fs::File::open(path).map(drop)).map_err(|e| EpsplatError::read(path, e))?;
     let unreadable = |e: Error| EpsplatError::malformed(path, format!("not a readable EXR: {e}"));
     let metadata = MetaData::read_from_file(path, false).map_err(unreadable)?;
     for header in &metadata.headers {
-        // Four bytes a channel as it is read, and as many in the frame.
+        // 4 bytes a channel in the decoded image, and 4 in the frame.
         let channels: u64 = metadata.headers.iter().map(|header| header.channels.list.len() as u64).sum();
         check(path, (header.layer_size.0 as u64, header.layer_size.1 as u64), 8 * channels)?;
     }
@@ -80,7 +81,7 @@ pub fn read(path: &Path) -> Outcome<Frame> {
         let channel = |name: &str| -> Option<Vec<f32>> {
             let channel = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name))?;
             Some(match &channel.sample_data {
-                // As a frame keeps them.
+                // A frame stores whole numbers as the bits of f32.
                 FlatSamples::U32(numbers) if is_whole => numbers.iter().copied().map(f32::from_bits).collect(),
                 _ if is_whole => return None,
                 samples => samples.values_as_f32().collect(),
@@ -122,7 +123,7 @@ mod tests {
         let color = ramp(n, 0.01).into_iter().map(|v| [v, 1.0 - v, -v, 0.5]).collect();
         let maps = MAPS.iter().map(|row| (row.map, ramp(n * row.map.width(), 1e-7)));
         let frame = maps.fold(Frame::of_colors(7, 5, color), |frame, (map, values)| frame.with(map, values));
-        // A number that is none of f32's, as where nothing is.
+        // Numbers whose bits are NaN as f32, such as that of the background.
         let names = (0..2 * n as u32).map(|k| f32::from_bits(u32::MAX - k)).collect();
         let frame = frame.with(Map::Depth, depth).with(Map::Index, names);
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Why reading stopped, before it is known which file it was.
+//! The reason why a reader failed, independent of the file's path.
 
 use crate::Error;
 use std::cell::Cell;
@@ -7,17 +7,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::Path;
 use std::sync::Once;
 
-/// A reader's failure without the path.
+/// A reader's failure, without the path.
 #[derive(Debug)]
 pub(super) enum Fault {
     /// The system could not read.
     Io(io::Error),
-    /// The file is not what its format says; one clause.
+    /// The file violates its format; the text is one clause.
     Malformed(String),
 }
 
 impl Fault {
-    /// The failure as the caller sees it.
+    /// Adds the path.
     pub(super) fn of(self, path: &Path) -> Error {
         match self {
             Self::Io(source) => Error::read(path, source),
@@ -32,7 +32,7 @@ impl From<io::Error> for Fault {
     }
 }
 
-/// Reserves room for `more` items, as an error and not an abort where the system has none.
+/// Reserves memory for `more` items; an allocation failure is an error and does not abort.
 pub(super) fn reserve<T>(items: &mut Vec<T>, more: u64) -> Result<(), Fault> {
     let more = usize::try_from(more).unwrap_or(usize::MAX);
     items.try_reserve_exact(more).map_err(|_| Fault::Io(io::ErrorKind::OutOfMemory.into()))
@@ -41,7 +41,7 @@ pub(super) fn reserve<T>(items: &mut Vec<T>, more: u64) -> Result<(), Fault> {
 /// Parts of a file that could not be read: scans, nodes, chunks.
 #[derive(Debug, Default)]
 pub(super) struct Unread {
-    /// The first of them, each with its reason.
+    /// The first parts, each with its reason.
     named: Vec<String>,
     parts: u64,
     points: u64,
@@ -49,11 +49,11 @@ pub(super) struct Unread {
 }
 
 impl Unread {
-    /// Parts that a sentence names, each with its reason.
+    /// The most parts that a sentence names.
     const MOST_NAMED: usize = 8;
 
-    /// Leaves out a part of so many points, of which a clause says what is wrong with it. Fails if
-    /// files are read strictly, and for what is not the file's fault.
+    /// Records that a part of `points` points is left out; `clause` describes it, given the reason.
+    /// Fails in strict mode, and for a failure of the system.
     pub(super) fn add(
         &mut self,
         clause: impl FnOnce(&str) -> String,
@@ -78,8 +78,8 @@ impl Unread {
         self.parts == 0
     }
 
-    /// The sentence about the file at `path`, which has `all` parts of this kind; where none of
-    /// them was `read`, the first one's fault.
+    /// The sentence about the file at `path`, which has `all` parts of this `kind`. Fails with the
+    /// first fault if no part was `read`.
     pub(super) fn told(self, path: &Path, (kind, all): (&str, u64), read: bool) -> Result<Vec<String>, Fault> {
         match self.first {
             None => return Ok(Vec::new()),
@@ -98,19 +98,21 @@ impl Unread {
     }
 }
 
-/// The name of a file for a progress line.
+/// The file name, for progress lines.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 thread_local! {
-    /// Whether panics on this thread are those of a decoder, which become a [`Fault`].
+    /// Whether a panic on this thread comes from a decoder, and becomes a [`Fault`] without a
+    /// message.
     static HUSHED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs what calls a decoder of another crate: corrupt data can make it panic. Nothing is printed of it.
+/// Runs a decoder of another crate, and turns its panic on corrupt data into a [`Fault`]; nothing
+/// is printed.
 ///
-/// A decoder's work on other threads is hushed only if they are: see [`hush_thread`].
+/// A decoder's other threads still print their panics unless they call [`hush_thread`].
 pub(super) fn surviving<T>(run: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     let before = HUSHED.get();
     hush_thread();
@@ -119,13 +121,13 @@ pub(super) fn surviving<T>(run: impl FnOnce() -> Result<T, Fault>) -> Result<T, 
     outcome.unwrap_or_else(|_| Err(Fault::Malformed("its points cannot be decoded; the file is damaged".into())))
 }
 
-/// Lets panics on this thread go unprinted from now on.
+/// Suppresses the messages of panics on this thread from now on.
 pub(super) fn hush_thread() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let usual = take_hook();
         set_hook(Box::new(move |panic| {
-            // A thread that is ending has no flag any more, and decodes nothing.
+            // A thread that is exiting has no flag any more; it decodes nothing.
             if !HUSHED.try_with(Cell::get).unwrap_or(false) {
                 usual(panic);
             }

@@ -1,4 +1,4 @@
-//! The formats that are read, and how files are told to be of one.
+//! The supported formats, and how the format of a file is detected.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -8,20 +8,20 @@ use super::values::BYTE_ORDER_MARK;
 /// A format of points or meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Polygon file format (Turk 1994).
+    /// Polygon File Format (Turk 1994).
     Ply,
-    /// LAS, or LAZ, its compressed form.
+    /// LAS, or its compressed form LAZ.
     Las,
     /// Wavefront OBJ.
     Obj,
-    /// ASTM E2807; read by builds with the feature `e57`.
+    /// ASTM E2807; needs the feature `e57`.
     E57,
-    /// Point Cloud Library; read by builds with the feature `pcd`.
+    /// Point Cloud Library; needs the feature `pcd`.
     Pcd,
 }
 
 impl Format {
-    /// The formats that this build reads, by the extensions of their files.
+    /// File extensions of the formats that this build reads.
     pub const READ: &[(&str, Self)] = &[
         ("ply", Self::Ply),
         ("las", Self::Las),
@@ -33,7 +33,7 @@ impl Format {
         ("pcd", Self::Pcd),
     ];
 
-    /// Those as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
+    /// These names as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {
         let names: Vec<_> = Self::READ.iter().map(|(name, _)| name.to_ascii_uppercase()).collect();
         match names.split_last() {
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// What a file's extension says, in either case; of formats that this build does not read too.
+    /// The format of a file's extension, in any case; also formats that this build does not read.
     pub(super) fn of_name(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "e57" => Some(Self::E57),
@@ -51,7 +51,7 @@ impl Format {
         }
     }
 
-    /// Names a known format that is not read, by the file's name or its first bytes.
+    /// Describes a file of a known but unsupported format, by its extension or first bytes.
     pub(super) fn unread(path: &Path, start: &[u8]) -> Option<String> {
         let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
         let named = |name: &str| extension.as_deref() == Some(name);
@@ -65,10 +65,10 @@ impl Format {
             _ if named("sog") => "a SOG file of Gaussians",
             _ => return None,
         };
-        Some(format!("it is {what}, which is not read: SuperSplat or splat-transform make a PLY file of it, which is"))
+        Some(format!("it is {what}, which is not read: convert it to PLY with SuperSplat or splat-transform"))
     }
 
-    /// What a file's first bytes say. OBJ files begin with anything.
+    /// The format of a file's first bytes. OBJ files have no signature.
     pub(super) fn of_start(start: &[u8]) -> Option<Self> {
         if start.starts_with(b"LASF") {
             return Some(Self::Las);
@@ -87,17 +87,16 @@ impl Format {
 }
 
 impl Format {
-    /// The fault of the first bytes of a stream that is said to be of this format; None if
-    /// they may be those of one.
+    /// The reason why the first bytes of a stream cannot be of this format; None if they can.
     pub(super) fn fault_of_start(self, start: &[u8]) -> Option<String> {
         let name = format!("{self:?}").to_ascii_uppercase();
         let fits = match self {
             Self::Ply | Self::Las | Self::E57 => Self::of_start(start) == Some(self),
-            // Their texts begin with anything, but not with zeros: of UTF-16 every other byte may
-            // be one.
+            // Text may begin with anything but two zero bytes; in UTF-16, every other byte may be
+            // zero.
             Self::Obj | Self::Pcd => !start.starts_with(&[0, 0]),
         };
-        let first = if self == Self::Ply { "line is not 'ply'" } else { "bytes are of no such file" };
+        let first = if self == Self::Ply { "line is not 'ply'" } else { "bytes do not match that format" };
         (!fits).then(|| format!("it is not a {name} file: its first {first}"))
     }
 }

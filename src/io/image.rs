@@ -1,4 +1,4 @@
-//! Images that are read: one limit of their size for all, found in the header before anything is allocated.
+//! Reading of images: one size limit for all, checked in the header before memory is allocated.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -9,47 +9,49 @@ use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use super::input::check_regular;
 use crate::error::{Error, Result};
 
-/// The most pixels of an image that is read: a picture of 16384x16384, as textures of scans are.
+/// The most pixels of an image that is read: 16384x16384, a common size of scans' textures.
 pub const MOST_PIXELS: u64 = 1 << 28;
 
-/// Refuses an image of more than [`MOST_PIXELS`], and one that the system has no memory for, `each` bytes a pixel.
+/// Refuses an image of more than [`MOST_PIXELS`], or one for which the system lacks memory at
+/// `each` bytes a pixel.
 ///
 /// # Errors
 ///
-/// [`Error::Malformed`] for the first, [`Error::Read`] for the second.
+/// [`Error::Malformed`] for too many pixels, [`Error::Read`] for too little memory.
 pub(super) fn check(path: &Path, (width, height): (u64, u64), each: u64) -> Result<()> {
     let pixels = width.saturating_mul(height);
     if pixels > MOST_PIXELS {
         let what =
-            format!("an image of at most {MOST_PIXELS} pixels is read, not of {width}x{height}: make it smaller");
+            format!("the image is {width}x{height}, more than the limit of {MOST_PIXELS} pixels: make it smaller");
         return Err(Error::malformed(path, what));
     }
     check_room(path, pixels.saturating_mul(each))
 }
 
-/// Makes sure that the system gives so many bytes, which what is made of the file at `path` is about to take. They are given
-/// back at once: decoders ask for them in parts, and end the program where they get none.
+/// Checks that the system can allocate this many bytes for data from the file at `path`.
+///
+/// The memory is freed at once. The check matters because decoders allocate in parts and abort the
+/// program when an allocation fails.
 ///
 /// # Errors
 ///
-/// [`Error::Read`].
+/// [`Error::Read`] if the allocation fails.
 pub fn check_room(path: &Path, bytes: u64) -> Result<()> {
     let bytes = usize::try_from(bytes).unwrap_or(usize::MAX);
     let room = Vec::<u8>::new().try_reserve_exact(bytes);
     room.map_err(|_| Error::read(path, std::io::ErrorKind::OutOfMemory.into()))
 }
 
-/// Makes sure that a file that is named by another one is a file: a pipe or a device may have no
-/// end.
+/// Checks that a file named by another one is a regular file: a pipe or a device may have no end.
 ///
 /// # Errors
 ///
-/// [`Error::Read`].
+/// [`Error::Read`] if it is not, or does not exist.
 pub(super) fn check_file(path: &Path) -> Result<()> {
     check_regular(path).map_err(|error| Error::read(path, error))
 }
 
-/// The bytes of a file.
+/// Reads the bytes of a regular file.
 ///
 /// # Errors
 ///
@@ -59,7 +61,7 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(|error| Error::read(path, error))
 }
 
-/// Width and height of an image, by its header.
+/// Reads width and height from an image's header.
 ///
 /// # Errors
 ///
@@ -69,12 +71,12 @@ pub(super) fn size(path: &Path) -> Result<[u32; 2]> {
     reader.into_dimensions().map(<[u32; 2]>::from).map_err(unreadable)
 }
 
-/// The formats of pictures that surfaces are painted with.
+/// The formats of images for textures.
 const PAINT: &str = "PNG, JPEG, BMP or TGA";
 
 type Opened = (ImageReader<BufReader<File>>, Box<dyn Fn(ImageError) -> Error>);
 
-/// A file that is open as an image, and how what is wrong with it is said.
+/// Opens an image file; also returns a function that describes what is wrong with it.
 fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     let called = if format.is_some() { "PNG" } else { PAINT };
     let of = path.to_owned();
@@ -83,21 +85,22 @@ fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
     match format {
         Some(format) => reader.set_format(format),
-        // The name decides where the first bytes say nothing, as they do of TGA.
+        // The extension decides where the first bytes do not, as for TGA.
         None => reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?,
     }
-    // The limit is ours; the library's is less than we write.
+    // [`MOST_PIXELS`] is the limit; the library's default is lower than the sizes that epsplat
+    // writes.
     reader.no_limits();
     Ok((reader, Box::new(unreadable)))
 }
 
-/// Decodes the image at `path`, a PNG, or without a `format` one that surfaces are painted with, by
-/// its first bytes or its name. `each` is how many bytes a pixel what is made of it will take.
+/// Decodes the image at `path`: a PNG, or without a `format` one for textures, by its first bytes
+/// or extension. `each` is the number of bytes a pixel that the caller will allocate.
 ///
 /// # Errors
 ///
-/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is no such image or
-/// too large.
+/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for an image of another
+/// format, or one that is too large.
 pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Result<DynamicImage> {
     let (reader, unreadable) = opened(path, format)?;
     let decoder = reader.into_decoder().map_err(&unreadable)?;

@@ -1,4 +1,4 @@
-//! What is read: a file, or a copy of what cannot be sought in.
+//! Inputs of readers: a file, or a copy of a stream that is not seekable.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, Write};
@@ -9,26 +9,26 @@ use super::Format;
 use super::values::text_of;
 use crate::{Error, Result};
 
-/// Bytes from the start by which formats are told apart.
+/// The number of first bytes that decide the format.
 const START: u64 = 32;
 
-/// The most bytes that are copied of what cannot be sought in: 4 GiB. A pipe may have no end.
+/// The most bytes that are copied from a stream: 4 GiB. A pipe may have no end.
 pub const MOST_COPIED: u64 = 1 << 32;
 
-/// A file that is open to be read: it can be sought in, and how long it is is known.
+/// An open, seekable file of known length and format.
 #[derive(Debug)]
 pub struct Input {
     pub(super) file: File,
-    /// Bytes.
+    /// Length in bytes.
     pub(super) length: u64,
-    /// What errors call it; files that it names lie beside it.
+    /// The name in errors; files that it refers to are looked up beside it.
     pub(super) path: PathBuf,
     pub(super) format: Format,
-    /// The file is a copy: the original cannot be read again.
+    /// Whether the file is a copy of a stream, which cannot be read again.
     copied: bool,
 }
 
-/// Copies that were looked at before they are read, each under the path that it will be opened by.
+/// Copies of streams that were inspected but not read yet, with the paths that will open them.
 static LOOKED_AT: Mutex<Vec<(PathBuf, Input)>> = Mutex::new(Vec::new());
 
 fn looked_at() -> MutexGuard<'static, Vec<(PathBuf, Input)>> {
@@ -36,17 +36,16 @@ fn looked_at() -> MutexGuard<'static, Vec<(PathBuf, Input)>> {
 }
 
 impl Input {
-    /// Opens the file at `path`, or for `-` standard input, and tells its format: the one that is given, or else that of its name's
-    /// extension in either case, or else that of its first bytes.
+    /// Opens the file at `path`, or standard input for `-`, and determines its format.
     ///
-    /// Pipes are read to their end into a temporary file without a name, which goes when the input
-    /// does. Devices are refused.
+    /// The format is the given one, or else that of the file's extension in any case, or else that
+    /// of its first bytes. Pipes are copied to an unnamed temporary file, which is deleted with the
+    /// input. Devices are refused.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read or has no room for the copy, or it would be
-    /// longer than [`MOST_COPIED`],
-    /// [`Error::Malformed`] where nothing tells the format.
+    /// [`Error::Read`] where the system cannot read, or a copy does not fit on disk or would exceed
+    /// [`MOST_COPIED`]. [`Error::Malformed`] where the format cannot be determined.
     pub fn open(path: &Path, format: Option<Format>) -> Result<Self> {
         let mut looked_at = looked_at();
         if let Some(at) = looked_at.iter().position(|(known, _)| known == path) {
@@ -60,8 +59,8 @@ impl Input {
         opened.into_input(called, named)
     }
 
-    /// Goes back to the start, and keeps a copy for the next that opens `path`, since the original
-    /// is read; what can be opened again is dropped. Standard input has one place for all.
+    /// Rewinds the file. If it is a copy of a stream, it is stored for the next call that opens
+    /// `path`, because the stream itself is consumed; otherwise it is closed.
     pub(super) fn keep(mut self, path: &Path) -> io::Result<()> {
         self.file.rewind()?;
         if self.copied {
@@ -71,7 +70,7 @@ impl Input {
     }
 }
 
-/// Refuses a device, which may have no end, and of which reading may do something.
+/// Refuses a device: it may have no end, and reading may have side effects.
 pub(crate) fn check_kind(there: &Metadata) -> io::Result<()> {
     #[cfg(unix)]
     {
@@ -85,8 +84,8 @@ pub(crate) fn check_kind(there: &Metadata) -> io::Result<()> {
     Ok(())
 }
 
-/// Refuses what is not a regular file, for files that the content of another names: opening a pipe
-/// would wait for who writes to it.
+/// Refuses anything but a regular file, for files that another file names: opening a pipe would
+/// block until somebody writes to it.
 pub(crate) fn check_regular(path: &Path) -> io::Result<()> {
     let there = std::fs::metadata(path)?;
     check_kind(&there)?;
@@ -96,10 +95,10 @@ pub(crate) fn check_regular(path: &Path) -> io::Result<()> {
     if there.is_file() { Ok(()) } else { Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")) }
 }
 
-/// The most bytes of a file of text that is read as a whole: cameras, studies.
+/// The most bytes of a text file that is read as a whole: cameras, studies.
 const MOST_TEXT: u64 = 1 << 28;
 
-/// The text of a file or a pipe, in UTF-8 or UTF-16.
+/// Reads the text of a file or a pipe, in UTF-8 or UTF-16.
 ///
 /// # Errors
 ///
@@ -120,14 +119,14 @@ pub(crate) fn text(path: &Path) -> Result<String> {
     read().map_err(|error| Error::read(path, error))
 }
 
-/// Standard input as a file; its place in the stream is that of the original.
+/// Standard input as a file that shares the stream's position.
 #[cfg(unix)]
 pub(crate) fn standard_input() -> io::Result<File> {
     use std::os::fd::AsFd;
     Ok(io::stdin().as_fd().try_clone_to_owned()?.into())
 }
 
-/// What was opened.
+/// An opened file with its length, or a stream.
 enum Opened {
     File(File, u64),
     Stream(Box<dyn Read>),
@@ -138,12 +137,12 @@ impl Opened {
         if standard {
             return Self::standard();
         }
-        // A device is not opened either, which may do something by itself.
+        // A device is not even opened, because that may have side effects.
         let there = std::fs::metadata(path)?;
         check_kind(&there)?;
         let file = File::open(path)?;
         let metadata = file.metadata()?;
-        // A directory can be opened, and says what it is when it is read.
+        // A directory can be opened; the error comes when it is read.
         if metadata.is_file() || metadata.is_dir() {
             return Ok(Self::File(file, metadata.len()));
         }
@@ -155,7 +154,7 @@ impl Opened {
         let mut file = standard_input()?;
         let metadata = file.metadata()?;
         check_kind(&metadata)?;
-        // A later reader goes on from where an earlier one left off.
+        // If an earlier reader has consumed a part, the rest is read as a stream.
         if metadata.is_file() && file.stream_position()? == 0 {
             return Ok(Self::File(file, metadata.len()));
         }
@@ -184,7 +183,7 @@ impl Opened {
                 (file, length, format)
             }
             Self::Stream(mut stream) => {
-                // The format is told first: what is no cloud may have no end.
+                // The format is checked before copying, as a stream of other data may have no end.
                 (&mut stream).take(START).read_to_end(&mut start).map_err(failed)?;
                 let format = named.or_else(|| Format::of_start(&start)).ok_or_else(|| unknown(path, &start))?;
                 if let Some(what) = format.fault_of_start(&start) {
@@ -198,7 +197,7 @@ impl Opened {
     }
 }
 
-/// Neither its name nor its first bytes say that it is of a format that is read.
+/// The error for a file whose extension and first bytes match no format.
 fn unknown(path: &Path, start: &[u8]) -> Error {
     if let Some(what) = Format::unread(path, start) {
         return Error::malformed(path, what);
@@ -206,12 +205,12 @@ fn unknown(path: &Path, start: &[u8]) -> Error {
     let formats = Format::sentence();
     Error::malformed(
         path,
-        format!("its format is not known: {formats} files are read; if it is one, --input-format says which"),
+        format!("its format is not known: {formats} files are read; if it is one, name it by --input-format"),
     )
 }
 
-/// All bytes of a stream, of which `start` is read and there are no more than `most`, in a
-/// temporary file; and how many.
+/// Copies a stream to a temporary file: the bytes `start`, which are already read, and the `rest`,
+/// `most` bytes in all. Returns the file and its length.
 fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
     let no_room = |error: io::Error| {
         let folder = std::env::temp_dir();
@@ -231,7 +230,7 @@ fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
         })?;
     if length > most {
         let most = if most < 1 << 20 { format!("{most} bytes") } else { format!("{} MiB", most >> 20) };
-        let what = format!("it is longer than {most}, the most that is copied of a pipe: name a file instead");
+        let what = format!("it is longer than {most}, the limit for a pipe: name a file instead");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
     }
     file.rewind()?;
@@ -280,7 +279,7 @@ mod tests {
             (Format::Obj, b"# a comment"),
             (Format::Obj, &utf16),
             (Format::Pcd, b"# a comment\nVERSION"),
-            // Too short for any: their readers say it.
+            // Too short for any format; the readers report that.
             (Format::Obj, b""),
         ] {
             assert_eq!(open(format, start).unwrap(), start.len() as u64, "{format:?}");

@@ -1,4 +1,4 @@
-//! The triangles of one input file, as they are.
+//! A triangle mesh as its file gives it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,48 +17,50 @@ use crate::scene::{Colors, Up};
 pub struct Mesh {
     /// World coordinates of the vertices.
     pub positions: Vec<[f64; 3]>,
-    /// The vertices of each triangle, by their index in `positions`, counter-clockwise seen from outside.
+    /// The vertices of each triangle as indices into `positions`, counter-clockwise seen from
+    /// outside.
     pub triangles: Vec<[u32; 3]>,
-    /// One normal for each corner of each triangle, any length; zero or non-finite means missing. Without them the mesh is
-    /// faceted: a triangle (a, b, c) has the normal `(b - a) x (c - a)`.
+    /// A normal per corner of each triangle, any length; zero or non-finite means missing. Without
+    /// them the mesh is faceted: a triangle (a, b, c) has the normal `(b - a) x (c - a)`.
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
-    /// One colour for each vertex.
+    /// A colour per vertex.
     pub colors: Option<Colors>,
-    /// One linear colour with straight alpha for each triangle, where vertices have none.
+    /// A linear colour with straight alpha per triangle, where vertices have none.
     pub face_colors: Option<Vec<[f32; 4]>>,
-    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left; not a
-    /// number for triangles without.
+    /// Texture coordinates (u, v) per corner of each triangle, origin bottom left; NaN for
+    /// triangles without any.
     pub texture: Option<Vec<[[f32; 2]; 3]>>,
-    /// What triangles may be made of.
+    /// The materials that triangles refer to.
     pub materials: Vec<Material>,
-    /// For each triangle an index into `materials`; one past its end means none.
+    /// Per triangle an index into `materials`; one past its end means none.
     pub material: Option<Vec<u32>>,
-    /// The direction that the format, by convention, calls up.
+    /// The up direction of the format's convention.
     pub up: Option<Up>,
-    /// What belongs to the mesh and could not be read, a sentence each.
+    /// Parts of the mesh that could not be read: one sentence each.
     pub notes: Vec<String>,
 }
 
-/// What a triangle is made of.
+/// The material of a triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// As the file calls it.
+    /// The name in the file.
     pub name: String,
-    /// Diffuse reflectivity: linear RGB, straight alpha.
+    /// Diffuse reflectivity: linear RGB with straight alpha.
     pub diffuse: [f32; 4],
-    /// An image that `diffuse` is multiplied by.
+    /// The image that is multiplied by `diffuse`.
     pub texture: Option<Arc<Texture>>,
-    /// The file of that image.
+    /// The path of the image.
     pub image: Option<PathBuf>,
 }
 
 impl Material {
-    /// Whether the edges of its image go on beyond [0, 1].
+    /// Whether texture coordinates outside [0, 1] take the edge texels instead of repeating the
+    /// image.
     pub fn clamps(&self) -> bool {
         self.texture.as_ref().is_some_and(|texture| texture.clamps())
     }
 
-    /// The image times the diffuse colour, in linear light and codes of 8 bits; if there is an image.
+    /// The image times the diffuse colour, as 8-bit codes; None if there is no image.
     pub fn painted(&self) -> Option<Arc<Texture>> {
         let texture = self.texture.as_ref()?;
         let plain = self.diffuse == [1.0; 4];
@@ -67,12 +69,12 @@ impl Material {
 }
 
 impl Mesh {
-    /// Whether the parts fit each other.
+    /// Checks that indices are valid and arrays have the right lengths.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if a triangle names a vertex that does not exist, or something that vertices or triangles have one of
-    /// each is not as many.
+    /// [`Error::Usage`] if a triangle uses a vertex that does not exist, if an array per vertex or
+    /// per triangle has another length, or if there are 2^32 triangles or more.
     pub fn check(&self) -> Result<()> {
         let (vertices, triangles) = (self.positions.len(), self.triangles.len());
         let named = self.triangles.as_flattened().iter().all(|&vertex| (vertex as usize) < vertices);
@@ -94,13 +96,13 @@ impl Mesh {
             return Ok(());
         }
         Err(Error::Usage(
-            "a mesh has fewer than 2^32 triangles, each names three of its vertices, its colours are as many as its \
-             vertices, and its normals, texture coordinates and materials as many as its triangles"
+            "a mesh must have fewer than 2^32 triangles of existing vertices, as many colours as vertices, and as many \
+             normals, texture coordinates and materials as triangles"
                 .into(),
         ))
     }
 
-    /// The mesh of those triangles whose flag is set, with the vertices and materials that they name.
+    /// Returns the triangles whose flag is set, with only the vertices and materials that they use.
     #[must_use]
     pub fn part(&self, keep: &[bool]) -> Self {
         fn kept<T: Copy>(all: &[T], keep: &[bool]) -> Vec<T> {
@@ -152,14 +154,15 @@ impl Mesh {
         }
     }
 
-    /// Gives every triangle one material, which is `texture` alone.
+    /// Gives every triangle one white material with this texture.
     pub fn paint(&mut self, texture: Texture) {
         let name = "texture".to_owned();
         self.materials = vec![Material { name, diffuse: [1.0; 4], texture: Some(Arc::new(texture)), image: None }];
         self.material = Some(vec![0; self.triangles.len()]);
     }
 
-    /// The textures that triangles are painted with, each once, and which of them each triangle has.
+    /// Returns the distinct textures of the triangles, and for each triangle the index of its
+    /// texture.
     pub fn textures(&self) -> (Vec<Arc<Texture>>, Vec<Option<u32>>) {
         let mut textures = Numbers::default();
         let number = |material: &Material| material.texture.as_ref().map(|texture| textures.of(texture));
@@ -170,16 +173,20 @@ impl Mesh {
         (textures.all, numbers)
     }
 
-    /// Texture coordinates on a triangle, by its index, at the point with these corner weights,
-    /// whose sum is 1; if the triangle has any.
+    /// Texture coordinates on a triangle at the point with these barycentric weights, which add up
+    /// to 1; None if the triangle has none.
     pub fn texture_at(&self, triangle: usize, weights: DVec3) -> Option<[f32; 2]> {
         let [a, b, c] = self.texture.as_ref()?.get(triangle)?.map(|[u, v]| DVec2::new(u.into(), v.into()));
         let place = (a * weights.x + b * weights.y + c * weights.z).as_vec2();
         place.is_finite().then(|| place.to_array())
     }
 
-    /// The colour there: linear RGB, straight alpha. A texture times its material's diffuse colour, if there is one; else the
-    /// interpolated colours of the vertices; else the triangle's own; else the diffuse colour.
+    /// The colour on a triangle at the point with these barycentric weights: linear RGB, straight
+    /// alpha.
+    ///
+    /// The first of these that exists: the texture times its material's diffuse colour, the
+    /// interpolated colours of the vertices, the triangle's own colour, the diffuse colour, the
+    /// default colour.
     pub fn color_at(&self, triangle: usize, weights: DVec3) -> [f32; 4] {
         let material = self.material_of(triangle);
         let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
@@ -196,13 +203,13 @@ impl Mesh {
         }
     }
 
-    /// The colour of a triangle, by its index, or of its material; if it has one.
+    /// The colour of a triangle, or else the diffuse colour of its material; None without either.
     pub fn own_color(&self, triangle: usize) -> Option<[f32; 4]> {
         let own = self.face_colors.as_ref().and_then(|all| all.get(triangle)).copied();
         own.or_else(|| self.material_of(triangle).map(|material| material.diffuse))
     }
 
-    /// The material of a triangle, by its index in `triangles`.
+    /// The material of the triangle with this index.
     pub fn material_of(&self, triangle: usize) -> Option<&Material> {
         self.materials.get(*self.material.as_ref()?.get(triangle)? as usize)
     }

@@ -1,4 +1,5 @@
-//! Files: one format each; every reader ends in [`Points`], every writer appears whole or not at all.
+//! Files: one module per format. Every reader returns [`Points`]; an output file appears whole or
+//! not at all.
 
 pub mod about;
 pub mod atomic;
@@ -54,36 +55,39 @@ use std::path::Path;
 /// How files are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
-    /// The format, whatever the file's name and first bytes say.
+    /// The format. None takes it from the file's name or first bytes.
     pub format: Option<Format>,
-    /// Points that a LAS file marks as withheld, which is deleted, are read like all others.
+    /// Points that a LAS file marks as withheld, which means deleted, are read like all others.
     pub keep_withheld: bool,
-    /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they are.
+    /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they
+    /// are. Otherwise a file is an error if many are thicker than a tenth of their width.
     pub flatten: bool,
-    /// Opacities by the classes of a laser scan's points; other files than LAS have none.
+    /// Opacities by class, for the points of laser scans (LAS files).
     pub classes: ClassOpacities,
-    /// Alphas beside colours are left out; the opacities of Gaussians are not.
+    /// Alphas beside colours are ignored; the opacities of Gaussians are not.
     pub ignore_alpha: bool,
-    /// The file's description of itself is kept ([`Points::about`]).
+    /// The file's description of itself is stored in [`Points::about`].
     pub describe: bool,
     /// A file of which a part cannot be read is an error: a scan of an E57 file, a chunk of a LAZ
-    /// file, a node of a COPC file. Else that part is left out, and told by [`Points::unread`].
+    /// file, a node of a COPC file. Otherwise that part is left out and named in
+    /// [`Points::unread`].
     pub strict: bool,
 }
 
-/// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
+/// Reads a file of any supported format; see [`Input::open`].
 ///
-/// Points come in the file's own order and coordinates. A file with no points is no error here.
+/// The formats are PLY, LAS, LAZ (also COPC) and OBJ, and with the features of their names E57 and
+/// PCD. Points keep the file's order and coordinates. A file without points is not an error here.
 ///
 /// # Errors
 ///
-/// [`Error::Read`] for a missing file or a directory, [`Error::Malformed`] for a file that is none of these formats or
-/// is not what its format says.
+/// [`Error::Read`] for a missing file or a directory, [`Error::Malformed`] for a file of another
+/// format, or one that violates its format.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
     read_with(path, ReadOptions::default(), progress)
 }
 
-/// Reads the points of a file, as `options` say.
+/// Reads the points of a file with options.
 ///
 /// # Errors
 ///
@@ -94,8 +98,9 @@ pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> 
     Ok(points)
 }
 
-/// Reads the points of a file whose colours stay as the file has them ([`Points::raw`]):
-/// [`settle_colors`] settles what they mean, by all inputs of a scene together.
+/// Reads the points of a file and keeps its colours as they are in the file ([`Points::raw`]).
+///
+/// [`settle_colors`] then decides what they mean, for all inputs of a scene together.
 ///
 /// # Errors
 ///
@@ -131,14 +136,14 @@ fn read_pcd(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "pcd"))
 }
 
-/// A file of a format whose reader was left out.
+/// The error for a format whose reader is not compiled in.
 #[cfg(not(all(feature = "e57", feature = "pcd")))]
 fn without(path: &Path, feature: &str) -> Error {
     let format = feature.to_ascii_uppercase();
     Error::malformed(path, format!("this build does not read {format} files: build with '--features {feature}'"))
 }
 
-/// Reads the triangles of a mesh: OBJ or PLY; see [`Input::open`].
+/// Reads the triangles of an OBJ or PLY file; see [`Input::open`].
 ///
 /// # Errors
 ///
@@ -147,7 +152,7 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     read_mesh_with(path, ReadOptions::default(), progress)
 }
 
-/// Reads the triangles of a mesh file, as `options` say.
+/// Reads the triangles of a mesh file with options.
 ///
 /// # Errors
 ///

@@ -1,28 +1,30 @@
-//! Looks of the triangles of a mesh, beside the colours of its vertices.
+//! Colours and images of the triangles of a mesh, beside the colours of its vertices.
 
 use std::sync::Arc;
 
 use super::{Mesh, Texture};
 use crate::scene::color::DEFAULT_COLOR;
 
-/// Colours and images of triangles.
+/// Colours and images per triangle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Paint {
-    /// The linear colour of each, straight alpha: its own, or its material's, with which its image
-    /// is multiplied. Where a triangle has no image, the colours of its vertices hide it. None
-    /// where no triangle has any.
+    /// Linear colours with straight alpha, per triangle: its own colour, or its material's.
+    ///
+    /// A triangle's image is multiplied by this colour. Without an image, the colours of the
+    /// vertices replace it. Empty if no triangle has a colour.
     pub colors: Vec<[f32; 4]>,
-    /// The images of the materials, each once.
+    /// The distinct images of the materials.
     pub textures: Vec<Arc<Texture>>,
-    /// Which of them each triangle has; [`u32::MAX`] means none. None where no triangle has any.
+    /// Per triangle an index into `textures`; [`u32::MAX`] means none. Empty if no triangle has an
+    /// image.
     pub numbers: Vec<u32>,
-    /// The corners' texture coordinates, origin bottom left; not a number for triangles without.
-    /// None where no triangle has any.
+    /// Texture coordinates per corner of each triangle, origin bottom left; NaN for triangles
+    /// without any. Empty if no triangle has any.
     pub places: Vec<[[f32; 2]; 3]>,
 }
 
 impl Paint {
-    /// The paint of a mesh; None where its triangles have nothing but what its vertices have.
+    /// The paint of a mesh; None if its triangles have no colours, images or texture coordinates.
     pub fn of(mesh: &Mesh) -> Option<Self> {
         let has_colors = mesh.face_colors.is_some() || mesh.material.is_some();
         let places = mesh.texture.clone().unwrap_or_default();
@@ -42,12 +44,12 @@ impl Paint {
         (paint != Self::default()).then_some(paint)
     }
 
-    /// The number of a triangle's image, if it has one.
+    /// The index of a triangle's image; None without an image.
     pub fn number(&self, triangle: usize) -> Option<u32> {
         self.numbers.get(triangle).copied().filter(|number| *number != u32::MAX)
     }
 
-    /// Whether triangles are painted with images.
+    /// Whether any triangle has an image.
     pub fn has_images(&self) -> bool {
         self.numbers.iter().any(|number| *number != u32::MAX)
     }

@@ -1,4 +1,4 @@
-//! What one input file holds, before it becomes surfels.
+//! The content of one input file, before it becomes surfels.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,110 +12,117 @@ use crate::scene::{Cap, Clip, Colors, Whole};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
-/// A reader reports what it found and, but for deleted points, all of it, and repairs nothing: a non-finite coordinate, a zero normal or a radius that is
-/// not positive stay as they are, and [`crate::surfels::build`] drops or estimates them, and counts them.
+/// A reader returns all points except deleted ones, and repairs nothing. Non-finite coordinates,
+/// zero normals and radii that are not positive stay as they are; [`crate::surfels::build`] drops
+/// or estimates them, and counts them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
     /// World coordinates.
     pub positions: Vec<[f64; 3]>,
-    /// One normal each, any length; zero or non-finite means missing.
+    /// A normal per point, of any length; zero or non-finite means missing.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// One disk radius each, world units; not positive or not finite means missing.
+    /// A disk radius per point, world units; non-positive or non-finite means missing.
     pub radii: Option<Vec<f32>>,
-    /// Half-axes s and t of one elliptical disk each, world units, with the normal s x t; they stand in for normal and radius
-    /// where they span an ellipse. Zero, parallel or non-finite ones mean missing.
+    /// Half-axes s and t of an elliptical disk per point, world units, with the normal s x t. They
+    /// replace normal and radius where they span an ellipse; zero, parallel or non-finite ones mean
+    /// missing.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
-    /// Where the disks of the half-axes end before their rims.
+    /// Clip lines of the disks with these half-axes.
     pub clips: Option<Vec<Clip>>,
-    /// How the disks of the half-axes curve.
+    /// Curvature of the disks with these half-axes.
     pub caps: Option<Vec<Cap>>,
-    /// Colours, [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
+    /// Colours: [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
     pub colors: Option<Colors>,
-    /// Colours and intensities as the file has them, until [`settle_colors`](super::settle_colors)
-    /// makes [`colors`](Self::colors) of them.
+    /// Colours and intensities as they are in the file, until
+    /// [`settle_colors`](super::settle_colors) converts them to [`colors`](Self::colors).
     pub raw: Option<Box<RawColors>>,
-    /// They are Gaussians, whose colours are codes of sRGB ([`Scene::encoded`](crate::scene::Scene::encoded)).
+    /// The points are Gaussians, whose colours are sRGB codes
+    /// ([`Scene::encoded`](crate::scene::Scene::encoded)).
     pub encoded: bool,
-    /// They were ellipsoids.
+    /// Counts and thickness of the ellipsoids that were flattened to surfels.
     pub flattened: Option<Flattened>,
-    /// Texture coordinates (u, v), origin bottom left as in OBJ.
+    /// Texture coordinates (u, v) per point, origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,
-    /// Which of several textures the coordinates are in; [`u32::MAX`] means none.
+    /// The index of each point's texture, if there are several; [`u32::MAX`] means none.
     pub texture_numbers: Option<Vec<u32>>,
-    /// What u and v gain for a world unit along x, y and z; all zero where it is not known.
+    /// The change of u and of v per world unit along x, y and z, per point; all zero if unknown.
     pub texture_slopes: Option<Vec<[[f32; 3]; 2]>>,
-    /// The direction that the format, by convention, calls up.
+    /// The up direction of the format's convention.
     pub up: Option<Up>,
-    /// Radii are those with which disks at the vertices cover the triangles of a mesh.
+    /// Radii are such that disks at a mesh's vertices cover its triangles.
     pub of_mesh: bool,
-    /// The triangles that the points are the vertices of.
+    /// The triangles of the mesh whose vertices are the points.
     pub faces: Option<Faces>,
-    /// Their levels of detail; they are in the order of the tree.
+    /// Levels of detail. The points are in the order of this tree.
     pub tree: Option<Tree>,
-    /// What a reader of a part of them and of their levels of detail must know of all; where there is a tree.
+    /// Facts about the whole scene, for readers of a part of it; only with a tree.
     pub whole: Option<Box<Whole>>,
-    /// They have normals that tell no sides.
+    /// The sign of the normals is arbitrary: they do not tell the two sides of a surface apart.
     pub unsided: bool,
-    /// A mesh that they are drawn beside: what is left of the one that they were made of.
+    /// A mesh file to draw together with these surfels: the part of the original mesh that they do
+    /// not replace.
     pub beside: Option<PathBuf>,
-    /// They are the vertices of a mesh that is closed and faces outward, or surfels that cover one: nobody sees its back who is not
-    /// inside.
+    /// The points are the vertices of a closed mesh that faces outward, or surfels that cover one.
+    /// Its back is visible only from inside.
     pub closed: bool,
-    /// How many points the file has of each class, without deleted ones; of a laser scan alone.
+    /// The number of points of each class, without deleted ones; only for laser scans.
     pub classes: BTreeMap<u8, u64>,
-    /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
+    /// The number of points that were left out because the file marks them as withheld (deleted).
     pub withheld: u64,
-    /// Points that the file holds and that were left out, as their class has the opacity 0.
+    /// The number of points that were left out because their class has the opacity 0.
     pub unseen: u64,
-    /// Vertices of a mesh that the file holds and that were left out, as no triangle names them.
+    /// The number of mesh vertices that were left out because no triangle uses them.
     pub loose: u64,
-    /// Triangles of a mesh that were left out, as a corner is nowhere that is drawn.
+    /// The number of triangles that were left out because a coordinate is not finite or too large.
     pub broken: u64,
-    /// Vertices of a mesh that were left out, as their triangles have no area, or a corner that is
-    /// nowhere.
+    /// The number of mesh vertices that were left out because all their triangles have no area or
+    /// are [`broken`](Self::broken).
     pub stranded: u64,
-    /// Surfels of a mesh that have the mean of an image over them.
+    /// The number of surfels of a mesh that have one colour, the mean of the image on their
+    /// triangle.
     pub averaged: u64,
-    /// Parts of the file that could not be read and were left out, named and counted: a sentence
-    /// each.
+    /// Parts of the file that could not be read and were left out: one sentence for each file, with
+    /// names and counts.
     pub unread: Vec<String>,
-    /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
+    /// Sorted indices of the file's points that were left out; the first point has 0.
     pub left_out: Vec<u64>,
-    /// The number of the point of the file that each one is, where several are one; they start at 0.
+    /// For each surfel, the index of its point among those that are kept, if a point may have
+    /// several surfels.
     pub numbers: Option<Vec<u32>>,
-    /// Sentences about what the reader found odd in the file, could not read, or shows otherwise
-    /// than somebody may expect.
+    /// Sentences about what is odd in the file, could not be read, or is drawn differently than a
+    /// user may expect.
     pub notes: Vec<String>,
     /// The file's description of itself, if [`ReadOptions::describe`](super::ReadOptions::describe)
     /// asks for it.
     pub about: Option<Box<About>>,
 }
 
-/// Ellipsoids whose shortest half-axis was left out.
+/// Ellipsoids that became surfels without their shortest half-axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Flattened {
-    /// All of them.
+    /// The number of ellipsoids.
     pub count: u64,
-    /// Those whose shortest half-axis is longer than a tenth of the middle one.
+    /// The number of those whose shortest half-axis is longer than a tenth of the middle one.
     pub thick: u64,
-    /// The median ratio of the two; of several files the largest.
+    /// The median ratio of the shortest half-axis to the middle one; the largest over several
+    /// files.
     pub ratio: f64,
 }
 
 impl Flattened {
-    /// Those of two inputs.
+    /// Joins the counts of two inputs.
     pub(crate) fn of_both(one: Option<Self>, other: Option<Self>) -> Option<Self> {
         let (Some(one), Some(other)) = (one, other) else { return one.or(other) };
         let (count, thick) = (one.count + other.count, one.thick + other.thick);
         Some(Self { count, thick, ratio: one.ratio.max(other.ratio) })
     }
 
-    /// What a user should hear of it.
+    /// A sentence for users.
     pub(crate) fn sentence(&self) -> String {
         let Self { count, thick, ratio } = self;
         format!(
-            "{count} ellipsoids became surfels without their shortest axis: {thick} were thicker than a tenth of their width, half of all \
-             than {ratio:.3} of it"
+            "{count} ellipsoids became surfels without their shortest axis: {thick} were thicker than a tenth of their width, and the \
+             median thickness is {ratio:.3} of the width"
         )
     }
 }
@@ -123,22 +130,25 @@ impl Flattened {
 /// The triangles of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faces {
-    /// The vertices of each, counter-clockwise seen from outside.
+    /// The vertex indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// The normals that the file gives the corners, any length; zero or non-finite means missing.
+    /// Normals of the triangles' corners from the file, any length; zero or non-finite means
+    /// missing.
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
-    /// Their looks beside the colours of their vertices.
+    /// Colours and images of the triangles, beside the vertices' colours.
     pub paint: Option<Box<Paint>>,
 }
 
 impl Points {
-    /// Whether triangles, or points where there are none, have places in a texture.
+    /// Whether the triangles, or the points if there are none, have texture coordinates.
     pub fn has_places(&self) -> bool {
         let paint = self.faces.as_ref().and_then(|faces| faces.paint.as_ref());
         self.texture.is_some() || self.of_mesh && paint.is_some_and(|paint| !paint.places.is_empty())
     }
 
-    /// With colours in linear light that are the same from every side, whatever they were.
+    /// Converts the colours to linear light that is the same from every direction.
+    ///
+    /// Harmonics are reduced to their constant colours, with negative channels set to 0.
     #[must_use]
     pub fn in_light(mut self) -> Self {
         if let Some(Colors::Harmonics(harmonics)) = self.colors {
@@ -155,8 +165,10 @@ impl Points {
         self
     }
 
-    /// Keeps what each point has of the points whose flag is set; without some of them they do not cover a closed surface. Which points of the file they are, [`Provenance`](crate::scene::Provenance)
-    /// keeps.
+    /// Keeps the points whose flag is set, in all per-point arrays.
+    ///
+    /// A surface without some of its points is not closed, and its tree is dropped.
+    /// [`Provenance`](crate::scene::Provenance) records which points of the file remain.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         self.closed &= keep.iter().all(|keep| *keep);
         self.tree = self.tree.take().filter(|_| keep.iter().all(|keep| *keep));
@@ -174,7 +186,8 @@ impl Points {
     }
 }
 
-/// The positions, colours and texture coordinates of the points `of`, by their index, which may be there several times.
+/// Gathers positions, colours and texture coordinates of the points with the indices `of`, in that
+/// order; indices may repeat.
 pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
     fn each<T: Copy>(values: &[T], of: &[u32]) -> Vec<T> {
         of.iter().map(|&index| values[index as usize]).collect()

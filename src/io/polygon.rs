@@ -1,28 +1,32 @@
-//! Polygons of a mesh as triangles.
+//! Triangulation of a mesh's polygons.
 
 use glam::{DVec2, DVec3};
 
-/// A polygon of more corners is fanned whatever its shape: ears take a time of up to their square, or in bad cases their cube.
+/// The most corners of a polygon whose ears are clipped, which takes quadratic time, and cubic time
+/// at worst. Larger polygons become fans, whatever their shape.
 const MOST_CORNERS: usize = 1 << 10;
 
-/// The triangles that make up a polygon, by the numbers of its `corners` and wound as it is: two fewer than it has corners.
+/// Triangulates a polygon: returns `corners.len() - 2` triangles of indices into `corners`, with
+/// the polygon's winding.
 ///
-/// It is fanned from its first corner if all those triangles are wound as it is, so if it is convex. Of any other, ears are cut off
-/// in the plane that its vector area is normal to (Meisters 1975): triangles at a convex corner that hold no other corner. A polygon
-/// that crosses itself may have none left; it is fanned too, as no triangles make it up.
+/// The triangles fan out from the first corner if all of them have the polygon's winding, as in a
+/// convex polygon. Otherwise ears are cut off in the plane normal to the polygon's vector area:
+/// triangles at a convex corner that contain no other corner (Meisters 1975). A polygon that
+/// crosses itself may run out of ears; it becomes a fan too, as no triangulation exists.
 pub(super) fn triangles(corners: &[DVec3]) -> Vec<[usize; 3]> {
     let fan: Vec<_> = (2..corners.len()).map(|last| [0, last - 1, last]).collect();
     let area = |[a, b, c]: [usize; 3]| (corners[b] - corners[a]).cross(corners[c] - corners[a]);
     let whole: DVec3 = fan.iter().copied().map(area).sum();
     let wound_alike = fan.iter().all(|&triangle| area(triangle).dot(whole) >= 0.0);
-    // What is no number is not wound at all, and has no ears.
+    // NaN and infinite corners have no winding and no ears.
     if wound_alike || corners.len() > MOST_CORNERS || !whole.is_finite() {
         return fan;
     }
     ears(&corners.iter().map(|&corner| flat(corner, whole)).collect::<Vec<_>>()).unwrap_or(fan)
 }
 
-/// A point without its coordinate along the axis nearest to `normal`: polygons around it turn left.
+/// Drops the coordinate along the axis nearest to `normal`, so that a polygon around `normal` turns
+/// left.
 fn flat(point: DVec3, normal: DVec3) -> DVec2 {
     let DVec3 { x, y, z } = normal.abs();
     let (flat, along) = if z >= x && z >= y {
@@ -35,11 +39,13 @@ fn flat(point: DVec3, normal: DVec3) -> DVec2 {
     if along < 0.0 { DVec2::new(flat.y, flat.x) } else { flat }
 }
 
-/// Triangles of a polygon that turns left, cut off one after the other; none where it crosses itself.
+/// Triangulates a polygon that turns left by cutting off ears. None if the ears run out, as they
+/// may if it crosses itself.
 fn ears(corners: &[DVec2]) -> Option<Vec<[usize; 3]>> {
     let turn = |a: usize, b: usize, c: usize| (corners[b] - corners[a]).perp_dot(corners[c] - corners[a]);
     let holds = |[a, b, c]: [usize; 3], other: usize| {
-        // A polygon with a hole comes back to a corner.
+        // Corners at the same position do not count: a polygon with a hole visits some corners
+        // twice.
         let apart = [a, b, c].iter().all(|&corner| corners[corner] != corners[other]);
         apart && turn(a, b, other) >= 0.0 && turn(b, c, other) >= 0.0 && turn(c, a, other) >= 0.0
     };
@@ -51,7 +57,7 @@ fn ears(corners: &[DVec2]) -> Option<Vec<[usize; 3]>> {
             let [a, b, c] = around(*at);
             turn(a, b, c) > 0.0 && left.iter().all(|&other| !holds([a, b, c], other))
         };
-        // A corner on a straight line goes last: its triangle has no area, from which it would get no normal.
+        // Corners on a straight line are cut last: their triangles have no area, so no normal.
         let is_straight = |at: &usize| {
             let [a, b, c] = around(*at);
             turn(a, b, c) == 0.0
@@ -68,7 +74,7 @@ fn ears(corners: &[DVec2]) -> Option<Vec<[usize; 3]>> {
 mod tests {
     use super::*;
 
-    /// Twice the area of a polygon in the plane z = 0, left turns positive.
+    /// Twice the area of a polygon in the plane z = 0; positive if it turns left.
     fn double_area(corners: &[DVec3]) -> f64 {
         (0..corners.len()).map(|k| corners[k].cross(corners[(k + 1) % corners.len()]).z).sum()
     }
@@ -81,7 +87,7 @@ mod tests {
         corners.iter().map(|&[x, y]| DVec3::new(x, y, 0.0)).collect()
     }
 
-    /// Those of a star, whose fan from any corner is not wound as it is.
+    /// The corners of a star: a fan from any of its corners has triangles of both windings.
     fn star() -> Vec<DVec3> {
         let corner = |k: u32| {
             let radius = if k.is_multiple_of(2) { 1.0 } else { 0.3 };
@@ -95,7 +101,7 @@ mod tests {
         assert_eq!(triangles(&polygon(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])), [[0, 1, 2]]);
         let square = polygon(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
         assert_eq!(triangles(&square), [[0, 1, 2], [0, 2, 3]]);
-        // Bent, and so is a fan.
+        // A bent quad still becomes a fan.
         let bent: Vec<_> = square.iter().map(|p| DVec3::new(p.x, p.y, p.x * p.y)).collect();
         assert_eq!(triangles(&bent), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(triangles(&square[..2]), [[0; 3]; 0]);
@@ -108,7 +114,8 @@ mod tests {
             .chain((0..6).map(|k| [6.0 - f64::from(k), if k % 2 == 0 { 3.0 } else { 0.5 }]))
             .chain([[0.0, 3.0]])
             .collect();
-        // A square with a square hole, to which and from which a seam leads; and an arrow with a corner amid a side.
+        // A square with a square hole that a seam connects to the outline, and an arrow with a
+        // corner on a straight side.
         let outer = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0]];
         let hole = [[1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0], [1.0, 1.0]];
         let arrow = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 0.3], [0.0, 2.0]];
@@ -124,7 +131,7 @@ mod tests {
                 assert!(areas.iter().all(|&area| area >= 0.0), "{shape} {first}: {areas:?}");
             }
         }
-        // Which a fan does not give.
+        // A fan has triangles of the wrong winding.
         let fan: Vec<_> = (2..10).map(|last| [0, last - 1, last]).collect();
         assert!(signed(&star(), &fan).iter().any(|&area| area < -0.1));
     }

@@ -1,4 +1,4 @@
-//! The images of a mesh: each file is decoded once, and all of them together are bounded.
+//! The images of a mesh: each file is decoded once, and their total size is limited.
 
 use std::collections::HashMap;
 use std::fs;
@@ -10,17 +10,17 @@ use super::Texture;
 use super::image::{self, MOST_PIXELS};
 use crate::error::{Error, Result};
 
-/// Textures, each once, and their numbers.
+/// Distinct textures and their indices.
 #[derive(Debug, Default)]
 pub(crate) struct Numbers {
-    /// By their numbers.
+    /// The textures, by index.
     pub all: Vec<Arc<Texture>>,
     by_place: HashMap<*const Texture, u32>,
     by_content: HashMap<u64, Vec<u32>>,
 }
 
 impl Numbers {
-    /// The number of a texture: that of another one that has the same texels, if there is one.
+    /// The index of a texture; textures with equal texels and address mode share one.
     pub fn of(&mut self, texture: &Arc<Texture>) -> u32 {
         let place = Arc::as_ptr(texture);
         if let Some(known) = self.by_place.get(&place) {
@@ -34,8 +34,8 @@ impl Numbers {
         if known.is_none() {
             alike.push(number);
         }
-        // Kept even if another one stands for it: what is at a place must stay there as long as the
-        // place is known.
+        // Duplicates are recorded too. A recorded texture must outlive this map: another one at its
+        // address would get its index.
         self.by_place.insert(place, number);
         if known.is_none() {
             self.all.push(texture.clone());
@@ -44,19 +44,21 @@ impl Numbers {
     }
 }
 
-/// The images of one mesh while they are read.
+/// The images of one mesh while they are being read.
 #[derive(Debug, Default)]
 pub(super) struct Images {
-    /// The outcome for each file, by its path, and whether its edges go on.
+    /// The outcome for each path and address mode: whether coordinates outside [0, 1] are clamped.
     known: HashMap<(PathBuf, bool), Option<Arc<Texture>>>,
-    /// Files by their length and a hash of their bytes.
+    /// Paths of files by their length and a hash of their bytes.
     by_content: HashMap<(u64, u64), Vec<PathBuf>>,
     pixels: u64,
 }
 
 impl Images {
-    /// The image of a file, which is decoded if neither it nor a copy of it was before; its edges
-    /// go on if it `clamps`. None of one that cannot be read, which `notes` say once.
+    /// Reads an image file, or returns the one from before if it or a copy of it was read.
+    ///
+    /// If it `clamps`, texture coordinates outside [0, 1] take the edge texels. Returns None for a
+    /// file that cannot be read, and adds one sentence to `notes`.
     ///
     /// # Errors
     ///
@@ -87,7 +89,7 @@ impl Images {
         let pixels = self.pixels.saturating_add(width * height);
         if pixels > MOST_PIXELS && self.pixels > 0 {
             let what = format!(
-                "with it the images of one mesh have {pixels} pixels, and {MOST_PIXELS} are read at most: make them smaller"
+                "with it the images of one mesh have {pixels} pixels, more than the limit of {MOST_PIXELS}: make them smaller"
             );
             return Err(Error::malformed(path, what));
         }
@@ -96,7 +98,7 @@ impl Images {
         Ok(read)
     }
 
-    /// The first file that was read and has the same bytes; this one, if none has.
+    /// The first file with the same bytes that was read, or this one if there is none.
     fn first_copy(&mut self, path: &Path) -> Result<PathBuf> {
         let bytes = image::bytes(path)?;
         let mut hasher = DefaultHasher::new();

@@ -1,25 +1,26 @@
-//! Levels of detail as a file has them.
+//! Levels of detail as they are in a file.
 
 use super::Points;
 use crate::scene::Surfel;
 use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 
-/// The largest number of a node, as for coordinates of points.
+/// The largest magnitude of a node's numbers, the same as for point coordinates.
 const LARGEST: f32 = 1e18;
 
-/// The largest radius of a node: twice that of a ball around points of a cube of [`LARGEST`] coordinates.
+/// The largest radius of a node: at least twice the diagonal of the cube of [`LARGEST`]
+/// coordinates, `4 sqrt(3) LARGEST`.
 const LARGEST_RADIUS: f32 = 8.0 * LARGEST;
 
 /// The nodes of a tree over points that are in its order ([`Hierarchy`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
-    /// Their centres, half-axes and colours; radii are those of their spheres.
+    /// Centres, half-axes and colours of the nodes; the radii are those of their bounding spheres.
     pub nodes: Box<Points>,
-    /// What else each has.
+    /// The other values of each node.
     pub rows: Vec<TreeRow>,
 }
 
-/// What a node has beside its ellipse and its colour.
+/// The values of a node beside its ellipse and colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeRow {
     /// [`Node::cone`].
@@ -33,7 +34,10 @@ pub struct TreeRow {
 }
 
 impl Tree {
-    /// The nodes about `origin`; None if one has no place or no extent that is a number.
+    /// Converts the nodes to a hierarchy relative to `origin`.
+    ///
+    /// None if a number is not finite or too large, a radius is negative, an alpha is above 1, or
+    /// half-axes span no ellipse.
     pub fn hierarchy(&self, origin: glam::DVec3) -> Option<Hierarchy> {
         let count = self.rows.len();
         let mut all = Hierarchy { nodes: Vec::with_capacity(count), low: Vec::with_capacity(count) };
@@ -69,11 +73,11 @@ impl Tree {
         Some(all)
     }
 
-    /// Why these are no tree over so many points; None if they are one.
+    /// The reason why the nodes are no valid tree over this many points; None if they are one.
     pub(super) fn fault(&self, points: usize) -> Option<String> {
         let Some(hierarchy) = self.hierarchy(glam::DVec3::ZERO) else {
             return Some(
-                "a node has a centre, half-axes, a radius or a colour that are no numbers, or too large, or no ellipse"
+                "the centre, half-axes, radius or colour of a node is not finite or too large, or its half-axes span no ellipse"
                     .into(),
             );
         };
@@ -81,7 +85,7 @@ impl Tree {
         let what = match Hierarchy::check(&hierarchy.nodes, points).err()? {
             Fault::Children(index) => format!("the children of {} are not the nodes that come next", place(index)),
             Fault::Elements(index) => format!("the points of {} are not those that come next", place(index)),
-            Fault::Count(index) => format!("{} has nothing below it, or too much", place(index)),
+            Fault::Count(index) => format!("{} has no children or points, or too many children", place(index)),
             Fault::Depth => "it is too deep".into(),
             Fault::Loose => {
                 format!("its {} nodes and {points} points are not all below its first node", self.rows.len())
@@ -95,7 +99,7 @@ impl Tree {
 mod tests {
     use super::*;
 
-    /// The radius of a node may be several times as large as a coordinate.
+    /// A node's radius may be several times larger than a coordinate.
     #[test]
     fn radii_may_be_larger_than_coordinates() {
         let of = |x: f64, radius: f32| {

@@ -1,17 +1,17 @@
-//! Normals and radii of a mesh's vertices from the triangles around them: how a mesh becomes points.
+//! Conversion of a mesh's vertices to points: normals and radii from the triangles around them.
 
 use glam::{DVec3, Vec3};
 
-/// How much larger radii are than needed to cover: a blending kernel fades towards its rim.
+/// Factor on the covering radius, because a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;
 
-/// Sums over the triangles of a mesh, for each vertex.
+/// Sums of normals and largest radii over the triangles around each vertex.
 #[derive(Debug)]
 pub(super) struct Triangles<'a> {
     positions: &'a [[f64; 3]],
     normals: Vec<DVec3>,
     radii: Vec<f64>,
-    /// A corner names a normal that points to the triangle's back.
+    /// Whether a corner has a normal that points to its triangle's back.
     backward: bool,
 }
 
@@ -25,13 +25,14 @@ impl<'a> Triangles<'a> {
         }
     }
 
-    /// Adds a triangle by its vertices' numbers, with the normals its corners name, if they do.
+    /// Adds a triangle, given by its vertex indices. `named` are the normals that the file gives
+    /// its corners, if it gives any.
     pub(super) fn add(&mut self, corners: [usize; 3], named: Option<[Option<[f64; 3]>; 3]>) {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| self.positions.get(corner).copied().map(DVec3::from))
         else {
             return;
         };
-        // Its length is twice the triangle's area.
+        // Its length is twice the triangle's area, so triangles count by their area.
         let area_normal = (b - a).cross(c - a);
         let radius = covering_radius(a, b, c);
         for (index, corner) in corners.into_iter().enumerate() {
@@ -49,12 +50,12 @@ impl<'a> Triangles<'a> {
         }
     }
 
-    /// Whether the normals that corners name are on the sides that the triangles face.
+    /// Whether all given corner normals are on the front side of their triangles.
     pub(super) fn face_as_named(&self) -> bool {
         !self.backward
     }
 
-    /// The unit normal, or zero, and the radius, or zero, of each vertex.
+    /// Returns the unit normal and the radius in world units of each vertex; zero if it has none.
     pub(super) fn finish(self) -> (Vec<[f32; 3]>, Vec<f32>) {
         let unit = |normal: DVec3| normal.normalize_or_zero().as_vec3().to_array();
         (
@@ -64,17 +65,20 @@ impl<'a> Triangles<'a> {
     }
 }
 
-/// Whether each of the normals that are `given` is on the side that the `triangles` say, where both say one.
+/// Whether no normal of `given` points to the opposite side of the vertex normal in `triangles`;
+/// zero normals have no side.
 pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
     let side = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from_array(*a).dot(Vec3::from_array(*b));
     given.iter().zip(triangles).map(side).all(|side| side >= 0.0)
 }
 
-/// The smallest radius with which disks at the three corners cover the triangle; `None` for one without area.
+/// The smallest radius with which disks at the three corners cover the triangle, world units. None
+/// for a triangle without area.
 ///
-/// In an acute triangle the circumcentre is the last point to be covered. In one that is obtuse at C, it lies outside;
-/// the last points are on the longest side, where the bisectors of the sides at C cross it: b / (2 cos A) from A and
-/// a / (2 cos B) from B.
+/// In an acute triangle, the last point to be covered is the circumcentre. In a triangle that is
+/// obtuse at C, the circumcentre lies outside. The last points to be covered are then on the
+/// longest side, where the bisectors of the sides at C cross it: at distance b / (2 cos A) from A
+/// and a / (2 cos B) from B.
 pub(crate) fn covering_radius(p: DVec3, q: DVec3, r: DVec3) -> Option<f64> {
     let double_area = (q - p).cross(r - p).length();
     let mut sides = [p.distance(q), q.distance(r), r.distance(p)];

@@ -1,18 +1,18 @@
-//! Conversions that several formats share: numbers in text, 16-bit colour codes, colours kept finite.
+//! Conversions that several formats share: text, numbers, 16-bit colour codes, finite colours.
 
 use crate::scene::color::srgb_to_linear;
 use std::io::{self, BufRead};
 use std::sync::LazyLock;
 
-/// What some editors begin UTF-8 text with; it belongs to no word.
+/// The byte order mark with which some editors begin UTF-8 text.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The text of bytes in UTF-8, or where it begins with the byte order mark of UTF-16 in that,
-/// without its mark: some editors, and redirections on Windows, write one.
+/// Decodes text in UTF-8, or in UTF-16 if it begins with that byte order mark, without the mark.
+/// Some editors, and redirections on Windows, write UTF-16.
 ///
 /// # Errors
 ///
-/// `InvalidData` for what is no text.
+/// `InvalidData` for bytes that are not valid text.
 pub(super) fn text_of(bytes: &[u8]) -> io::Result<String> {
     let code: fn([u8; 2]) -> u16 = match *bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
@@ -27,21 +27,22 @@ pub(super) fn text_of(bytes: &[u8]) -> io::Result<String> {
     String::from_utf16(&codes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
 }
 
-/// Linear light for each 16-bit sRGB code.
+/// Linear light of each 16-bit sRGB code.
 pub(super) static SRGB16_TO_LINEAR: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|code| srgb_to_linear(f64::from(code) / 65535.0) as f32).collect());
 
-/// What the lines of a text end with, by the first of them: a line feed, perhaps after a carriage return, or a carriage return
-/// alone, as on old Macintoshes.
+/// The last byte of each line end, judged by the first line: `\n` (also for `\r\n`), or `\r` alone,
+/// as on old Macintoshes.
 pub(super) fn line_end(reader: &mut impl BufRead) -> io::Result<u8> {
     let start = reader.fill_buf()?;
     let first = start.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
-    // Where nothing follows, either would do.
+    // If nothing follows the `\r`, either byte would do.
     let alone = first.is_some_and(|at| start[at] == b'\r' && start.get(at + 1).is_some_and(|next| *next != b'\n'));
     Ok(if alone { b'\r' } else { b'\n' })
 }
 
-/// A number in text, as C's `printf` writes it: `nan`, `inf` and Microsoft's `-nan(ind)`, `1.#QNAN` and `1.#INF` too.
+/// Parses a number as C's `printf` writes it, including `nan`, `inf` and Microsoft's `-nan(ind)`,
+/// `1.#QNAN` and `1.#INF`.
 pub(super) fn parse_number(token: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(token).ok()?;
     text.parse().ok().or_else(|| {
@@ -57,21 +58,23 @@ pub(super) fn parse_number(token: &[u8]) -> Option<f64> {
     })
 }
 
-/// A colour channel as a finite f32: not a number becomes 0, what is too large becomes the largest.
+/// Converts a colour channel to a finite f32: NaN becomes 0, and values beyond f32 saturate.
 pub(super) fn finite(value: f64) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32 }
 }
 
-/// A token or a name from a file, shortened so that it fits in a one-line message.
+/// A token or a name from a file, shortened and without control characters for a one-line message.
 pub(super) fn shown(token: &[u8]) -> String {
     let text: String =
         String::from_utf8_lossy(token).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
     if text.chars().count() > 40 { text.chars().take(40).chain("...".chars()).collect() } else { text }
 }
 
-/// A parser's message, which may quote the file at any length: on one line, and without the middle of a long quotation.
+/// A parser's message on one line. It may quote the file at any length, so the middle of a long
+/// message is removed.
 pub(super) fn one_line(message: &str) -> String {
-    /// Characters kept of the start, and of the end, where parsers say what they expected and on which line.
+    /// Characters of the start and of the end; at the end, parsers say what they expected and in
+    /// which line.
     const KEPT: (usize, usize) = (80, 240);
     let text: Vec<char> = message.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
     match (text.get(..KEPT.0), text.len().checked_sub(KEPT.1).and_then(|from| text.get(from..))) {

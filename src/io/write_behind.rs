@@ -1,4 +1,4 @@
-//! Writing behind: what is made is written by other threads while the next is made.
+//! Writing of outputs in other threads while the next ones are being made.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,22 +8,22 @@ use std::thread;
 
 use crate::error::{Error, Result};
 
-/// Gives each of `items`, in order, to one of `writers` threads, and returns what `write` made of them, in order.
+/// Passes each of `items` to one of `writers` threads, and returns the results of `write` in order.
 ///
-/// Items are made by the calling thread, the next as soon as a writer has taken the one before: at most `writers + 1` exist at
-/// a time, so memory does not grow with their number, however slow the writers are. Several items are written at a time, so
-/// `write` must not care for their order.
+/// The calling thread makes the items, the next one as soon as a writer has taken the one before.
+/// At most `writers + 1` items exist at a time, so memory does not grow with their number, however
+/// slow the writers are. Several items are written at a time, in no particular order.
 ///
 /// # Errors
 ///
-/// The error of the first item, in order, that could not be made or written. None is made after one was seen; those that
-/// others are writing are written to their end.
+/// The error of the first item, in order, that could not be made or written. After a failure is
+/// seen, no more items are made, and those that are being written are completed.
 pub fn write_behind<T: Send, R: Send>(
     writers: NonZeroUsize,
     items: impl Iterator<Item = Result<T>>,
     write: impl Fn(T) -> Result<R> + Sync,
 ) -> Result<Vec<R>> {
-    // Handed over, not queued: an item that waits in a queue would be one more in memory.
+    // A rendezvous channel: an item that waits in a queue would be one more in memory.
     let (sender, receiver) = sync_channel(0);
     let receiver = Arc::new(Mutex::new(receiver));
     let failed = AtomicBool::new(false);
@@ -43,7 +43,7 @@ pub fn write_behind<T: Send, R: Send>(
                 })
             })
             .collect();
-        // The writers' are the only receivers, so that sending fails if a panic ends them all.
+        // Only the writers hold receivers now, so sending fails if panics have ended all of them.
         drop(receiver);
         let mut outcomes = Vec::new();
         for (index, item) in items.enumerate() {
@@ -71,7 +71,7 @@ pub fn write_behind<T: Send, R: Send>(
     outcomes.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
-/// The next item; none when all are made. Writers that wait queue up for the lock.
+/// The next item; None when there are no more. Idle writers wait for the lock.
 fn take<T>(receiver: &Mutex<Receiver<T>>) -> Option<T> {
     receiver.lock().unwrap_or_else(PoisonError::into_inner).recv().ok()
 }
@@ -96,7 +96,7 @@ mod tests {
             Ok(item)
         });
         let written = write_behind(two(), items, |item| {
-            // Later ones are quicker, so they end out of order.
+            // Later items take less time, so they finish out of order.
             thread::sleep(Duration::from_micros(100 * (50 - item)));
             alive.fetch_sub(1, Ordering::SeqCst);
             Ok(2 * item)

@@ -1,37 +1,48 @@
-//! Stage 3: over the fragments within epsilon of the nearest depth, and on its side of the surface, the sums of weight and of weight times attribute
-//! (paper 000, Eq. 9 and 10).
+//! Stage 3: sums weight, and weight times attribute, over the fragments within epsilon of the
+//! nearest depth and on its side of the surface (paper 000, Eq. 9 and 10).
 //!
 //! # Accumulators
 //!
-//! Let W be a fragment's weight w, turned into the units of its sum, and a its attribute, mapped from the scene's own
-//! range to [0, 1]. A fragment adds W to the weight and W a to each attribute. The mean of n accepted fragments of summed
-//! weight w then errs by at most [`AccumulatorRow::error_bound`](crate::plan::AccumulatorRow::error_bound), as a fraction of the attribute's range, beside the errors
-//! of the fragments themselves. Let u = 2^-24, the rounding of one f32 operation.
+//! Let W be a fragment's weight w in the units of its sum, and a its attribute, mapped from the
+//! scene's own range to [0, 1]. A fragment adds W to the weight and W a to each attribute. The mean
+//! of n accepted fragments of summed weight w then errs by at most
+//! [`AccumulatorRow::error_bound`](crate::plan::AccumulatorRow::error_bound), as a fraction of the
+//! attribute's range, in addition to the errors of the fragments themselves. Let u = 2^-24, the
+//! rounding of one f32 operation.
 //!
-//! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word, and W a is rounded to f32 and then to
-//!   an integer. Integer addition is associative: the sums, and so the image, do not depend on the order of the surfels,
-//!   on pages, or on the schedule. Sums have 64 bits in two words: `before = atomicAdd(low, x)`; if that wrapped,
-//!   `atomicAdd(high, 1)`. They overflow after 2^32 full weights.
-//!   A term errs by a relative u of itself, which moves the mean by at most u, and by half a unit, which moves it by
-//!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
-//!   1: `n / (F w)`. A sum is read as an f32 with an error of 1.5 u: its upper word, below 2^24, is exact, the rounding of
-//!   the lower one is at most u / 2 of a sum that has an upper one, and only then does adding the two round again. Two
-//!   such sums, dividing, and the product that maps back: `6 u` with the term's own. A sum carries once for each full
-//!   weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the
-//!   paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
-//!   ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
-//!   takes two additions for most, of 40 bits or, where the kernel's tails need them, or of order-free sums, far ones that weigh little, up to 56 ([`wide_bits`]). An adapter with 64-bit atomics makes the same sums in half the additions.
-//! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
-//!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
-//!   `fixed`. A sum is read with one rounding: `n 2^-B / w + 5 u`.
-//! - **fixed64**: W = 2^40 w exactly, and W a, rounded as f32 and cut at 2^-40, in one u64: each term errs by a relative u
-//!   of itself, so the mean by u, whatever n: `6 u + n 2^-40 / w`. It overflows after 2^24 full weights.
+//! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word; W a is rounded to
+//!   f32 and then to an integer. Integer addition is associative: the sums, and so the image, do
+//!   not depend on the order of the surfels, on pages, or on the schedule. Sums have 64 bits in two
+//!   words: `before = atomicAdd(low, x)`; if that wrapped, `atomicAdd(high, 1)`. They overflow
+//!   after 2^32 full weights. A term errs by a relative u of itself, which moves the mean by at
+//!   most u, and by half a unit, which moves it by `n / (2 sum W)`. Rounding the weights moves it
+//!   by as much again, times the spread of the attributes, which is at most 1: `n / (F w)` in all.
+//!   A sum is read as an f32 with an error of 1.5 u: its upper word, below 2^24, is exact; the
+//!   rounding of the lower word is at most u / 2 of a sum that has an upper one, and only then does
+//!   adding the two round again. Two such sums, the division, and the product that maps back give
+//!   `6 u`, the term's own error included. A sum carries once per full weight, which is rarer than
+//!   once per fragment (on a software adapter carries are a fifth of the pass). At the rim of the
+//!   paper's kernel, exp(-6), terms keep 23 bits. Where weights may be smaller still, or alphas
+//!   differ ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of
+//!   `fixed64` in two words, which takes two additions for most. They have 40 bits; or up to 56
+//!   ([`wide_bits`]) where the kernel's tails need them, or order-free sums, whose far fragments
+//!   weigh little. An adapter with 64-bit atomics makes the same sums in half the additions.
+//! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at
+//!   least 24 and let 255 full weights (or all surfels, if fewer) meet in a pixel. A sum that wraps
+//!   is detected, and the frame is rendered again with `fixed`. A sum is read with one rounding:
+//!   `n 2^-B / w + 5 u`.
+//! - **fixed64**: W = 2^40 w exactly; W a, rounded as f32 and cut at 2^-40, in one u64. Each term
+//!   errs by a relative u of itself, so the mean by u, whatever n: `6 u + n 2^-40 / w`. It
+//!   overflows after 2^24 full weights.
 //! - **packed64**: the terms of `fixed32`, two sums in the halves of one u64.
-//! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
-//!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
+//! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in
+//!   any order errs by at most `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The
+//!   image depends on the order of the fragments.
 //!
-//! Where depths tell surfaces apart a fragment adds W w and W w z, with w no less than 2^-8: both are up to 256 times as small as W, and the
-//! bounds, in which w stands for what is summed, as much larger. Of 24 bits nothing is left of weights below 2^-17: the depth is then the nearest one.
+//! Where surfaces are compared by their blended depths, a fragment adds W w and W w z to the
+//! depth's sums, with the factor w at least 2^-8. These terms are up to 256 times smaller than W,
+//! and the bounds, in which w stands for the summed weights, that much larger. With 24 bits nothing
+//! is left of weights below 2^-17; the depth is then the nearest one.
 
 use super::attributes;
 use super::footprint::footprint;
@@ -45,28 +56,31 @@ use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner, wide_bit
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Camera, Colors, Fade, Map, Scene};
 
-/// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
-/// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and whether the adapter adds 64 bits at
-/// once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
+/// The file that stores the sums of `fixed`.
+///
+/// It depends on whether terms may exceed a word, because weights may be small
+/// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and on
+/// whether the adapter adds 64 bits at once ([`SceneNeeds::atomics_u64`]), which makes the same
+/// sums in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
     match (needs.wide_sums || needs.copies, needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => PAIRS,
-        // Products are made of words.
+        // Products with numbers of copies are made of single words.
         (true, true) if !needs.copies => "accumulator_fixed64.wgsl",
         (true, _) => "accumulator_fixed_wide.wgsl",
     }
 }
 
-/// The file that keeps two of its sums in one number.
+/// The file that adds two sums of `fixed` at once, as the halves of one 64-bit number.
 const PAIRS: &str = "accumulator_fixed_pairs.wgsl";
 
-/// The file of its terms.
+/// The file that computes the terms of `fixed`.
 pub(super) fn terms_file(needs: &SceneNeeds) -> &'static str {
     if needs.wide_sums { "terms_wide.wgsl" } else { "terms.wgsl" }
 }
 
-/// The files that keep the sums of a render with `needs` in storage.
+/// The files that store the sums of a render with `needs` in storage buffers.
 pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     match needs.accumulator {
         Accumulator::Fixed => vec![terms_file(needs), fixed_file(needs)],
@@ -75,7 +89,8 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     }
 }
 
-/// The files that keep the sums of a tile's pixels, where [`files`] keeps them in storage.
+/// The files that keep the sums of a tile's pixels in registers; those of [`files`] keep sums in
+/// storage.
 pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     let pairs = fixed_file(needs) == PAIRS;
     [
@@ -86,20 +101,21 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     ]
 }
 
-/// The sums of `fixed` that a device keeps in `words`, each as one number.
+/// The sums of `fixed` as one number each, from the `words` in which a device stores them.
 pub fn canonical(needs: &SceneNeeds, words: &[u32]) -> Vec<u64> {
     let long = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
     if fixed_file(needs) != PAIRS {
         return words.as_chunks().0.iter().map(|&[low, high]| long(low, high)).collect();
     }
-    // What the low half carried into the high one is taken out of it again (accumulator_fixed_pairs.wgsl).
+    // Subtracts from the high half what the low half carried into it
+    // (accumulator_fixed_pairs.wgsl).
     let pair = |&[low, high, from_low, from_high]: &[u32; 4]| {
         [long(low, from_low), long(high, from_high).wrapping_sub(from_low.into())]
     };
     words.as_chunks().0.iter().flat_map(pair).collect()
 }
 
-/// The words in which a device keeps `sums`: what [`canonical`] is made of.
+/// The words in which a device stores `sums`: the inverse of [`canonical`].
 pub fn kept(needs: &SceneNeeds, sums: &[u64]) -> Vec<u32> {
     let [low, high] = [|long: u64| long as u32, |long: u64| (long >> 32) as u32];
     if fixed_file(needs) != PAIRS {
@@ -112,35 +128,38 @@ pub fn kept(needs: &SceneNeeds, sums: &[u64]) -> Vec<u32> {
     sums.as_chunks().0.iter().flat_map(pair).collect()
 }
 
-/// The sums of one pixel, in f64: weight, weight times attributes.
+/// The sums of one pixel, in f64: weights, and weights times attributes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelSums {
-    /// Sum of weights.
+    /// The sum of the weights.
     pub weight: f64,
-    /// Of the premultiplied linear colour.
+    /// The sum of the premultiplied linear colour.
     pub color: [f64; 4],
-    /// Of the normal, turned toward the viewer: those of the front and the back of a thin part would cancel.
+    /// The sum of the normals, turned toward the viewer: otherwise front and back of a thin part
+    /// would cancel.
     pub normal: [f64; 3],
-    /// The side that is seen is the back.
+    /// Whether the visible side is the back.
     pub back: bool,
-    /// Of the depth, and of the weights that it is summed by.
+    /// The sum of the depths, weighted as in `depth_weight`.
     pub depth: f64,
-    /// Weights, or where surfaces are told apart by their depths, their squares.
+    /// The sum of the depths' weights: the weights, or their squares where surfaces are compared by
+    /// depth.
     pub depth_weight: f64,
-    /// The depth of the nearest fragment; of lists alone.
+    /// The depth of the nearest fragment; set for lists only.
     pub nearest: f64,
-    /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
+    /// The sums of [`Textured::terms`](crate::scene::Textured::terms), positions in a texture.
     pub place: [f64; 5],
-    /// What fragments hold back, as optical depth; where all of a pixel are summed ([`oit`](super::oit)).
+    /// The optical depth of all fragments; set where all of a pixel's fragments are summed
+    /// ([`oit`](super::oit)).
     pub held_back: f64,
-    /// Accepted fragments.
+    /// The number of accepted fragments.
     pub count: u32,
     /// The smallest relative distance of a fragment to a decision; see [`Map::Decision`].
     pub decision: f64,
 }
 
 impl PixelSums {
-    /// Nothing yet.
+    /// Sums of no fragments.
     pub const ZERO: Self = Self {
         weight: 0.0,
         color: [0.0; 4],
@@ -156,14 +175,17 @@ impl PixelSums {
     };
 }
 
-/// The least part of its weight that a fragment has in a depth that surfaces are told apart by, where it is its weight's square: no pixel
-/// is without any.
+/// The smallest factor on a fragment's weight in the depth sums where surfaces are compared by
+/// depth.
+///
+/// There a fragment counts by the square of its weight; this bound ensures that every covered pixel
+/// has a depth.
 pub const LEAST_MIDDLE: f64 = 1.0 / 256.0;
 
-/// How far outside a decision a fragment is still looked at to record its distance, relative.
+/// How far outside a decision, relative, a fragment still records its distance.
 const NEARBY: f64 = 1e-3;
 
-/// The twin, over the rows of `nearest`, which the twin of the visibility pass made.
+/// The f64 twin, over the rows of `nearest`, the result of the visibility pass's twin.
 pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat>,
     scene: &Scene,
@@ -190,11 +212,12 @@ pub fn reference<'a>(
                 let front = nearest[pixel];
                 let along = camera.along_axis(x, y);
                 let behind = options.epsilon.farthest(front.depth, radius, along);
-                // Where cuts fade into each other, what is nearest in the one that the sample shows may lie behind other ones' surfels.
+                // With fades the nearest depth is that of the sample's own cut; surfels of other
+                // cuts may lie in front of it.
                 let reached = options.epsilon.farthest(at.depth, radius, along);
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
-                    // What shows the other side is out unless it is nearest.
+                    // A fragment of the other side is rejected unless it is nearest.
                     let behind = if back == front.back { behind } else { front.depth };
                     let before = if splat.fade == Fade::WHOLE { f64::INFINITY } else { reached / front.depth - 1.0 };
                     sum.decision = sum.decision.min(decision_beside(at, behind, camera.near, before));
@@ -222,7 +245,8 @@ pub fn reference<'a>(
                     *total += weight * value;
                 }
                 let depth_weight = if compares_depth { weight * once.max(LEAST_MIDDLE) } else { weight };
-                // Surfels of other cuts that lie before it count as nearest: a term is clamped.
+                // Depths of other cuts in front of the nearest one count as the nearest, because
+                // terms are clamped.
                 sum.depth += depth_weight * at.depth.max(front.depth);
                 sum.depth_weight += depth_weight;
                 sum.count += splat.copies;
@@ -232,13 +256,15 @@ pub fn reference<'a>(
     sums
 }
 
-/// The relative distance to the nearest decision that could turn the fragment's fate: it is in or out by rim, near
-/// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
+/// The relative distance to the nearest decision that could change whether a fragment is accepted.
+///
+/// It is accepted if rim, near depth and epsilon all accept it. If it clearly fails one of them,
+/// the others cannot change that, and the distance is +inf.
 pub(super) fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
     decision_beside(at, behind, near, f64::INFINITY)
 }
 
-/// The same, where a fragment is out by another margin, too.
+/// The same, with one more margin that must accept the fragment.
 fn decision_beside(at: Intersection, behind: f64, near: f64, beside: f64) -> f64 {
     let before = if behind.is_finite() { behind / at.depth - 1.0 } else { f64::INFINITY };
     let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before, beside];
@@ -272,7 +298,7 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// The files that keep the sums of a render's first module.
+/// The files that store the sums, for a render's main module.
 pub const SUMS: Pass = Pass {
     name: "sums",
     files: |needs| if needs.sums_by_compute() { files(needs) } else { Vec::new() },
@@ -283,9 +309,10 @@ pub const SUMS: Pass = Pass {
 const ACCUMULATE: Kernel = Kernel::new("accumulate");
 const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1]);
 
-/// The pass of the small splats; of inputs that are kept apart, of the `first` one or of another.
+/// The stage that accumulates the small splats; with separate inputs, `first` says whether this is
+/// the first one.
 pub fn steps(plan: &Plan, band: usize, first: bool) -> Stage {
-    // What wrapped is counted over all bands, in the words before the sums.
+    // The words before the sums count wrapped sums over all bands.
     let head = plan.needs.accumulator.row().head_words();
     let mut clears = vec![Clear::of("sums", head, plan.bands[band].pixels * u64::from(plan.sum_words))];
     if band == 0 && first && head > 0 {
@@ -295,7 +322,7 @@ pub fn steps(plan: &Plan, band: usize, first: bool) -> Stage {
     Stage::new("accumulate", band, runs).after(clears).as_twin(Twin::Accumulate)
 }
 
-/// The pass of the large splats, a workgroup each.
+/// The stage that accumulates the large splats, one workgroup each.
 pub fn large(band: usize) -> Stage {
     Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE_LARGE, over: Over::Large }])
 }
@@ -313,7 +340,7 @@ mod tests {
         let of = |rho: f64, behind: f64| decision(at(rho), behind, 0.1);
         // Just inside the rim, well inside the tolerance.
         assert!((of(1.0 - 1e-7, 2.2) - 1e-7).abs() < 1e-12);
-        // At the rim, but far behind the tolerance: out either way.
+        // At the rim, but far behind the tolerance: rejected either way.
         assert_eq!(of(1.0 - 1e-7, 1.0), f64::INFINITY);
         // At the tolerance, but outside the disk.
         assert_eq!(of(1.5, 2.0), f64::INFINITY);

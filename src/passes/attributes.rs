@@ -1,5 +1,8 @@
-//! What is blended beside the weight: colour, normal, depth, fragment count, and a place in a texture. Each is a file that adds its
-//! terms to a pixel's sums and one that resolves them, or an absent one.
+//! The attributes that are blended with the weight: colour, normal, depth, fragment count, and
+//! texture coordinates.
+//!
+//! Each has a file that adds its terms to a pixel's sums and one that resolves them, or a file that
+//! replaces both where it is absent.
 
 use super::lit;
 use super::splat::Splat;
@@ -7,7 +10,7 @@ use crate::plan::pass::Pass;
 use crate::plan::{ColorNeed, PixelLayout, RasterDepth, RenderOptions, Sides, SurfelLayout, color_channels};
 use crate::scene::{Camera, Map, Scene};
 
-/// The files and constants.
+/// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "attributes",
     files: |needs| {
@@ -17,7 +20,7 @@ pub const PASS: Pass = Pass {
             pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
-            // Of one fragment nothing is summed.
+            // A single fragment needs no sum.
             match needs.sums_depth() && needs.winner.is_none() {
                 false => "depth_absent.wgsl",
                 true if needs.compares_depth() => "depth_middles.wgsl",
@@ -29,7 +32,7 @@ pub const PASS: Pass = Pass {
         files.extend(needs.normal.then_some("normal.wgsl"));
         files.push("attributes.wgsl");
         files.extend(match needs.color {
-            // Of one fragment nothing is summed.
+            // A single fragment needs no sum.
             _ if !needs.weighs() => &[][..],
             ColorNeed::Constant => &["color_constant.wgsl"],
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
@@ -68,7 +71,8 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// The twin: the premultiplied colour of a splat, as it is seen from the camera and lit if splats are.
+/// The f64 twin: the premultiplied colour of a splat, as seen from the camera, and lit if splats
+/// are lit.
 pub fn color(scene: &Scene, splat: &Splat, camera: &Camera, options: &RenderOptions) -> [f64; 4] {
     let surfel = splat.surfel as usize;
     let direction = camera.direction_to(scene.origin + scene.center(surfel));

@@ -1,8 +1,9 @@
-//! Stage 0 of scenes with levels of detail: the tree cut into branches that fit a device's buffers.
+//! Stage 0 with levels of detail: cuts the tree into branches that fit a device's buffers.
 //!
-//! A branch has neighbouring subtrees, whose surfels follow each other; and if there are several, the first has no surfels but the nodes above all of
-//! them, of which the lowest ones lead to roots of the others. Which nodes are together depends on the adapter, but what becomes of a node
-//! does not depend on its branch.
+//! A branch has neighbouring subtrees, whose surfels are consecutive. If there are several
+//! branches, the first has no surfels, but the nodes above all others; its lowest nodes lead to
+//! roots of the other branches. Which nodes share a branch depends on the adapter, but the fate of
+//! a node does not depend on its branch.
 
 mod row;
 mod small;
@@ -18,51 +19,52 @@ use self::small::Small;
 use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
-/// The most surfels of one node that an invocation copies the numbers of.
+/// The most surfels of one node whose numbers one invocation copies.
 const MOST_OF_LEAF: u32 = 4096;
 
-/// Neighbouring subtrees.
+/// Neighbouring subtrees of a tree, laid out for a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Branch {
-    /// Its surfels, by their places in the scene.
+    /// The range of its surfels in the scene.
     pub surfels: Range<u32>,
     /// Its rows, roots first and level by level.
     pub nodes: Vec<Row>,
-    /// The number in the tree of each of them.
+    /// The number in the tree of each row's node.
     pub numbers: Vec<u32>,
-    /// How many are roots.
+    /// The number of roots.
     pub roots: u32,
-    /// The number of the first root among those of all branches but the first.
+    /// The number of the first root, counted over all branches except the first.
     pub first_root: u32,
-    /// Its root is that of the tree.
+    /// Whether its root is the root of the tree.
     pub whole: bool,
-    /// How many levels it has.
+    /// The number of levels.
     pub levels: u32,
-    /// How many of the first ones one workgroup judges: no more nodes than it can, of which no more is left than its loops end for.
+    /// The number of top levels that one workgroup can judge within its node and loop limits.
     pub small_levels: u32,
 }
 
-/// What a row of a branch is made of.
+/// The item that a row of a branch represents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Item {
-    /// A node and what is below it.
+    /// A node, with everything below it.
     Node(u32),
-    /// Some surfels of a leaf that has too many, which is judged whole: a node above them.
+    /// Some surfels of a leaf that has too many. The leaf is judged whole, as a node above its
+    /// parts.
     Part { leaf: u32, first: u32, count: u32 },
     /// A root of another branch, by its number.
     Other { root: u32, node: u32 },
 }
 
-/// Where a node is that is in another branch.
+/// The place of a node that is in another branch.
 #[derive(Clone, Copy)]
 struct Elsewhere {
-    /// The number of the root, or of the first one.
+    /// The number of its root, or of the first of its roots.
     root: u32,
-    /// It is a leaf, each part of which is a root.
+    /// Whether it is a leaf each part of which is a root.
     in_parts: bool,
 }
 
-/// The parts of a leaf with more surfels than one invocation should copy; of another none.
+/// The parts of a leaf with more surfels than one invocation should copy; none for other nodes.
 fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
     let Node { first, count, leaf, .. } = *node;
     let end = if leaf && count > MOST_OF_LEAF { first + count } else { first };
@@ -73,7 +75,8 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
     })
 }
 
-/// The branches of a tree, each of at most `most` surfels and nodes together, if that is a few thousand or more.
+/// The branches of a tree, each of at most `most` surfels and nodes together; `most` must be at
+/// least a few thousand.
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     let (rows, surfels) = rows_of(tree);
     if rows <= most {
@@ -106,13 +109,14 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     all
 }
 
-/// The branch of all of a tree.
+/// The single branch of a whole tree.
 fn of_root(tree: &Hierarchy, surfels: u32) -> Branch {
     Branch { whole: true, ..laid_out(tree, (&[Item::Node(0)], tree.nodes.len()), 0..surfels, |_| None) }
 }
 
-/// The same of a tree without crowded leaves, whose rows are its nodes, as these lie level by level, too: all threads make them, which takes a view of
-/// 3,000,000 nodes 0.98 times as long.
+/// The same for a tree without crowded leaves, whose rows are its nodes in the same order.
+///
+/// All threads make them, which takes 0.98 times as long for a view of 3,000,000 nodes.
 fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
     let row = |node: &Node| {
         let kind = if node.leaf { LEAF } else { INNER };
@@ -122,7 +126,7 @@ fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
     let (mut level, mut levels, mut small) = (0..1.min(nodes.len()), 0, Small::of(1));
     while !level.is_empty() {
         small.add(&nodes[level.clone()]);
-        // The children of the last node that has some are the last of the next level.
+        // The children of the last node that has children end the next level.
         let last = nodes[level.clone()].iter().rfind(|row| row.together);
         let end = last.map_or(level.end, |row| (row.first + (row.below & COUNT_MASK)) as usize);
         (level, levels) = (level.end..end, levels + 1);
@@ -132,7 +136,7 @@ fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
     Branch { surfels: 0..surfels, nodes, numbers, roots: 1, first_root: 0, whole: true, levels, small_levels }
 }
 
-/// Rows and surfels of a tree.
+/// The number of rows and surfels of a tree.
 fn rows_of(tree: &Hierarchy) -> (u64, u32) {
     let of = |(number, node): (usize, &Node)| {
         let surfels = if node.leaf { node.count } else { 0 };
@@ -142,10 +146,10 @@ fn rows_of(tree: &Hierarchy) -> (u64, u32) {
     tree.nodes.par_iter().enumerate().with_min_len(4096).map(of).reduce(|| (0, 0), sum)
 }
 
-/// How many surfels and rows are below each node, itself with them.
+/// For each node, the number of surfels and rows of its subtree, itself included.
 fn sizes(tree: &Hierarchy) -> Vec<u64> {
     let mut sizes = vec![0u64; tree.nodes.len()];
-    // Children have larger numbers.
+    // Children have larger numbers than their parents.
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         sizes[index] = 1 + match node.leaf {
             true => u64::from(node.count) + parts(index as u32, node).count() as u64,
@@ -155,7 +159,8 @@ fn sizes(tree: &Hierarchy) -> Vec<u64> {
     sizes
 }
 
-/// The largest subtrees of at most `most` from left to right, with their sizes and their surfels.
+/// The largest subtrees of size at most `most`, from left to right, with their sizes and their
+/// numbers of surfels.
 fn subtrees(tree: &Hierarchy, sizes: &[u64], most: u64) -> Vec<(Item, u64, u32)> {
     let (mut found, mut open) = (Vec::new(), vec![0u32]);
     while let Some(index) = open.pop() {
@@ -178,7 +183,7 @@ fn subtrees(tree: &Hierarchy, sizes: &[u64], most: u64) -> Vec<(Item, u64, u32)>
     found
 }
 
-/// Surfels below a node: from those of its leftmost leaf to those of its rightmost.
+/// The number of surfels below a node: from those of its leftmost leaf to those of its rightmost.
 fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
     let end_of = |last: bool| {
         let mut node = &tree.nodes[index as usize];
@@ -191,7 +196,10 @@ fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
     last.first + last.count - first.first
 }
 
-/// The branch of some subtrees of so many nodes or a few more, whose surfels are a range; nodes that are `elsewhere` lead to roots of other branches.
+/// Lays out the branch of some subtrees, whose surfels are a range.
+///
+/// The subtrees have `room` nodes, or a few more. Nodes that are `elsewhere` lead to roots of other
+/// branches.
 fn laid_out(
     tree: &Hierarchy,
     (roots, room): (&[Item], usize),
@@ -212,7 +220,7 @@ fn laid_out(
     Branch { surfels, nodes, numbers, roots: roots.len() as u32, first_root: 0, whole: false, levels, small_levels }
 }
 
-/// Rows of a branch, of which those below are not all there yet.
+/// The rows of a branch while they are made, level by level.
 struct Rows<'a, E> {
     tree: &'a Hierarchy,
     elsewhere: E,
@@ -234,7 +242,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
                     None if node.leaf && node.count <= MOST_OF_LEAF => {
                         (number, LEAF, node.first - self.surfels.start, node.count)
                     }
-                    // A leaf in parts is a node above them.
+                    // A leaf in parts becomes a node above them.
                     _ => (number, INNER, 0, 0),
                 }
             }
@@ -244,7 +252,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
         self.numbers.push(number);
     }
 
-    /// Adds what is right below an inner node.
+    /// Adds the rows right below an inner node.
     fn push_below(&mut self, row: usize) {
         if self.nodes[row].below >> KIND_SHIFT != INNER {
             return;
@@ -280,10 +288,10 @@ mod tests {
     use crate::scene::{Scene, Surfel};
     use crate::surfels::hierarchy;
 
-    /// Those of which there are many.
+    /// The surfels that get copies.
     const CROWDED: [usize; 5] = [0, 1, 2, 20, 40];
 
-    /// Surfels on a spiral, and so many `copies` more of some.
+    /// A tree of `count` surfels on a spiral, with `copies` more of each of [`CROWDED`].
     fn tree(count: usize, copies: usize) -> Hierarchy {
         let at = |k: usize| {
             let (sine, cosine) = (k as f32 * 2.4).sin_cos();
@@ -300,7 +308,8 @@ mod tests {
         (node.below >> KIND_SHIFT, node.below & COUNT_MASK)
     }
 
-    /// The surfels below a row of a branch, by their places in the scene, and the numbers of the nodes that lead there.
+    /// Collects the surfels below a row of a branch, by their places in the scene. Checks that rows
+    /// that lead to other branches name the right nodes.
     fn below(branches: &[Branch], (branch, row): (usize, u32), depth: u32, into: &mut Vec<u32>) {
         let of = &branches[branch];
         assert!(depth < 2 * of.levels + branches[0].levels);
@@ -322,7 +331,8 @@ mod tests {
         }
     }
 
-    /// How many nodes each level of a branch has, and the most surfels or children of one.
+    /// For each level of a branch, its number of nodes and the most surfels or children of one of
+    /// them.
     fn levels_of(branch: &Branch) -> Vec<(usize, u32)> {
         let (mut levels, mut level) = (Vec::new(), &branch.nodes[..branch.roots as usize]);
         let mut end = level.len();
@@ -335,12 +345,13 @@ mod tests {
         levels
     }
 
-    /// What an inner node says of its children is so, and it says it unless some lead elsewhere.
+    /// Checks an inner node's bound on its children's radii. It has one unless some of its children
+    /// are in another branch or in parts.
     fn family(tree: &Hierarchy, branch: &Branch, index: usize) {
         let (node, children) = (branch.nodes[index], branch.row(tree, index).children);
         let rows = node.first as usize..(node.first + kind(&node).1) as usize;
         let of = |row: usize| kind(&branch.nodes[row]);
-        // A crowded leaf whose parts are roots is above them.
+        // A crowded leaf whose parts are roots is a node above them.
         let crowds = |row: usize| {
             let leaf = tree.nodes[branch.numbers[row] as usize].leaf;
             leaf && of(row).0 == INNER && of(branch.nodes[row].first as usize).0 == OTHER_BRANCH
@@ -369,7 +380,7 @@ mod tests {
             assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
             assert!(all.len() == 1 || all[0].surfels.is_empty());
             let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;
-            // The nodes above all others are few.
+            // The first branch fits, because the nodes above all others are few.
             assert!(all.iter().all(fits), "{count} {copies}");
             let mut found = Vec::new();
             below(&all, (0, 0), 0, &mut found);
@@ -389,7 +400,7 @@ mod tests {
                 assert!(small.iter().all(|(nodes, _)| *nodes <= (JUDGED * WORKGROUP) as usize));
                 let rounds = |levels: &[(usize, u32)]| levels.iter().map(|(_, below)| rounds_of(*below)).sum::<u64>();
                 assert!(rounds(small) + u64::from(branch.roots) < MOST_ROUNDS);
-                // And no more levels are.
+                // No further level is small.
                 match others.first() {
                     Some((nodes, _)) if *nodes > (JUDGED * WORKGROUP) as usize => large = true,
                     Some((_, below)) => {

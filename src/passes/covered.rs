@@ -1,6 +1,8 @@
-//! Stage 4, its start: which tiles of the image have anything. An image has pixels that no splat covers, and to resolve them
-//! takes as long as to resolve others; so those tiles stay as the image was cleared, unless its background or its depth map
-//! differ from 0 there.
+//! Stage 4, its start: the list of image tiles that are not empty.
+//!
+//! Resolving a pixel that no splat covers takes as long as any other. Tiles without a fragment are
+//! therefore skipped and stay as the image was cleared, unless the background or the depth map
+//! differs from 0 there.
 
 use crate::gpu::layout::COVERED_LIST;
 use crate::plan::pass::Pass;
@@ -13,7 +15,8 @@ pub const PASS: Pass = Pass {
     files: |_| vec!["covered.wgsl"],
     kernels: |_| vec![LIST, ARRANGE],
     constants: |making| {
-        // Of peeled layers the last one may be empty.
+        // With depth peeling the last layer may be empty, so the nearest depths do not show which
+        // tiles have earlier ones.
         let needs = making.needs;
         let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some();
         vec![
@@ -27,23 +30,25 @@ pub const PASS: Pass = Pass {
 const LIST: Kernel = Kernel::new("list_covered");
 const ARRANGE: Kernel = Kernel::of("arrange_covered", [1; 3]);
 
-/// Words that the list of a band takes at most.
+/// The most words that a band's list can take.
 pub fn words(band: &Band) -> u64 {
     u64::from(COVERED_LIST) + band.tiles
 }
 
-/// The word of the buffer of nearest depths at which the list of a band starts: the rasteriser keeps no depths in it.
+/// The word of the buffer `nearest` at which a band's list starts: 0 with the rasteriser, which
+/// stores no depths in that buffer.
 pub fn start(plan: &Plan, band: usize) -> u64 {
     let band = &plan.bands[band];
     if plan.needs.raster.is_some() { 0 } else { band.pixels + band.tiles }
 }
 
-/// The head of the list, cleared: nothing is in it.
+/// The clear of the list's header, which empties the list.
 pub fn restart(plan: &Plan, band: usize) -> Clear {
     Clear::of("nearest", start(plan, band), COVERED_LIST.into())
 }
 
-/// What is cleared before the list is made: its head, and the image, of which covered tiles alone are written.
+/// The clears before the list is made: its header, and the image, in which only covered tiles are
+/// written.
 pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
     let mut clears = vec![restart(plan, band)];
     if !plan.lists_empty || super::asks_for_order(&plan.needs) {
@@ -53,10 +58,11 @@ pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
     clears
 }
 
-/// What lists the tiles in which a nearest depth is.
+/// The dispatch that lists the tiles with a nearest depth.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 
-/// What makes the list, by what `lists` its tiles.
+/// The dispatches that make the list: `lists`, which lists the tiles, and one that writes the grids
+/// to dispatch over it.
 pub fn runs(lists: Run) -> [Run; 2] {
     [lists, Run { kernel: ARRANGE, over: Over::Once }]
 }

@@ -1,19 +1,24 @@
-//! Stage 1, its start: batches of surfels that cannot show are left out before they are projected.
+//! Stage 1, its start: leaves out batches of surfels that cannot be visible, before they are
+//! projected.
 //!
-//! The order of the surfels makes each [`BATCH`](crate::gpu::layout::BATCH) of them a neighbourhood, with a bounding ball. Of the batches in view those
-//! nearer than the middle of the scene are projected and drawn first ([`Part::Near`]). What is then farthest in each tile of
-//! pixels hides those of the others ([`Part::Far`]) that lie behind it, and epsilon behind that, at all of their pixels. Of a
-//! closed surface that is most of its back.
+//! The order of the surfels makes each [`BATCH`](crate::gpu::layout::BATCH) of them a
+//! neighbourhood, with a bounding ball. Among the batches in view, those nearer than the middle of
+//! the scene are projected and drawn first ([`Part::Near`]). The farthest of the nearest depths in
+//! each tile of pixels then hides those of the others ([`Part::Far`]) that lie behind it, by more
+//! than epsilon, at all of their pixels. For a closed surface that is most of its back.
 //!
-//! **No image depends on it.** A fragment of a batch that is left out has a depth z of more than the deepest that is
-//! accepted at its pixel for the nearest depth so far, and the true nearest is no farther, so the fragment is neither
-//! nearest nor accepted. Both sides have room for rounding: a depth that a kernel finds differs from that of the disk by
-//! some units of 2^-24 over the cosine between ray and normal, and the room is a thousandth.
+//! **No image depends on it.** A fragment of a batch that is left out has a depth z beyond the
+//! deepest that is accepted at its pixel for the nearest depth so far, and the true nearest depth
+//! is no farther. So the fragment is neither nearest nor accepted. Both comparisons allow for
+//! rounding: a kernel's depth differs from that of the disk by some units of 2^-24 divided by the
+//! cosine between ray and normal, and the margin is a thousandth.
 //!
-//! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has no holes.
+//! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has
+//! no holes.
 //!
-//! What is left out takes no room: the splats of the listed batches are stored one batch after the other, in slots, and
-//! [`Look::Slots`](crate::plan::steps::Look::Slots) reads from the device how many there are.
+//! Batches that are left out take no memory: the splats of the listed batches are stored in slots,
+//! one batch after the other, and [`Look::Slots`](crate::plan::steps::Look::Slots) reads from the
+//! device how many there are.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -23,8 +28,8 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
 use crate::scene::{Camera, LowPass, Projection, Surfel};
 
-/// A ball around disks, each with its centre and the height of its cap: centre x, y, z and radius, world units relative to the
-/// scene's origin.
+/// The bounding ball of disks, each with its centre and the height of its cap: centre x, y, z and
+/// radius, world units relative to the scene's origin.
 pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel, f64)> + Clone) -> [f32; 4] {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (center, ..) in surfels.clone() {
@@ -34,11 +39,12 @@ pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel, f64)> +
     let far =
         |(center, surfel, height): (DVec3, &Surfel, f64)| center.distance(middle.as_dvec3()) + reach(surfel) + height;
     let radius = surfels.map(far).fold(0.0, f64::max);
-    // Up to the next f32 and past the rounding of these lengths.
+    // Rounded up to the next f32, and past the rounding of these lengths.
     middle.extend((radius * (1.0 + 1e-6)) as f32).to_array()
 }
 
-/// The longer half-axis of the ellipse whose half-axes s and t need not be perpendicular: the larger singular value of [s t].
+/// The longer half-axis of the ellipse of s and t, which need not be perpendicular: the larger
+/// singular value of [s t].
 fn reach(surfel: &Surfel) -> f64 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
     let (sum, difference) = (s.length_squared() + t.length_squared(), s.length_squared() - t.length_squared());
@@ -54,8 +60,11 @@ pub fn filter_reach(design: &Design) -> f64 {
     }
 }
 
-/// The twin of `ball_extent` and `pixels_of`: the first and last points of the image that disks in the ball at `center`
-/// (camera space) can touch, world units and pixels; `None` for a ball that reaches the near depth.
+/// The f64 twin of `ball_extent` and `pixels_of`: the first and the last image point, pixels, that
+/// disks in a ball can touch.
+///
+/// `center` is in camera space; lengths are in world units. `None` for a ball that reaches the near
+/// depth.
 pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64) -> Option<[DVec2; 2]> {
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
@@ -93,12 +102,13 @@ pub const PASS: Pass = Pass {
 const CULL_NEAR: Kernel = Kernel::new("cull_near");
 const CULL_FAR: Kernel = Kernel::new("cull_far");
 
-/// Which batches of every page are in `part`, [`Part::Near`] or, after the nearest depths are those of the near ones,
-/// [`Part::Far`].
+/// The stage that lists the batches of every page that are in `part`.
+///
+/// This is [`Part::Near`] or, once the nearest depths of the near ones are known, [`Part::Far`].
 pub fn steps(band: usize, part: Part) -> Stage {
     let near = part == Part::Near;
     let kernel = if near { CULL_NEAR } else { CULL_FAR };
-    // The far ones follow the near ones.
+    // The counts of all, far and not near batches; the far ones are listed after the near ones.
     let counts = [("drawn", 1), ("drawn", u64::from(LIST_FAR) + 1), ("rest", 0)];
     let mut clears: Vec<_> = counts.into_iter().map(|(list, word)| Clear::of(list, word, 1)).collect();
     clears.push(Clear::of("queue", 0, QUEUE_START.into()));
@@ -121,7 +131,7 @@ mod tests {
         Camera::posed((640, 480), lens, DVec3::ZERO, DMat3::IDENTITY, 0.05).unwrap()
     }
 
-    /// Whether the image of a ball holds what `surfel` may touch.
+    /// Whether the image of a ball holds all pixels that `surfel` may touch.
     fn holds([low, high]: [DVec2; 2], surfel: &Surfel, camera: &Camera, design: &Design) -> bool {
         let center = Vec3::from_array(surfel.center).as_dvec3();
         project::reference((0, surfel, None), center - camera.eye, camera, design).is_none_or(|splat| {

@@ -1,15 +1,20 @@
-//! A cap at a pixel: a surfel that curves out of its plane ([`Cap`]). The twin of `wgsl/curved.wgsl`.
+//! A cap at a pixel: a surfel that curves out of its plane ([`Cap`]). The twin of
+//! `wgsl/curved.wgsl`.
 //!
-//! **Rows.** With N the inverse of [s t n], n the unit normal, a point q relative to the surfel's centre has the coordinates
-//! `(u, v, w) = N q`, and the cap is `w = (uu u² + 2 uv u v + vv v²) / 2`. Of the ray through a pixel take the point at the depth of
-//! the centre: its (U, V, W) are affine in the pixel, and 0 where the centre is seen, so they are stored relative to the pixel that
-//! holds the centre, as the rows of a [homography](super::homography) are. From there the ray goes on, for each longer half-axis r
-//! that its depth grows by, by `(U, V, W) r/z + D` with D = N p r/z (pinhole), or by D = N e r (orthographic, e its direction). All of
-//! these numbers are near 1 whatever the scene's scale, if the surfel is not much larger than its depth.
+//! **Rows.** With N the inverse of [s t n], n the unit normal, a point q relative to the surfel's
+//! centre has the coordinates `(u, v, w) = N q`, and the cap is
+//! `w = (uu u² + 2 uv u v + vv v²) / 2`. On the ray through a pixel, take the point at the depth of
+//! the centre: its (U, V, W) are affine in the pixel, and 0 at the image of the centre. They are
+//! stored relative to the pixel that holds the centre, like the rows of a
+//! [homography](super::homography). When its depth grows by r, the longer half-axis, the ray
+//! advances by `(U, V, W) r/z + D`, where D = N p r/z (pinhole) or D = N e r (orthographic, e the
+//! ray's direction). All these numbers are near 1 at any scale of the scene, if the surfel is not
+//! much larger than its depth.
 //!
-//! **Intersection.** `a σ² + b σ + c = 0` for σ, the way along the ray in r of depth. Of its roots the nearest counts that lies on
-//! the cap, inside its lines and past the near depth; the sign of the slope there tells the side. Where the disk is flat the
-//! equation is that of its plane. (Specified after paper 001, which gives no formula.)
+//! **Intersection.** `a σ² + b σ + c = 0`, where σ is the distance along the ray in units of r of
+//! depth. The nearest root counts that lies on the cap, inside its clip lines and past the near
+//! depth; the sign of the slope there tells the side. For a flat disk the equation is that of its
+//! plane. (Specified after paper 001, which gives no formula.)
 
 use glam::{DVec2, DVec3};
 
@@ -17,41 +22,44 @@ use super::homography::Projected;
 use super::splat::{Intersection, Splat};
 use crate::scene::{Camera, Cap, Projection};
 
-/// How a splat curves.
+/// The curvature of a splat, prepared for the pixels of one camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Curve {
-    /// `u . (dx, dy, 1)` is U at a pixel (dx, dy) from the anchor; so `v`, and `w` in units of [`Self::radius`].
+    /// The row of U: `u . (dx, dy, 1)` is U at a pixel (dx, dy) from the anchor.
     pub u: DVec3,
-    /// V.
+    /// The row of V.
     pub v: DVec3,
-    /// W.
+    /// The row of W, in units of [`Self::radius`].
     pub w: DVec3,
-    /// D.
+    /// D, the constant part of the ray's advance.
     pub along: DVec3,
     /// r/z; 0 for an orthographic camera.
     pub spread: f64,
-    /// r: the longer half-axis, world units.
+    /// r, the longer half-axis, world units.
     pub radius: f64,
     /// The depth at which U, V and W are taken, world units.
     pub depth: f64,
-    /// The cap's heights in units of r.
+    /// The cap's coefficients (uu, uv, vv) in units of r.
     pub heights: [f64; 3],
-    /// What the normal gains for a unit of u and of v, world space, where that of the centre is 1 long.
+    /// The change of the normal per unit of u and of v, world space, where the centre's normal has
+    /// length 1.
     pub slopes: [DVec3; 2],
-    /// Backs are left out.
+    /// Whether back faces are left out.
     pub culls: bool,
 }
 
 impl Curve {
-    /// Whether every point of the cap shows its back. With P = N p its normal's product with the way from the eye is
-    /// `P_w - h - slope . (P_u, P_v)` at a height h; here over z / r.
+    /// Whether every point of the cap shows its back.
+    ///
+    /// With P = N p, the product of the normal and the view ray is `P_w - h - slope . (P_u, P_v)`
+    /// at height h; here divided by z (pinhole).
     pub fn faces_away(&self) -> bool {
         let cap = Cap(self.heights.map(|height| height as f32));
         self.along.z - cap.extremes()[1] * self.spread - cap.slope(self.along.x, self.along.y).length() > 0.0
     }
 }
 
-/// A surfel as a camera sees it, camera space: its centre p, half-axes s and t and cap, world units.
+/// A surfel in camera space: centre p, half-axes s and t, and cap, world units.
 pub(super) struct Seen {
     pub p: DVec3,
     pub s: DVec3,
@@ -60,23 +68,25 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// The least and the largest depth of the box of the cap.
+    /// The smallest and the largest depth of the cap's bounding box.
     pub fn depths(&self) -> [f64; 2] {
         let slope = self.s.z.hypot(self.t.z);
         let [low, high] = self.shifts().map(|shift| shift.z);
         [self.p.z - slope + low.min(high), self.p.z + slope + low.max(high)]
     }
 
-    /// Where the disk's centre comes to at the cap's least and largest height, relative to it.
+    /// The displacements of the disk's centre at the cap's lowest and highest point.
     fn shifts(&self) -> [DVec3; 2] {
         let normal = self.s.cross(self.t).normalize_or_zero();
         self.cap.extremes().map(|height| normal * height)
     }
 
-    /// The first and last point of the image that the cap can touch past the near depth, pixels:
-    /// what boxes around it, each sheared along a ray, have in common. Along the ray through the
-    /// centre a box is tight, but beside the eye that ray is nearly across the axis, and such a box
-    /// fills the image. Along the axis it does not.
+    /// The first and last image point, in pixels, that the cap can touch past the near depth.
+    ///
+    /// They bound the intersection of two boxes around the cap, each sheared along a ray. The box
+    /// along the ray through the centre is tight, except beside the eye, where that ray is nearly
+    /// perpendicular to the axis and the box fills the image. The box along the axis is small
+    /// there.
     pub fn extent(&self, camera: &Camera) -> [DVec2; 2] {
         let focal = DVec2::new(camera.fx, camera.fy);
         let image = |point: DVec2| point * focal + DVec2::new(camera.cx, camera.cy);
@@ -99,7 +109,7 @@ impl Seen {
         [image(low), image(high)]
     }
 
-    /// The least and the largest `x - ratio z` of the box of the cap.
+    /// The smallest and the largest `x - ratio z` of the cap's box.
     fn around(&self, x: fn(DVec3) -> f64, ratio: f64) -> [f64; 2] {
         let of = |v: DVec3| x(v) - ratio * v.z;
         let half = of(self.s).hypot(of(self.t));
@@ -107,8 +117,8 @@ impl Seen {
         [of(self.p) - half + a.min(b), of(self.p) + half + a.max(b)]
     }
 
-    /// The least and the largest (X/Z, Y/Z) of the box that is sheared along the ray (`ratio`, 1),
-    /// at these depths.
+    /// The smallest and the largest (X/Z, Y/Z), between two depths, of the cap's box sheared along
+    /// the ray (`ratio`, 1).
     fn seen_around(&self, ratio: DVec2, [near, far]: [f64; 2]) -> [DVec2; 2] {
         let seen = |[low, high]: [f64; 2], ratio: f64| {
             [low / if low < 0.0 { near } else { far } + ratio, high / if high > 0.0 { near } else { far } + ratio]
@@ -119,7 +129,8 @@ impl Seen {
     }
 }
 
-/// The inverse of [s t n] by rows, n the unit normal of s and t, which need not be perpendicular.
+/// The rows of the inverse of [s t n], n the unit normal of s and t. These need not be
+/// perpendicular.
 fn inverse(s: DVec3, t: DVec3) -> [DVec3; 3] {
     let cross = s.cross(t);
     let n = cross.normalize_or_zero();
@@ -131,13 +142,14 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
     let [m_s, m_t, n] = inverse(seen.s, seen.t);
     let radius = seen.s.length().max(seen.t.length());
     let rows = [m_s, m_t, n / radius];
-    // Past the near depth: where a cap lies mostly behind the camera, r / z may be large.
+    // Without an anchor at its centre, U, V and W are taken past the near depth: r / z may be large
+    // where a cap lies mostly behind the camera.
     let depth = if projected.images.is_some() { seen.p.z } else { camera.near.max(seen.depths()[1]) };
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
     let pixel = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5;
     let d = ((pixel - principal) / focal).extend(1.0);
-    // The point of the anchor's ray at that depth, from the centre.
+    // The point of the anchor's ray at that depth, relative to the centre.
     let (start, scale, spread) = match camera.projection {
         Projection::Pinhole => (d * depth - seen.p, depth, radius / depth),
         Projection::Orthographic => (d.truncate().extend(depth) - seen.p, 1.0, 0.0),
@@ -161,20 +173,24 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
     }
 }
 
-/// What the normal gains for a unit of u and of v, world space, for a normal of unit length: minus the gradient of the height.
+/// The change of a unit normal per unit of u and of v, world space: minus the gradient of the
+/// height.
 pub(super) fn normal_slopes(s: DVec3, t: DVec3, cap: Cap) -> [DVec3; 2] {
     let [m_s, m_t, _] = inverse(s, t);
     let [uu, uv, vv] = cap.0.map(f64::from);
     [-(m_s * uu + m_t * uv), -(m_s * uv + m_t * vv)]
 }
 
-/// Where the ray through a pixel at `d` from the anchor meets the cap; and for the low-pass, where it meets the plane that touches the
-/// cap at its centre: 1/z (pinhole) or z, and how far inside the lines.
+/// Intersects the ray through the pixel at `d` from the anchor with the cap, and with the plane
+/// that touches the cap at its centre.
+///
+/// For that plane, which the low-pass needs, it returns 1/z (pinhole) or z, and how far inside the
+/// clip lines the point is.
 pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (Intersection, (f64, f64)) {
     let at = |row: DVec3| row.x * d.x + (row.y * d.y + row.z);
     let start = DVec3::new(at(curve.u), at(curve.v), at(curve.w));
     let step = start * curve.spread + curve.along;
-    // Seen edge-on it is met at its centre's depth.
+    // Seen edge-on, the plane counts as met at the centre's depth.
     let to_plane = if step.z == 0.0 { 0.0 } else { -start.z / step.z };
     let depth = curve.depth + curve.radius * to_plane;
     let inside = splat.inside(start.x + to_plane * step.x, start.y + to_plane * step.y);
@@ -187,17 +203,17 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
     let met = if out <= 0.0 {
         first
     } else if out_of_second <= 0.0 {
-        // It is decided no better than that the first is none.
+        // The hit is no more certain than the miss of the first root.
         Intersection { inside: second.inside.min(out), ..second }
     } else {
-        // As far outside of the disk as the nearer of the two is of anything.
+        // A miss by as much as the nearer root misses.
         let (nearer, missed) = if out_of_second < out { (second, out_of_second) } else { (first, out) };
         Intersection { rho2: (1.0 + missed).powi(2), inside: f64::INFINITY, ..nearer }
     };
     (met, plane)
 }
 
-/// A ray's two meetings with the paraboloid of a cap, the nearer one first.
+/// The two intersections of a ray with the paraboloid of a cap, the nearer one first.
 struct Way {
     first: Intersection,
     second: Intersection,
@@ -209,11 +225,13 @@ impl Way {
         let bent = |a: DVec3, b: DVec3| uu * a.x * b.x + uv * (a.x * b.y + a.y * b.x) + vv * a.y * b.y;
         let [a, b, c] = [0.5 * bent(step, step), bent(start, step) - step.z, 0.5 * bent(start, start) - start.z];
         let discriminant = b * b - 4.0 * a * c;
-        // How far it is from 0, of its terms: beside an outline nothing is known of it.
+        // The distance of the discriminant from 0, relative to its terms: near an outline, rounding
+        // decides.
         let margin = discriminant / (b * b + (4.0 * a * c).abs());
         let root = discriminant.max(0.0).sqrt();
         let far = -0.5 * (b + if b >= 0.0 { root } else { -root });
-        // Where the slope has the sign of b, and where it has the other one.
+        // The root at which the slope has the sign of b, and the one at which it has the opposite
+        // sign.
         let roots = [(c / far, b < 0.0), (far / a, b >= 0.0)];
         let [first, second] = roots.map(|(sigma, away)| {
             let (u, v) = (start.x + sigma * step.x, start.y + sigma * step.y);
@@ -225,7 +243,10 @@ impl Way {
     }
 }
 
-/// How far a meeting is from being a hit, of the unit disk, of its lines' lengths, or of the near depth: not positive for a hit.
+/// How far an intersection is from being a hit; 0 or negative for a hit.
+///
+/// The largest of the distances outside the unit disk, outside the clip lines, and before the near
+/// depth (relative).
 fn outside(curve: &Curve, camera: &Camera, at: &Intersection) -> f64 {
     let never = curve.culls && at.away || at.rho2.is_nan();
     let margins = [at.rho2.sqrt() - 1.0, -at.inside, 1.0 - at.depth / camera.near];
@@ -242,8 +263,9 @@ mod tests {
     use crate::scene::{Lens, LowPass, Surfel};
     use glam::{DMat3, Vec3};
 
-    /// Pixels within the bounds of caps all around an eye, of all heights or flat; each that shows
-    /// the cap lies within them.
+    /// Counts the pixels in the bounds of caps of at most this height (0: flat) all around an eye.
+    ///
+    /// Asserts that every pixel that shows a cap lies within its bounds.
     fn pixels_in_bounds(height: f64) -> u64 {
         let size = 48;
         let camera = Camera::posed((size, size), Lens::Fov(75.0), DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap();

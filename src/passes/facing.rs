@@ -1,5 +1,7 @@
-//! Points that face the camera (Schuetz and Wimmer 2015): their half-axes, and where a ray meets them. The twin of `wgsl/facing.wgsl`
-//! and `wgsl/axes_facing.wgsl`.
+//! Points that face the camera (Schuetz and Wimmer 2015): their half-axes and their intersection
+//! with a ray.
+//!
+//! The twin of `wgsl/facing.wgsl` and `wgsl/axes_facing.wgsl`.
 
 use glam::{DVec2, DVec3};
 
@@ -8,7 +10,7 @@ use crate::plan::pass::{Making, Pass};
 use crate::scene::facing::{Facing, PointShape};
 use crate::scene::{Camera, Projection, Samples, Surfel};
 
-/// The files and constants; none where surfels lie in planes of their own.
+/// The pass's files and constants; no constants where surfels lie in planes of their own.
 pub const PASS: Pass = Pass {
     name: "facing",
     files: |needs| {
@@ -32,11 +34,11 @@ fn constants(making: &Making<'_>) -> Vec<(&'static str, f64)> {
     vec![("LEAST_RADIUS", least), ("MOST_RADIUS", most), ("SQUARE", square)]
 }
 
-/// A point as it faces the camera.
+/// A point that faces the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     shape: PointShape,
-    /// World units.
+    /// The radius, world units.
     radius: f64,
 }
 
@@ -48,12 +50,12 @@ pub struct Faced {
 }
 
 impl Faced {
-    /// In a picture with these `samples`.
+    /// Points of a picture with these `samples` per pixel.
     pub fn new(facing: Facing, samples: Samples) -> Self {
         Self { facing, samples }
     }
 
-    /// The point that a surfel at depth `z` is, by a camera whose pixels are the samples.
+    /// The point for a surfel at depth `z`. The pixels of `camera` are the samples.
     pub fn point(&self, surfel: &Surfel, z: f64, camera: &Camera) -> Point {
         let radius = self.facing.radius(surfel.radius().into(), z, camera, self.samples);
         Point { shape: self.facing.shape, radius }
@@ -61,23 +63,23 @@ impl Faced {
 }
 
 impl Point {
-    /// What it is drawn as.
+    /// The shape that is drawn.
     pub fn shape(&self) -> PointShape {
         self.shape
     }
 
-    /// World units.
+    /// The radius, world units.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Half-axes in camera space.
+    /// The half-axes in camera space, world units.
     pub fn axes(&self) -> [DVec3; 2] {
         [DVec3::X * self.radius, DVec3::Y * self.radius]
     }
 }
 
-/// Where the ray through a pixel at `d` from the anchor meets a point.
+/// Intersects the ray through the pixel at `d` from the anchor with a point.
 pub(super) fn meet(point: &Point, splat: &Splat, camera: &Camera, d: DVec2) -> Intersection {
     let change = DVec2::new(splat.a.x, splat.b.y);
     let uv = change * d + DVec2::new(splat.a.z, splat.b.z);
@@ -85,7 +87,7 @@ pub(super) fn meet(point: &Point, splat: &Splat, camera: &Camera, d: DVec2) -> I
         Projection::Pinhole => (splat.c.z, 1.0 / splat.c.z),
         Projection::Orthographic => (1.0, splat.c.z),
     };
-    // A point always shows at the pixel that it lies in, as if it were a square of that size.
+    // A point always shows at the pixel that it lies in, like a square of that pixel's size.
     let own = (2.0 * uv / change).abs().max_element();
     let beside = uv / scale;
     let rho = if point.shape == PointShape::Square { beside.abs().max_element() } else { beside.length().min(own) };

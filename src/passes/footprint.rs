@@ -59,18 +59,20 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// Where the ray through the centre of pixel (x, y) meets the splat's plane, or its low-pass, and the factor on the
-/// kernel's weight; `None` behind the camera.
+/// Intersects the ray through the centre of pixel (x, y) with the splat's plane, or its low-pass.
+///
+/// Returns the intersection and the factor on the kernel's weight; `None` behind the camera.
 pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
     met(splat, camera, low_pass, x, y).map(|(at, gain)| (at, gain * splat.fade.weight()))
 }
 
-/// The same of all of the splat.
+/// The same without the splat's fade.
 fn met(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
     if let Some(curve) = &splat.curve {
         let (cap, plane) = curved::meet(curve, splat, camera, DVec2::new(dx, dy));
-        // What a line cuts of the plane, and a back that is left out, the cap itself may show.
+        // Where the tangent plane is clipped, or shows a back that is culled, the cap itself may
+        // still be visible.
         let shows = |(at, _): &(Intersection, f64)| at.inside >= 0.0 && !(curve.culls && at.away);
         let soft = filtered(splat, camera, low_pass, Some(cap), plane, (dx, dy));
         return soft.filter(|soft| soft.0.rho2 >= cap.rho2 || shows(soft)).or(Some((cap, 1.0)));

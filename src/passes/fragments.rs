@@ -1,13 +1,18 @@
-//! Stages 2 and 3 where surfaces show through each other ([`Composite`](crate::scene::Composite)): a list of each pixel's fragments, from
-//! front to back, which [`layers`](super::layers) or [`sorted`](super::sorted) composite.
+//! Stages 2 and 3 where surfaces show through each other ([`Composite`](crate::scene::Composite)):
+//! makes a list of each pixel's fragments, from front to back, which [`layers`](super::layers) or
+//! [`sorted`](super::sorted) composite.
 //!
-//! The visibility pass counts the fragments of each pixel, a scan makes of the counts where each list starts, and the attribute pass puts
-//! every fragment's depth, weight and attributes there. Then each pixel's list is sorted, so nothing that follows depends on the order in
-//! which fragments came: those of one depth are in that of the surfels ([`order`](super::order)) where their order shows.
+//! The visibility pass counts the fragments of each pixel, a prefix sum turns the counts into list
+//! starts, and the attribute pass stores every fragment's depth, weight and attributes in its list.
+//! Then each list is sorted, so later passes do not depend on the order in which fragments were
+//! stored: fragments at one depth are in the order of their surfels ([`order`](super::order)),
+//! where that order is visible.
 //!
-//! **Room.** How many fragments there are is looked at before any is put anywhere. Where a band has more than a buffer holds, it is cut
-//! by the counts of its rows into bands that have not, and the frame begins again: what cannot be held at once is drawn in turns, and
-//! nothing is left out. What one invocation cannot go through is sorted and composited in rounds ([`long_lists`](super::long_lists)).
+//! **Memory.** The number of fragments is read before any is stored. If a band has more than a
+//! buffer holds, it is cut, by the counts of its rows, into bands that fit, and the frame begins
+//! again: fragments that do not fit at once are drawn in turns, and none is left out. Lists that
+//! are too long for one invocation are sorted and composited in rounds
+//! ([`long_lists`](super::long_lists)).
 
 use glam::DVec3;
 
@@ -20,24 +25,24 @@ use crate::plan::steps::{Kernel, Look, Over, Part, Run, Stage, Step};
 use crate::plan::{Band, FragmentLayout, Lists, Plan};
 use crate::scene::kernel::LEAST_WEIGHT;
 
-/// A fragment of the twin.
+/// A fragment of the f64 twin.
 #[derive(Clone, Copy, Debug)]
 pub struct Fragment {
-    /// Its surfel.
+    /// The index of its surfel.
     pub surfel: u32,
     /// Camera-space z, world units.
     pub depth: f64,
-    /// It shows the back of a surface that has sides.
+    /// Whether it shows the back of a two-sided surface.
     pub back: bool,
     /// The shorter half-axis of its surfel, world units.
     pub radius: f64,
-    /// Its weight.
+    /// The kernel's weight, times the low-pass's gain and the fade.
     pub weight: f64,
-    /// Premultiplied linear colour, lit if splats are.
+    /// Premultiplied linear colour, lit if splats are lit.
     pub color: [f64; 4],
-    /// World space, unit, turned toward the viewer.
+    /// World space, unit length, turned toward the viewer.
     pub normal: DVec3,
-    /// The place of its surfel in the [`order`](super::order).
+    /// The rank of its surfel in the [`order`](super::order).
     pub rank: u32,
 }
 
@@ -46,11 +51,12 @@ pub struct Fragment {
 pub struct List {
     /// From front to back.
     pub fragments: Vec<Fragment>,
-    /// The smallest relative distance of one of them to a decision, or of one that is none for it.
+    /// The smallest relative distance to a decision of a fragment, or of a footprint that narrowly
+    /// missed being one.
     pub decision: f64,
 }
 
-/// The twin: the lists of the pixels of `strip`.
+/// The f64 twin: the lists of the pixels of `strip`.
 pub fn reference(strip: &Strip<'_>) -> Vec<List> {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let nothing = List { fragments: Vec::new(), decision: f64::INFINITY };
@@ -83,7 +89,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<List> {
         }
     }
     for list in &mut lists {
-        // Of one depth the front comes before the back.
+        // At equal depth the front comes before the back.
         let key = |f: &Fragment| (f.depth, f.back, f.rank);
         list.fragments.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
     }
@@ -99,7 +105,7 @@ pub const PASS: Pass = Pass {
             Some(Lists::Layers) => "fragments_untied.wgsl",
             Some(Lists::Sorted) => "fragments_ranked.wgsl",
         };
-        // Else veils count.
+        // With veils, fragments_veils.wgsl counts.
         let count = (!needs.veils).then_some("fragments_count.wgsl");
         let sort = ["fragments_sort.wgsl", "fragments_network.wgsl", ties];
         let all = ["fragments.wgsl", "compositing.wgsl", "layer_sums.wgsl"].into_iter().chain(sort);
@@ -131,28 +137,36 @@ const LIST: Kernel = Kernel::new("list_fragments");
 const LIST_LARGE: Kernel = Kernel::of("list_fragments_large", [TILE, TILE, 1]);
 const SORT: Kernel = Kernel::new("sort_fragments");
 
-/// Words of the buffer that says where lists start: what there is altogether and at most at a pixel, then where the lists of each
-/// row start and where the last one ends, then the same of each pixel, and where lists end by [`veils`](super::veils).
+/// Words of the buffer of list starts.
+///
+/// First the total number of fragments and the most at one pixel; then the start of each row's
+/// lists and the end of the last; then the same per pixel; then the last step of each pixel's list
+/// ([`veils`](super::veils)).
 pub fn start_words(band: &Band) -> u64 {
     2 + u64::from(band.rows) + 1 + band.pixels + 1 + band.pixels
 }
 
-/// Where lists start, of fragments that the visibility pass counted; and a look at how many there are.
+/// The steps that compute where lists start, from the visibility pass's counts, and read how many
+/// fragments there are.
 pub fn starts(band: usize) -> [Step; 2] {
     let run = |kernel, over| Run { kernel, over };
     let runs = vec![run(OF_ROWS, Over::Rows), run(START_ROWS, Over::Once), run(START_PIXELS, Over::Rows)];
     [Step::Stage(Stage::new("bin", band, runs)), Step::Look(Look::Fragments(band))]
 }
 
-/// The lists themselves, and their order.
+/// The stages that store the fragments in their lists, and sort these.
 pub fn steps(band: usize) -> [Stage; 2] {
     let run = |kernel, over| Run { kernel, over };
     let list = vec![run(LIST, Over::Slots(Part::All)), run(LIST_LARGE, Over::Large)];
     [Stage::new("accumulate", band, list), Stage::new("sort", band, vec![run(SORT, Over::Pixels)])]
 }
 
-/// Bands of the image for a view, whose `band` has more fragments than there is room for `most`: it is cut where the next row would be
-/// too many, by the `starts` of its rows, and those after it into as few rows as that took. None if a row alone has more.
+/// Cuts `band` of a view, which has more than the `most` fragments that a buffer holds, and returns
+/// all bands of the new view.
+///
+/// The band is cut where the next row would exceed `most`, by the `starts` of its rows, and only
+/// between rows of whole pixels. Later bands get as many rows as the smallest piece, the last one
+/// excepted. `None` if a single row has more.
 pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Band>> {
     let whole = plan.needs.samples.down as usize;
     let mut rows = Vec::new();
@@ -170,7 +184,7 @@ pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Ba
         fits &= *of_cut > 0 && starts[at + of_cut] - starts[at] <= most;
         at += of_cut;
     }
-    // The last piece is what was left.
+    // The last piece is a remainder, so it does not count.
     let full = &rows[..rows.len().saturating_sub(1).max(1)];
     let least = full.iter().copied().min().filter(|_| fits)?.max(whole) as u32;
     let mut bands = plan.bands[..band].to_vec();
@@ -193,7 +207,7 @@ pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Ba
 mod tests {
     use crate::gpu::sources::FILES;
 
-    /// The comparators of the network that sorts sixteen keys, as its text has them.
+    /// The comparators of the network that sorts sixteen keys, parsed from its WGSL.
     fn network(text: &str) -> Vec<[usize; 2]> {
         let number = |part: &str| part.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap();
         let pair = |line: &str| {
@@ -205,14 +219,15 @@ mod tests {
         text.lines().filter_map(pair).collect()
     }
 
-    /// Whether it sorts every list of zeros and ones, and so every list (Knuth, 5.3.4, theorem Z).
+    /// Whether the network sorts every list of zeros and ones, and so every list (Knuth, 5.3.4,
+    /// theorem Z).
     fn sorts(network: &[[usize; 2]]) -> bool {
         (0..1u32 << 16).all(|bits| {
             let sorted = network.iter().fold(bits, |bits, [a, b]| {
                 let swaps = (bits >> a & 1) > (bits >> b & 1);
                 if swaps { bits ^ (1 << a | 1 << b) } else { bits }
             });
-            // As many ones as there were, all behind the zeros.
+            // As many ones as before, all behind the zeros.
             sorted == 0xffff & !(0xffff >> bits.count_ones())
         })
     }

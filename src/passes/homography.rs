@@ -1,15 +1,18 @@
-//! A disk's image in one camera: the homography from pixels to the disk, and the extent of its outline. The twin of
-//! `wgsl/camera_pinhole.wgsl` and `wgsl/camera_orthographic.wgsl`.
+//! A disk's image in one camera: the homography from pixels to the disk, and the extent of its
+//! outline.
+//!
+//! The twin of `wgsl/camera_pinhole.wgsl` and `wgsl/camera_orthographic.wgsl`.
 //!
 //! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies
-//! `(a, b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4). The rows of that
-//! matrix are `t x p`, `p x s` and `s x t`, over `p . (s x t)`. It is stored relative to the pixel that holds the
-//! splat's own centre: about the image's origin, a splat of two pixels at column 1000 would lose nine bits of its
-//! shape to cancellation. The kernel finds that centre in doubled f32 precision (`wgsl/double.wgsl`), so u and v err by
-//! a few units of 2^-24 over the cosine of the angle between view ray and normal.
+//! `(a, b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4).
+//! The rows of that matrix are `t x p`, `p x s` and `s x t`, divided by `p . (s x t)`. It is stored
+//! relative to the pixel that holds the splat's own centre: relative to the image's origin, a splat
+//! of two pixels at column 1000 would lose nine bits of its shape to cancellation. The kernel finds
+//! that centre in doubled f32 precision (`wgsl/double.wgsl`), so u and v err by a few units of
+//! 2^-24, divided by the cosine of the angle between view ray and normal.
 //!
-//! **Extent.** The lines x = k tangent to the disk's outline solve a quadratic in k; a disk that crosses the near depth
-//! is bounded by its part in front.
+//! **Extent.** The lines x = k that are tangent to the disk's outline solve a quadratic in k. A
+//! disk that crosses the near depth is bounded by its part in front of it.
 
 use glam::{DVec2, DVec3};
 
@@ -23,16 +26,19 @@ pub(super) struct Projected {
     pub(super) c: DVec3,
     pub(super) low: DVec2,
     pub(super) high: DVec2,
-    /// The normal points away from the viewer.
+    /// Whether the normal points away from the viewer.
     pub(super) away: bool,
-    /// The centre relative to the anchor's and the half-axes' images, where the splat's centre is the anchor.
+    /// The centre relative to the anchor's centre, and the images of the half-axes. `None` unless
+    /// the anchor is the splat's own centre pixel.
     pub(super) images: Option<[DVec2; 3]>,
 }
 
-/// Past this the centre is so far outside the image that it is no use as an anchor (exact in f32 too).
+/// The largest coordinate of an anchor, pixels, which is exact in f32. A centre farther outside the
+/// image is of no use.
 const FARTHEST_ANCHOR: f64 = 4_194_304.0;
 
-/// The disk with centre `p` and half-axes `s` and `t`, camera space, in the image of `camera`. Part of it is in front of the near depth.
+/// Projects the disk with centre `p` and half-axes `s` and `t` (camera space). Part of it must lie
+/// beyond the near depth.
 pub(super) fn projected(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {
     match camera.projection {
         Projection::Pinhole => pinhole(camera, p, s, t),
@@ -49,11 +55,11 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {
     let away = p.dot(s.cross(t));
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
-    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    // Edge-on the rows vanish; u is then set to 2, outside the disk.
     let edge_on = away == 0.0;
     let scale = if edge_on { 0.0 } else { 1.0 / away };
     let (a, b, c) = (t.cross(p) * scale, p.cross(s) * scale, s.cross(t) * scale);
-    // d = ((x - cx)/fx, (y - cy)/fy, 1): columns of the homography per pixel.
+    // d = ((x - cx)/fx, (y - cy)/fy, 1): the homography's columns per pixel.
     let per_pixel = |row: DVec3| row.truncate() / focal;
     let (a_xy, b_xy, c_xy) = (per_pixel(a), per_pixel(b), per_pixel(c));
     let slope = slope(s, t);
@@ -93,7 +99,8 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {
     }
 }
 
-/// X/Z of the tangents to a disk before the camera, relative to its centre's; vectors are (x or y, z).
+/// X/Z of the tangents to a disk in front of the camera, relative to its centre's. Vectors are (x
+/// or y, z).
 fn tangents(s: [f64; 2], t: [f64; 2], p: [f64; 2]) -> DVec2 {
     let ratio = p[0] / p[1];
     let (s_x, t_x) = (s[0] - ratio * s[1], t[0] - ratio * t[1]);
@@ -106,7 +113,7 @@ fn tangents(s: [f64; 2], t: [f64; 2], p: [f64; 2]) -> DVec2 {
     if b >= 0.0 { DVec2::new(-far / d, near) } else { DVec2::new(-near, far / d) }
 }
 
-/// The disk coordinates (u, v) of the two ends of the chord at depth `near`.
+/// The disk coordinates (u, v) of both ends of the chord at depth `near`.
 fn chord(s: DVec3, t: DVec3, p_z: f64, slope: f64, near: f64) -> [DVec2; 2] {
     if slope == 0.0 {
         return [DVec2::ZERO; 2];
@@ -117,7 +124,7 @@ fn chord(s: DVec3, t: DVec3, p_z: f64, slope: f64, near: f64) -> [DVec2; 2] {
     [along * steepest + half * steepest.perp(), along * steepest - half * steepest.perp()]
 }
 
-/// X/Z extent of the part of a disk at depths of `near` and more.
+/// The X/Z extent of the part of a disk at depths of at least `near`.
 fn clipped_extent(s: [f64; 2], t: [f64; 2], p: [f64; 2], ends: [DVec2; 2], near: f64) -> DVec2 {
     let ends = ends.map(|uv| (p[0] + uv.x * s[0] + uv.y * t[0]) / near);
     let (mut low, mut high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));

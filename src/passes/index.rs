@@ -1,8 +1,13 @@
-//! A map of its own: at each pixel, which surfel has the greatest weight of those within epsilon of the nearest depth, by the number of
-//! its input and of its point there. Of equal weights (on a device: within four units in the last place of f32) the surfel that comes
-//! first in the [`order`](super::order) has it, which depends on what surfels are and not on where they stood in their files.
+//! The index map, in a pass of its own: at each pixel, the input and the point that the visible
+//! surfel of greatest weight comes from.
 //!
-//! Two sweeps over the fragments keep the greatest weight, then the first of those that have it, in the map's own words of the image.
+//! Visible surfels are those within epsilon of the nearest depth. Between equal weights (on a
+//! device: weights within four units in the last place of f32) the surfel that comes first in the
+//! [`order`](super::order) wins. That order depends on the surfels' values, not on their places in
+//! files.
+//!
+//! Two sweeps over the fragments find the greatest weight, then the first surfel that has it, in
+//! the map's own words of the image.
 
 use super::footprint::footprint;
 use super::visibility::Nearest;
@@ -15,7 +20,7 @@ use crate::plan::steps::{Kernel, Over, Part, Run, Stage};
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Map, Provenance};
 
-/// The map's row.
+/// The map's pass.
 pub const MAP: MapPass = MapPass {
     map: Map::Index,
     pass: Pass {
@@ -34,7 +39,7 @@ const STRONGEST_LARGE: Kernel = Kernel::of("strongest_large", [TILE, TILE, 1]);
 const NAME: Kernel = Kernel::new("name_strongest");
 const NAME_LARGE: Kernel = Kernel::of("name_strongest_large", [TILE, TILE, 1]);
 
-/// The numbers of a pixel where nothing is.
+/// The input and point number of an empty pixel.
 pub const NOTHING: u32 = u32::MAX;
 
 fn runs(_: &Plan, band: usize) -> Stage {
@@ -44,14 +49,14 @@ fn runs(_: &Plan, band: usize) -> Stage {
     Stage::new("index", band, runs)
 }
 
-/// Input and point of a surfel, as a pixel of a frame keeps them.
+/// The input and point number of a surfel, as bits of the two f32 that a frame stores per pixel.
 fn named(provenance: &Provenance, surfel: Option<u32>) -> [f32; 2] {
     let Some(surfel) = surfel else { return [f32::from_bits(NOTHING); 2] };
     let (input, point) = provenance.of(surfel.into());
     [input, point].map(|number| f32::from_bits(u32::try_from(number).unwrap_or(NOTHING - 1)))
 }
 
-/// Of a weight and what a place lacks to the last number, input and point.
+/// Converts each pixel's pair (weight, `u32::MAX` - rank) to the pair (input, point).
 fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
     for [weight, place] in words.as_chunks_mut().0 {
         let surfel = order.get((u32::MAX - place.to_bits()) as usize);
@@ -59,7 +64,7 @@ fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
     }
 }
 
-/// The twin.
+/// The f64 twin.
 fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let (Some(ranks), Some(map)) = (strip.ranks, frame.map_mut(Map::Index)) else { return };

@@ -1,9 +1,11 @@
-//! Stages 2 to 4 where inputs are kept apart: Tien's individuals (2008, chapter 5), which do not blend however near they are.
+//! Stages 2 to 4 where inputs are kept separate: Tien's individuals (2008, chapter 5), which do not
+//! blend however close they lie.
 //!
-//! Each is blended by itself, its nearest depths and its sums in the buffers that all share, and its pixels are shaded; of what they show
-//! the nearest is kept, by the depth that each blends to, as triangles and splats are told apart ([`join`](super::join)). So any number of
-//! them may meet at a pixel. A picture costs what its inputs would one by one, and eight words a pixel, or sixteen where maps or triangles ask
-//! for more.
+//! Each input is blended by itself, with nearest depths and sums in buffers that all inputs share,
+//! and its pixels are shaded. Each pixel keeps the nearest of the shaded surfaces, by the depth
+//! that each blends to, as triangles and splats are compared ([`join`](super::join)). So any number
+//! of inputs may meet at a pixel. A picture costs as much as its inputs would one by one, and eight
+//! words per pixel, or sixteen with maps or triangles.
 
 use super::resolve::Surface;
 use super::{Strip, accumulate, covered, resolve, visibility};
@@ -16,7 +18,7 @@ pub const PASS: Pass = Pass {
     name: "individuals",
     files: |needs| match needs.separate {
         true => vec!["individuals.wgsl"],
-        // What shows through is made of lists.
+        // With lists or peeled layers there are no separate inputs.
         false if needs.lists.is_some() || needs.peels.is_some() => Vec::new(),
         false => vec!["individuals_absent.wgsl"],
     },
@@ -27,7 +29,7 @@ pub const PASS: Pass = Pass {
 const KEEP: Kernel = Kernel::new("keep_individual");
 const LIST: Kernel = Kernel::new("list_individuals");
 
-/// Words of what individuals show at a pixel.
+/// Words per pixel of the nearest surface of the inputs so far.
 pub fn words(needs: &SceneNeeds) -> u32 {
     match needs.separate {
         false => 0,
@@ -36,24 +38,25 @@ pub fn words(needs: &SceneNeeds) -> u32 {
     }
 }
 
-/// What lists the tiles in which any shows.
+/// The dispatch that lists the tiles in which any input is visible.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 
-/// What an individual shows, where it is nearest, of the sums that are stored.
+/// The stage that shades the sums of an input and keeps its surface where it is nearest so far.
 pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: KEEP, over: Over::Covered });
     Stage::new("resolve", band, runs).after(clears(plan, band, first))
 }
 
-/// What is cleared before an individual's tiles are listed; before the `first` one nothing is kept.
+/// The clears before an input's tiles are listed. Before the `first` input they include the
+/// surfaces kept.
 pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
     let words = plan.bands[band].pixels * u64::from(words(&plan.needs));
     let kept = first.then(|| Clear::of("individuals", 0, words));
     [covered::restart(plan, band)].into_iter().chain(kept).collect()
 }
 
-/// The twin: what an individual shows at the pixels of `strip`.
+/// The f64 twin: the surfaces of one input at the pixels of `strip`.
 pub fn reference(strip: &Strip<'_>, individual: usize) -> Vec<Surface> {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let own = scene.provenance.ranges(scene.surfels.len() as u64).nth(individual).unwrap_or(0..0);
@@ -63,7 +66,8 @@ pub fn reference(strip: &Strip<'_>, individual: usize) -> Vec<Surface> {
     resolve::surfaces(&sums, &nearest, (scene, camera, options), first_row)
 }
 
-/// The twin: of what is `kept` and what another individual shows the nearer, and what lies near a decision.
+/// The f64 twin: keeps the nearer of each pixel's surface in `kept` and in `shown`, and their
+/// smallest distance to a decision.
 pub fn keep_nearest(kept: &mut [Surface], shown: Vec<Surface>) {
     for (kept, shown) in kept.iter_mut().zip(shown) {
         let both = kept.exists() && shown.exists();
@@ -76,7 +80,8 @@ pub fn keep_nearest(kept: &mut [Surface], shown: Vec<Surface>) {
     }
 }
 
-/// Whether `a` shows instead of `b`: it is nearer, or at one depth has the greater of the first of its values that differs.
+/// Whether `a` is shown in place of `b`: it is nearer, or at equal depth greater in the first value
+/// that differs.
 fn shows_before(a: &Surface, b: &Surface) -> bool {
     let values = |of: &Surface| {
         let [x, y, z] = of.normal.to_array();

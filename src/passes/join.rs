@@ -1,8 +1,9 @@
-//! Stage 4 where there are triangles: what shows of a pixel's splats and of its nearest triangle (Tien 2008, section 5.3), by
-//! [`Join`].
+//! Stage 4 where there are triangles: joins each pixel's blended splats with its nearest triangle
+//! (Tien 2008, section 5.3), by [`Join`].
 //!
-//! Splats are a surface by themselves before: nearest depths and sums see no triangle, else a splat's fragments just behind one would be
-//! left out of a mean that those just before it are in.
+//! Splats are blended first, without the triangles: if a triangle took part in nearest depths and
+//! sums, a splat's fragments just behind it would be missing from a mean that includes those just
+//! in front.
 
 use super::resolve::Surface;
 use super::triangles::Shown;
@@ -11,20 +12,20 @@ use crate::plan::{RenderOptions, bounds_of, in_view};
 use crate::scene::color::linear_to_srgb;
 use crate::scene::{Camera, Join, Scene};
 
-/// What triangles show in the rows of a strip, and what of its splats they are joined by.
+/// The triangles in the rows of a strip, and the values that join them with its splats.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
-    /// What triangles show there; empty if there are none.
+    /// The nearest triangle of each pixel; empty if there are no triangles.
     pub triangles: &'a [Shown],
     /// [`Scene::largest_shorter`](crate::scene::Scene::largest_shorter), world units.
     pub largest_shorter: f64,
-    /// No surfel lies deeper ([`farthest`](crate::plan::farthest)), world units.
+    /// The depth beyond which no surfel lies ([`farthest`](crate::plan::farthest)), world units.
     pub farthest: f64,
-    /// Colours of splats are codes of sRGB.
+    /// Whether splat colours are sRGB codes.
     pub coded: bool,
 }
 
-/// The twin: what shows of a pixel's splats and of its triangle.
+/// The f64 twin: the surface that a pixel shows, from its splats and its triangle.
 pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> Surface {
     let (share, order) = share_of_splats(splats, triangle, beside, options);
     let decision = splats.decision.min(triangle.decision).min(order);
@@ -44,13 +45,14 @@ pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, op
     if share > 0.0 { mean(&of_triangle, splats, share) } else { of_triangle }
 }
 
-/// A straight linear colour as codes of sRGB: the twin of `color_beside` in `wgsl/join_coded.wgsl`.
+/// Converts a straight linear colour to sRGB codes: the twin of `color_beside` in
+/// `wgsl/join_coded.wgsl`.
 fn coded([r, g, b, alpha]: [f64; 4]) -> [f64; 4] {
     let [r, g, b] = [r, g, b].map(linear_to_srgb);
     [r, g, b, alpha]
 }
 
-/// The mean of a triangle and of splats, which have a `share` of it.
+/// The mean of a triangle and of splats, which have the weight `share`.
 fn mean(triangle: &Surface, splats: &Surface, share: f64) -> Surface {
     let mix = |triangle: f64, splats: f64| triangle + share * (splats - triangle);
     let alpha = mix(triangle.color[3], splats.color[3]);
@@ -64,13 +66,15 @@ fn mean(triangle: &Surface, splats: &Surface, share: f64) -> Surface {
     Surface { color, normal, depth: mix(triangle.depth, splats.depth), decision: triangle.decision, ..*splats }
 }
 
-/// Whether the depth that a scene's splats blend to decides what shows in the view of `camera`.
+/// Whether the blended depth of a scene's splats decides what is visible in the view of `camera`:
+/// there are separate inputs, or triangles in view.
 pub(super) fn compares_depth(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool {
     let apart = options.separate && scene.provenance.ranges(scene.surfels.len() as u64).nth(1).is_some();
     apart || (options.join != Join::Nearest && in_view(&bounds_of(&scene.triangles), scene.origin, camera))
 }
 
-/// The part of the pixel that splats have beside a triangle, and its relative distance to a decision.
+/// The share of splats in a pixel beside a triangle, 0 to 1, and the relative distance to a
+/// decision.
 fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> (f64, f64) {
     match (splats.exists(), triangle.depth.is_finite()) {
         (false, _) => return (0.0, f64::INFINITY),
@@ -91,7 +95,7 @@ fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, opti
 pub const PASS: Pass = Pass {
     name: "join",
     files: |needs| {
-        // What shows through is made of lists.
+        // With lists or peeled layers there are no triangles.
         if needs.lists.is_some() || needs.peels.is_some() {
             return Vec::new();
         }

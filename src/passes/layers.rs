@@ -1,16 +1,19 @@
-//! Stage 4 of [`Composite::Layers`]: the fragments of a pixel are parted into surfaces, each is blended as the nearest
-//! one always is, and they are composited from front to back.
+//! Stage 4 of [`Composite::Layers`]: splits each pixel's fragments into surfaces, blends each
+//! surface as the nearest one is always blended, and composites them from front to back.
 //!
 //! # Where a surface ends
 //!
-//! The fragment nearest of those that no layer has yet starts one. Those of its side that lie within epsilon of it are blended, as in an
-//! opaque picture; those of its side that follow, each within epsilon of one before it, belong to the same surface but lie behind what shows
-//! of it, and are passed over. So a surface ends at the first gap of epsilon, as 3DSS merges the intervals of its kernels: a window of
-//! one epsilon behind the nearest fragment would cut a surface that the ray meets at a grazing angle, or at a crease, in two. Where
-//! normals have sides a front and a back are two surfaces, however near they lie.
+//! The nearest fragment that no layer has yet consumed starts a surface. Fragments of its side
+//! within epsilon of it are blended, as in an opaque picture. Those of its side that follow, each
+//! within epsilon of one before it, belong to the same surface but lie behind its visible part and
+//! are skipped. So a surface ends at the first gap of epsilon, as 3DSS merges the intervals of its
+//! kernels. A window of one epsilon behind the nearest fragment would cut a surface in two where
+//! the ray meets it at a grazing angle or at a crease. Where normals have sides, a front and a back
+//! are two surfaces, however close they lie.
 //!
-//! Sums are those of [`accumulate`](mod@super::accumulate), in integers, of the same terms, so a layer of alpha 1 that is nearest has the bits of the
-//! opaque picture that leaves no backs out; and a picture all of whose alphas are 1 is drawn as one.
+//! The sums are the integers of [`accumulate`](mod@super::accumulate), from the same terms. A
+//! nearest layer of alpha 1 therefore has the bits of the opaque picture without culling, and a
+//! picture whose alphas are all 1 is drawn as an opaque one.
 
 use super::Strip;
 use super::accumulate::PixelSums;
@@ -23,17 +26,20 @@ use crate::scene::composite::LEAST_TRANSMITTANCE;
 use crate::scene::maps::SURFACES;
 use crate::scene::{Composite, Map, Tail};
 
-/// How a pixel's fragments are parted into surfaces.
+/// How a pixel's fragments are split into surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parting {
     /// At the first gap of epsilon.
     Runs,
-    /// An epsilon behind the nearest fragment: what the rasteriser peels, and runs are compared with.
+    /// One epsilon behind the nearest fragment: the layers that the rasteriser peels, to compare
+    /// with.
     Window,
 }
 
-/// The surfaces of a pixel from front to back, at most `most` and, of what follows, one more if there is a tail; and the smallest relative
-/// distance to a decision.
+/// Splits a pixel's sorted fragments into surfaces, from front to back, and returns the smallest
+/// relative distance to a decision.
+///
+/// There are at most `most` surfaces, and with a tail one more that holds all remaining fragments.
 pub fn part(
     list: &[Fragment],
     (most, tail): (u32, Tail),
@@ -42,7 +48,8 @@ pub fn part(
 ) -> (Vec<PixelSums>, f64) {
     let farthest = |depth: f64, radius: f64| options.epsilon.farthest(depth, radius, along);
     let (mut layers, mut decision) = (Vec::new(), f64::INFINITY);
-    // How far each side is told: to where its run ends, or as far as the window of each fragment's own epsilon behind the last front reaches.
+    // Per side, the depth up to which fragments are consumed: the end of the last run, or with
+    // windows the last front, behind which each fragment's own epsilon counts.
     let mut told = [f64::NEG_INFINITY; 2];
     let untold = |f: &Fragment, told: [f64; 2]| {
         let told = told[usize::from(f.back)];
@@ -54,7 +61,7 @@ pub fn part(
             break;
         }
         let front = list[first];
-        // Of a front and a back at one depth but for rounding either may be the nearer surface.
+        // If a front and a back have the same depth but for rounding, either may start the surface.
         let other = list[first..].iter().find(|f| f.back != front.back && untold(f, told));
         decision = other.map_or(decision, |other| decision.min(other.depth / front.depth - 1.0));
         let mut sums = PixelSums { back: front.back && !last, nearest: front.depth, ..PixelSums::ZERO };
@@ -103,16 +110,16 @@ impl PixelSums {
     }
 }
 
-/// What is composited so far, from front to back.
+/// A pixel's composited colour so far, from front to back.
 #[derive(Clone, Copy)]
 pub(super) struct Shown {
-    /// Premultiplied.
+    /// Premultiplied linear colour and alpha.
     color: [f64; 4],
     transmittance: f64,
     layers: u32,
-    /// Of the last one, if it is a tail.
+    /// How much the last layer shows, alpha times transmittance, if it is a tail; else 0.
     tail: f64,
-    /// Depth and alpha.
+    /// Depth (camera-space z, world units) and alpha of the nearest surfaces.
     nearest: [[f64; 2]; SURFACES],
 }
 
@@ -120,17 +127,17 @@ impl Shown {
     pub(super) const NOTHING: Self =
         Self { color: [0.0; 4], transmittance: 1.0, layers: 0, tail: 0.0, nearest: [[f64::INFINITY, 0.0]; SURFACES] };
 
-    /// Whether it lets `least` through, so that what lies behind still shows.
+    /// Whether the transmittance is at least `least`, so that surfaces behind still show.
     pub(super) fn lets_through(&self, least: f64) -> bool {
         self.transmittance >= least
     }
 
-    /// The relative distance to letting just `least` through.
+    /// The relative distance of the transmittance to `least`.
     pub(super) fn decision(&self, least: f64) -> f64 {
         (self.transmittance / least - 1.0).abs()
     }
 
-    /// With a straight colour behind, at a depth.
+    /// Composites a straight colour at `depth` behind what is there.
     pub(super) fn with(mut self, [r, g, b, alpha]: [f64; 4], depth: f64) -> Self {
         let shows = self.transmittance * alpha;
         if let Some(surface) = self.nearest.get_mut(self.layers as usize) {
@@ -142,7 +149,7 @@ impl Shown {
         self
     }
 
-    /// Writes it, over the background, into a pixel of `frame`.
+    /// Writes the result, over the background, into a pixel of `frame`.
     pub(super) fn write(&self, options: &RenderOptions, decision: f64, frame: &mut Frame, pixel: usize) {
         let [r, g, b, alpha] = self.color;
         let straight = [r, g, b].map(|c| if alpha > 0.0 { c / alpha } else { 0.0 });
@@ -156,7 +163,7 @@ impl Shown {
     }
 }
 
-/// The twin: the image of `strip`.
+/// The f64 twin: the image of `strip`.
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let most = if let Composite::Layers(most) = options.composite { most } else { 1 };
@@ -180,7 +187,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     }
 }
 
-/// The files and constants.
+/// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "layers",
     files: |needs| match needs.lists {

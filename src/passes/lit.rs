@@ -1,5 +1,7 @@
-//! Where light falls: on pixels, at the blended normal, or on splats, each at its centre, whose lit colours are blended as paper 000 does
-//! ("complete per-vertex illumination", section 5.3). Then no normal is summed.
+//! Where light is evaluated: per pixel, at the blended normal, or per splat, at its centre.
+//!
+//! Lit splat colours are blended as in paper 000 ("complete per-vertex illumination", section 5.3).
+//! No normals are summed then.
 
 use glam::DVec3;
 
@@ -8,7 +10,7 @@ use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::{RenderOptions, Sides};
 
-/// The files and constants.
+/// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "lit",
     files: |needs| match needs.lit_splats {
@@ -19,7 +21,8 @@ pub const PASS: Pass = Pass {
     constants: |making| vec![("TURNS_LIT", u32::from(making.needs.sides == Sides::None).into())],
 };
 
-/// The twin: the premultiplied colour of a splat whose centre is seen along `direction`, lit if splats are.
+/// The f64 twin: the premultiplied colour of a splat, lit if splats are lit. `direction` points
+/// from the eye to its centre.
 pub fn reference(premultiplied: [f64; 4], splat: &Splat, direction: DVec3, options: &RenderOptions) -> [f64; 4] {
     let [r, g, b, alpha] = premultiplied;
     if !options.lights_splats() || alpha <= 0.0 {

@@ -1,18 +1,21 @@
-//! The low-pass for splats near a pixel in size or below. Without one, a disk between the pixels' centres is not seen, and
-//! a far surface has holes and moire.
+//! The low-pass for splats about as small as a pixel or smaller. Without one, a disk between pixel
+//! centres is not drawn, and a far surface has holes and moire.
 //!
-//! Both filters are ellipses centred on the splat, `rho^2 = |R x|^2` for x pixels from its centre:
+//! All filters are ellipses centred on the splat, `rho^2 = |R x|^2` for x pixels from its centre:
 //!
-//! - **max** (Botsch et al. 2005, section 4.2): a circle of radius [`RADIUS`], beside the disk; the smaller rho counts. A
-//!   splat then reaches the centre of the pixel that it lies in, so a surface sampled once a pixel has no holes.
-//! - **gaussians** ([`gaussian`]): the same circle for the surfels of 2D Gaussian splatting, where a Gaussian of a fixed standard deviation
-//!   stands beside that of the disk; its radius is as many of them as the kernel's disk has.
-//! - **ewa** (Zwicker et al. 2001): the disk's affine image J at its centre, convolved with the pixel's Gaussian:
-//!   `Q = J J^T + blur I`, weight times `sqrt(|J J^T| / |Q|)`. Exact for a Gaussian kernel; other kernels are convolved as
-//!   the Gaussian of the same variance.
+//! - **max** (Botsch et al. 2005, section 4.2): a circle of radius [`RADIUS`] beside the disk; the
+//!   smaller rho counts. A splat then reaches the centre of the pixel that it lies in, so a surface
+//!   sampled once per pixel has no holes.
+//! - **gaussians** ([`gaussian`]): the same circle for the surfels of 2D Gaussian splatting, where
+//!   a Gaussian of a fixed standard deviation stands beside that of the disk. The circle's radius
+//!   is as many of these deviations as the kernel's disk has.
+//! - **ewa** (Zwicker et al. 2001): the disk's affine image J at its centre, convolved with the
+//!   pixel's Gaussian: `Q = J J^T + blur I`, weight times `sqrt(|J J^T| / |Q|)`. Exact for a
+//!   Gaussian kernel; other kernels are convolved as the Gaussian of the same variance.
 //!
-//! A filtered fragment's depth is that of the disk's plane, held within the disk's own depths: where the filter takes over
-//! from the disk the two agree, and edge-on, where the plane runs away, the depth does not.
+//! A filtered fragment's depth is that of the disk's plane, clamped to the disk's own depths. Where
+//! the filter takes over from the disk the two agree; edge-on, where the plane's depth diverges,
+//! the fragment's does not.
 
 use glam::DVec2;
 
@@ -25,12 +28,14 @@ use crate::scene::{Camera, Kernel, LowPass, Projection, gaussian};
 /// The radius of `max`, pixels: half a pixel's diagonal, and a little for rounding.
 pub const RADIUS: f64 = 0.7072;
 
-/// The variance of the pixel's Gaussian in `ewa`, pixels squared: that of the pixel's own square, which is what rays
-/// through all of it average. With Zwicker's wider Gaussians (standard deviations 0.5 and 0.36 were tried) the images of
-/// benches/lowpass.toml are 3 to 9 dB farther from 16 rays a pixel.
+/// The variance of the pixel's Gaussian in `ewa`, pixels squared: that of the pixel's own square,
+/// over which a mean of many rays averages. With Zwicker's wider Gaussians (standard deviations 0.5
+/// and 0.36 were tried) the images of benches/lowpass.toml are 3 to 9 dB farther from 16 rays per
+/// pixel.
 pub const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
 
-/// `(pixel's sigma / kernel's sigma)^2`, pixels squared, but at least the square of [`RADIUS`]: what is added to J J^T.
+/// The term that `ewa` adds to J J^T: `(pixel's sigma / kernel's sigma)^2`, pixels squared, but at
+/// least the square of [`RADIUS`].
 pub fn blur(kernel: Kernel) -> f64 {
     let sigma_2 = match kernel {
         Kernel::Gaussian { sigma } => sigma * sigma,
@@ -44,11 +49,12 @@ pub fn blur(kernel: Kernel) -> f64 {
             0.5 * moment(3) / moment(1)
         }
     };
-    // Wide kernels would end before the next pixel's centre.
+    // For wide kernels the ratio is so small that the filter would end before the next pixel's
+    // centre.
     (PIXEL_VARIANCE / sigma_2).max(RADIUS * RADIUS)
 }
 
-/// The files and constants of the low-pass; kernels of other passes evaluate it.
+/// The low-pass's files and constants; kernels of other passes evaluate it.
 pub const PASS: Pass = Pass {
     name: "lowpass",
     files: |needs| match needs.low_pass {
@@ -64,21 +70,22 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// What a projection needs of the options, computed once a render: a low-pass with its number, and how points face the camera.
+/// The options that a projection uses, computed once per render: the low-pass with its size, and
+/// how points face the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Design {
-    /// Which.
+    /// The low-pass.
     pub low_pass: LowPass,
-    /// What `ewa` adds to J J^T, pixels squared.
+    /// The term that `ewa` adds to J J^T, pixels squared.
     pub blur: f64,
-    /// The radius of `max`, or of `gaussians`, pixels.
+    /// The radius of `max` or `gaussians`, pixels.
     pub radius: f64,
-    /// Surfels are points that face the camera.
+    /// How surfels face the camera, if they are drawn as points that do.
     pub facing: Option<Faced>,
 }
 
 impl Design {
-    /// That of `options`.
+    /// The design that `options` ask for.
     pub fn of(options: &RenderOptions) -> Self {
         let blur = if options.low_pass == LowPass::Ewa { blur(options.kernel) } else { 0.0 };
         let radius = match (options.low_pass, options.kernel) {
@@ -120,9 +127,11 @@ pub fn filter(design: &Design, center: DVec2, s: DVec2, t: DVec2, depths: [f64; 
     }
 }
 
-/// A splat at a pixel as the low-pass shows it: the intersection, and the factor on its weight.
+/// Applies the low-pass to a splat at a pixel: returns the intersection and the factor on its
+/// weight.
 ///
-/// `plane` is the third row at the pixel: 1/z (pinhole) or z of the disk's plane; `inside` how far inside the disk's lines its point is.
+/// `plane` is the third row at the pixel: 1/z (pinhole) or z of the disk's plane. `inside` is how
+/// far its point lies inside the disk's clip lines.
 pub fn filtered(
     splat: &Splat,
     camera: &Camera,
@@ -155,14 +164,15 @@ mod tests {
         assert!((blur(Kernel::Gaussian { sigma: 0.25 }) - 4.0 / 3.0).abs() < 1e-12);
         // A cone has variance 3/20 along each axis.
         assert!((blur(Kernel::Cone { power: 1.0 }) - 1.0 / (12.0 * 0.15)).abs() < 5e-3);
-        // A disk of constant weight has 1/4, for which the filter would not reach the next pixel's centre.
+        // A disk of constant weight has variance 1/4, with which the filter would not reach the
+        // next pixel's centre.
         assert_eq!(blur(Kernel::Constant), RADIUS * RADIUS);
     }
 
     #[test]
     fn ewa_adds_the_pixels_variance_and_keeps_the_volume() {
         let options = RenderOptions {
-            // For which the blur is 1.
+            // With this sigma the blur is 1.
             kernel: Kernel::Gaussian { sigma: PIXEL_VARIANCE.sqrt() },
             low_pass: LowPass::Ewa,
             ..RenderOptions::default()
@@ -175,7 +185,7 @@ mod tests {
         assert!((inverse[0] * q[0] + inverse[1] * q[1] - 1.0).abs() < 1e-12);
         assert!((inverse[0] * q[1] + inverse[1] * q[2]).abs() < 1e-12);
         assert!((inverse[1] * q[1] + inverse[2] * q[2] - 1.0).abs() < 1e-12);
-        // The integral of a Gaussian goes with the root of its determinant.
+        // The integral of a Gaussian is proportional to the root of its determinant.
         let (before, after) = (s.perp_dot(t).abs(), (q[0] * q[2] - q[1] * q[1]).sqrt());
         assert!((f.gain * after - before).abs() < 1e-12);
     }

@@ -1,30 +1,33 @@
-//! The stages, a file each: the equation with its source, the f64 twin (`reference`) and the GPU's recording
-//! (`steps`), and its row (`PASS`). The order of a frame is [`render::sequence`](crate::render).
+//! The passes of a frame, one file each: the equation with its source, its f64 twin (`reference`),
+//! its stages on a device (`steps`), and its row (`PASS`: files, kernels, constants).
 //!
-//! | stage | takes | makes |
+//! [`render::sequence`](crate::render) orders them in a frame.
+//!
+//! | pass | input | output |
 //! |---|---|---|
 //! | [`order`] | [`Scene`] | the order of its surfels in memory |
 //! | [`upload`] | a [`source::Source`] | pages of surfels |
 //! | [`branches`], [`select`] | a tree of surfels | the cut that is drawn in place of all |
-//! | [`cull`] | surfels, nearest depths so far | the batches that are projected |
-//! | [`project`] | surfels | [`splat::Splat`] each |
+//! | [`cull`] | surfels, nearest depths so far | the batches to project |
+//! | [`project`] | surfels | one [`splat::Splat`] each |
 //! | [`visibility`] | splats | the nearest depth of each pixel |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
-//! | [`winner`] | splats | the same of the nearest fragment alone |
+//! | [`winner`] | splats | sums of the nearest fragment alone |
 //! | [`fragments`], [`long_lists`] | splats | a list of each pixel's fragments |
-//! | [`tiles`] | large splats, or all | the same two, or the image |
-//! | [`moments`] | splats | what those of a pixel hold back, by depth |
-//! | [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
-//! | [`individuals`] | sums of an input that is kept apart | what shows of it and of those before |
-//! | [`triangles`] | triangles | what the nearest shows of each pixel |
-//! | [`covered`] | nearest depths | the tiles that have anything |
-//! | [`resolve`], [`join`] | sums, what triangles show | [`Frame`] |
-//! | [`layers`], [`sorted`] | lists | [`Frame`] |
+//! | [`tiles`] | large splats, or all | nearest depths and sums, or the image |
+//! | [`moments`] | splats | moments of each pixel's optical depth over depth |
+//! | [`oit`] | splats | [`accumulate::PixelSums`] of all fragments |
+//! | [`individuals`] | the sums of one separate input | the nearest surface of the inputs so far |
+//! | [`triangles`] | triangles | the nearest triangle of each pixel, shaded |
+//! | [`covered`] | nearest depths | the tiles that are not empty |
+//! | [`resolve`], [`join`] | sums, shaded triangles | [`Frame`] |
+//! | [`layers`], [`sorted`] | fragment lists | [`Frame`] |
 //!
-//! [`index`] makes a map of its own. [`unseen`] says why none of them shows where none does.
+//! [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
 //!
-//! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the [`lowpass`] that [`project`] prepared,
-//! and the [`attributes`] that are blended; [`shared`] is what every kernel has.
+//! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the
+//! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. [`shared`] holds the
+//! files of every kernel.
 
 pub mod accumulate;
 pub mod attributes;
@@ -71,34 +74,36 @@ use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
 use triangles::Corner;
 
-/// What a strip of the reference has for the twin of a pass.
+/// The input of the f64 twins: a strip of image rows with its scene, camera and splats.
 pub struct Strip<'a> {
-    /// What is rendered.
+    /// The scene to render.
     pub scene: &'a Scene,
-    /// The whole image's.
+    /// The camera of the whole image.
     pub camera: &'a Camera,
-    /// How.
+    /// How to render it.
     pub options: &'a RenderOptions,
-    /// Those that may touch its rows.
+    /// The splats that may touch the strip's rows.
     pub splats: Vec<&'a Splat>,
-    /// The scene's triangles' corners, as the camera sees them.
+    /// The corners of the scene's triangles, as the camera sees them.
     pub corners: &'a [Corner],
-    /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
+    /// The rank of each surfel in the [`order`] in which a device stores them, if a map or sorted
+    /// lists need it.
     pub ranks: Option<&'a [u32]>,
-    /// Where the scene's body starts and ends ([`depths`]), camera-space z, world units.
+    /// The nearest and the farthest depth of the scene's body ([`depths`]): camera-space z, world
+    /// units.
     pub depths: [f64; 2],
     /// [`Scene::largest_shorter`], world units.
     pub largest_shorter: f64,
-    /// No surfel lies deeper ([`farthest`]), camera-space z, world units.
+    /// The depth beyond which no surfel lies ([`farthest`]): camera-space z, world units.
     pub farthest: f64,
-    /// Its first row.
+    /// The strip's first row in the image.
     pub first_row: u32,
-    /// How many it has.
+    /// The number of rows.
     pub rows: u32,
 }
 
 impl<'a> Strip<'a> {
-    /// One without rows and splats, of the scene that `facts` are of.
+    /// A strip without rows and splats; `facts` are those of the scene.
     pub fn of((scene, facts): (&'a Scene, &Facts), camera: &'a Camera, options: &'a RenderOptions) -> Self {
         Self {
             scene,
@@ -116,40 +121,43 @@ impl<'a> Strip<'a> {
     }
 }
 
-/// A map that a pass of its own makes, from splats and nearest depths, in words of the image that [`resolve`] leaves alone.
+/// A map with a pass of its own, made from splats and nearest depths.
+///
+/// Its words of the image are left alone by [`resolve`].
 pub struct MapPass {
-    /// The map.
+    /// The map that this pass makes.
     pub map: Map,
-    /// Its name is the map's.
+    /// Its kernels and files; named like the map.
     pub pass: Pass,
-    /// After the image of a band is resolved.
+    /// The stage of a band, which runs after the band's image is resolved.
     pub runs: fn(&Plan, usize) -> Stage,
-    /// What the host makes of a pixel's words, of the numbers of the surfels in the order in which they are stored.
+    /// Turns the map's words, as read back, into its values; the last argument lists the surfels'
+    /// numbers in storage order.
     pub finish: fn(&mut [f32], &Provenance, &[u32]),
-    /// The twin, of what is nearest.
+    /// The f64 twin, given the nearest depths.
     pub reference: fn(&Strip<'_>, &[visibility::Nearest], &mut Frame),
 }
 
-/// Those maps.
+/// All maps that have a pass of their own.
 pub const MAP_PASSES: [&MapPass; 1] = [&index::MAP];
 
-/// Those that `needs` ask for.
+/// The maps of [`MAP_PASSES`] that `needs` asks for.
 fn own_maps(needs: &SceneNeeds) -> impl Iterator<Item = &'static MapPass> {
     let maps = needs.maps;
     MAP_PASSES.into_iter().filter(move |own| maps.has(own.map))
 }
 
-/// The stages of such maps in a band.
+/// The stages that make these maps in a band.
 pub fn of_maps(plan: &Plan, band: usize) -> impl Iterator<Item = Stage> {
     own_maps(&plan.needs).map(move |own| (own.runs)(plan, band).as_twin(Twin::Map(own.map)))
 }
 
-/// Whether a map, or what is sorted, asks for the order in which surfels are stored.
+/// Whether a map or sorted lists need the order in which surfels are stored.
 pub fn asks_for_order(needs: &SceneNeeds) -> bool {
     own_maps(needs).next().is_some() || needs.lists == Some(Lists::Sorted)
 }
 
-/// Makes of `frame`, as it was read back, what a user is given.
+/// Converts the maps of `frame`, as read back from the device, to the values that a user gets.
 pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, order: &[u32]) {
     for own in own_maps(needs) {
         if let Some(words) = frame.map_mut(own.map) {
@@ -158,7 +166,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
     }
 }
 
-/// The passes whose files every module has.
+/// The passes whose files every module includes.
 const PASSES: [&Pass; 25] = [
     &shared::PASS,
     &select::PASS,
@@ -192,28 +200,29 @@ fn passes(needs: &SceneNeeds) -> impl Iterator<Item = &'static Pass> {
     PASSES.into_iter().chain(own_maps(needs).map(|own| &own.pass))
 }
 
-/// The modules that a render with `needs` is made of: the first, that of the tiles, and that which chooses a cut, if there are any.
+/// The modules of a render with `needs`: the main one, then the one of the tiles and the one that
+/// chooses a cut, if they exist.
 pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
     let tiles = || Module { files: files_with(&tiles::PASS, needs).collect(), kernels: (tiles::PASS.kernels)(needs) };
-    // The same one before it is known how much is drawn.
+    // Compiled before the size of the cut is known, so with the needs that hold then.
     let cut = || Module { files: first_files(&needs.before_cut()), kernels: select::CHOOSING.into() };
     let kernels = passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect();
     let first = Module { files: first_files(needs), kernels };
     std::iter::once(first).chain(needs.tiles.then(tiles)).chain(needs.levels.then(cut)).collect()
 }
 
-/// Files that every module has, and those of one more pass.
+/// The files that every module includes, and those of one more pass.
 fn files_with(own: &Pass, needs: &SceneNeeds) -> impl Iterator<Item = &'static str> {
     PASSES.iter().flat_map(|pass| (pass.files)(needs)).chain((own.files)(needs))
 }
 
-/// Those of the first module.
+/// The files of the main module.
 fn first_files(needs: &SceneNeeds) -> Vec<&'static str> {
     let of_maps = own_maps(needs).flat_map(|own| (own.pass.files)(needs));
     files_with(&accumulate::SUMS, needs).chain(of_maps).collect()
 }
 
-/// The overridable constants of a render, by name.
+/// The overridable constants of a render, as name and value.
 pub fn constants(making: &Making<'_>) -> Vec<(&'static str, f64)> {
     passes(making.needs).flat_map(|pass| (pass.constants)(making)).collect()
 }

@@ -1,46 +1,56 @@
-//! Stage 2 of [`Composite::Moments`](crate::scene::Composite::Moments): what the fragments of a pixel hold back, as a measure over depth,
-//! told by its first moments (Münstermann, Krumpen, Klein and Peters 2018, Moment-based order-independent transparency).
+//! Stage 2 of [`Composite::Moments`](crate::scene::Composite::Moments): the moments of each pixel's
+//! optical depth as a measure over depth.
 //!
-//! A fragment of alpha a at the place y in [-1, 1] of the scene's depths adds `h y^k`, `h = -ln(1 - a)`, to the moments k = 0 to 4. Of
-//! all measures with these moments the one with mass at a given place x has it at two others too (the canonical representation: the
-//! zeros of the second orthogonal polynomial through x), and no measure has less before x than that, nor more up to and with x. What is taken to
-//! lie before x is the mass before it and a quarter of that at x (theirs, section 3.2), and lets through `exp` of minus that.
+//! After Münstermann, Krumpen, Klein and Peters 2018, Moment-based order-independent transparency.
 //!
-//! A fragment is weighed by what is let through to it of what is let through to the nearest one, whose own weight is then not less however much the pixel
-//! holds back: colours are means, so what all weights of a pixel have in common cancels.
+//! A fragment of alpha a at depth y, mapped to [-1, 1] over the scene's depths, adds `h y^k` with
+//! `h = -ln(1 - a)` to the moments k = 0 to 4. Among all measures with these moments, take the one
+//! with mass at a given depth x: it has mass at two other depths (the canonical representation: the
+//! zeros of the second orthogonal polynomial through x). No measure has less mass before x than
+//! this one, and none has more up to and including x. The mass in front of x is estimated as its
+//! mass before x plus a quarter of its mass at x (paper, section 3.2), and the transmittance is
+//! `exp` of minus that.
 //!
-//! Moments are sums of integers of 64 bits in units of 2^-26, so the order of fragments shows nowhere; theirs are of floats. As
-//! f32 leaves little of nearly degenerate moments, a part of 2^-14 of a spread measure is mixed in, as theirs of 16 bits have and a hundred times as much
-//! as theirs of floats. Depths are not warped by a logarithm, as the places are those of the scene's body and not of clip planes.
+//! A fragment's weight is the transmittance in front of it divided by that in front of the nearest
+//! fragment. The nearest weight is then 1 however dense the pixel is; as colours are means, a
+//! factor that all weights of a pixel share cancels.
+//!
+//! Moments are 64-bit integer sums in units of 2^-26, so the result does not depend on the order of
+//! fragments; the paper sums floats. Because f32 loses nearly all digits of nearly degenerate
+//! moments, they are mixed with a part of 2^-14 of a spread measure: the paper's part for 16-bit
+//! moments, and a hundred times its part for floats. Depths are not warped by a logarithm, because
+//! they are relative to the scene's body and not to clip planes.
 
 use super::Strip;
 use super::oit::{held_back, visit};
 use crate::plan::steps::Clear;
 use crate::plan::{Oit, Plan};
 
-/// Words of a pixel: two a moment.
+/// Words per pixel: two per moment.
 pub const MOMENT_WORDS: u32 = 10;
 
 /// The part of the spread measure that is mixed in.
 const MIXED: f64 = 1.0 / 16384.0;
 
-/// Its moments 1 to 4.
+/// Moments 1 to 4 of the spread measure, whose mass is 1.
 const SPREAD: [f64; 4] = [0.0, 0.375, 0.0, 0.375];
 
-/// Of the mass at a place what counts as before it.
+/// The part of the mass at a depth that counts as in front of it.
 const OF_OWN: f64 = 0.25;
 
-/// Moments 0 to 4 of what a pixel's fragments hold back.
+/// Moments 0 to 4 of the optical depth of a pixel's fragments.
 pub type Sums = [f64; 5];
 
-/// Neither variance nor what of the fourth moment skewness leaves is less: rounded moments of what hardly holds anything back may be those of no
-/// measure.
+/// The lower bound of the variance, and of the part of the fourth moment that skewness leaves,
+/// relative to the variance.
+///
+/// Moments of a nearly transparent pixel, once rounded, may belong to no measure.
 const LEAST_SPREAD: f64 = 1e-6;
 
-/// Of less mass nothing before anything shows.
+/// Below this optical depth a pixel counts as fully transparent.
 const LEAST_MASS: f64 = 1.0 / 65536.0;
 
-/// A measure of unit mass about its mean, and the mass.
+/// A measure over depths in [-1, 1], normalised to unit mass about its mean, and its mass.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
     mass: f64,
@@ -50,7 +60,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of the sums of a pixel.
+    /// The measure with the moment sums of a pixel.
     pub fn of([mass, sums @ ..]: Sums) -> Self {
         let b: [f64; 4] = std::array::from_fn(|k| match mass > 0.0 {
             true => sums[k] / mass * (1.0 - MIXED) + SPREAD[k] * MIXED,
@@ -63,7 +73,10 @@ impl Moments {
         Self { mass, mean, central: [second, third, fourth] }
     }
 
-    /// What is let through to the place `y` in [-1, 1], of what is let through to the nearest one, `first`.
+    /// The transmittance in front of depth `y`, divided by that in front of the nearest fragment's
+    /// depth `first`.
+    ///
+    /// Both depths are in [-1, 1].
     pub fn let_through(&self, y: f64, first: f64) -> f64 {
         if self.mass < LEAST_MASS {
             return 1.0;
@@ -71,21 +84,22 @@ impl Moments {
         (-self.mass * (self.before(y) - self.before(first)).max(0.0)).exp()
     }
 
-    /// The part of the mass that counts as before the place `y`.
+    /// The part of the mass in front of depth `y`, 0 to 1.
     fn before(&self, y: f64) -> f64 {
         let [second, third, fourth] = self.central;
         let x = y - self.mean;
-        // The polynomial whose zeros are the other two places; at x it is one over the mass there.
+        // The polynomial whose zeros are the two other depths; at x its value is 1 over the mass
+        // there.
         let rest = (fourth - second * second - third * third / second).max(LEAST_SPREAD * second);
         let c2 = (x * x - second - third / second * x) / rest;
         let (c1, c0) = ((x - third * c2) / second, 1.0 - second * c2);
         let own = 1.0 / (c0 + x * (c1 + x * c2));
-        // One of them may be infinitely far, where it has no mass.
+        // One of them may be infinitely far away; it has no mass then.
         let c2 = if c2.abs() < 1e-12 { 1e-12 } else { c2 };
         let (half, product) = (-0.5 * c1 / c2, c0 / c2);
         let larger = half + (half * half - product).max(0.0).sqrt().copysign(half);
         let other = product / larger;
-        // Of all mass 1 and the first moment 0.
+        // Solved from total mass 1 and first moment 0.
         let of_larger = (-own * x - other * (1.0 - own)) / (larger - other);
         let of_other = 1.0 - own - of_larger;
         let mut before = OF_OWN * own;
@@ -95,12 +109,13 @@ impl Moments {
     }
 }
 
-/// The place in [-1, 1] of a depth between two.
+/// Maps a depth to [-1, 1] between the two given depths, clamped.
 pub fn place(depth: f64, [first, farthest]: [f64; 2]) -> f64 {
     (2.0 * (depth - first) / (farthest - first) - 1.0).clamp(-1.0, 1.0)
 }
 
-/// The twin: the moments of the pixels of `strip`, and the place of the nearest fragment of each.
+/// The f64 twin: each pixel's moments, and its nearest fragment's depth in [-1, 1]. The pixels are
+/// those of `strip`.
 pub fn reference(strip: &Strip<'_>) -> Vec<(Moments, f64)> {
     let mut sums = vec![([0.0; 5], 1.0); strip.camera.width as usize * strip.rows as usize];
     visit(
@@ -119,7 +134,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<(Moments, f64)> {
     sums.into_iter().map(|(sums, first)| (Moments::of(sums), first)).collect()
 }
 
-/// What is cleared before moments are summed.
+/// The clear before moments are summed; `None` if there are no moments.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = u64::from(MOMENT_WORDS) * plan.bands[band].pixels;
     (plan.needs.oit == Some(Oit::Moments)).then(|| Clear::of("moments", 0, words))
@@ -139,23 +154,26 @@ mod tests {
 
     #[test]
     fn moments_of_few_masses_tell_what_lies_between_them() {
-        // Before, between and behind two surfaces.
+        // In front of, between and behind two surfaces.
         let two = of(&[(0.7, -0.4), (1.1, 0.5)]);
         for (place, mass) in [(-0.9, 0.0f64), (0.05, 0.7), (0.95, 1.8)] {
             let shown = two.let_through(place, -1.0);
             assert!((shown - (-mass).exp()).abs() < 0.01, "{place}: {shown}");
         }
-        // At one a quarter of its own, of which the nearest one has nothing before it.
+        // At a surface a quarter of its own mass counts. Relative to the nearest surface itself,
+        // all is let through.
         assert!((two.let_through(-0.4, -1.0) - (-0.25f64 * 0.7).exp()).abs() < 0.01);
         assert_eq!(two.let_through(-0.4, -0.4), 1.0);
-        // However much is held back the nearest fragment weighs, and what is far behind does not.
+        // However dense the pixel is, the nearest fragment has weight 1, and one far behind has
+        // almost none.
         let opaque = of(&[(900.0, -0.5), (900.0, 0.5)]);
         assert!(opaque.let_through(-0.5, -0.5) == 1.0 && opaque.let_through(0.5, -0.5) < 1e-100);
-        // Nothing holds nothing back, wherever it is asked, nor does what is too faint to tell.
+        // An empty measure lets everything through at every depth, and so does one below the least
+        // mass.
         for nothing in [of(&[]), Moments::of([4.0, 4.0, 3.0, 3.0, 3.0].map(|units| units / f64::from(1 << 26)))] {
             assert_eq!([-1.0, 0.0, 1.0].map(|place| nothing.let_through(place, -1.0)), [1.0; 3]);
         }
-        // Less is let through farther back, if not by much less.
+        // Transmittance decreases with depth, if not by much.
         let many = of(&[(0.2, -0.8), (0.3, -0.3), (0.1, 0.1), (0.5, 0.4), (0.2, 0.9)]);
         let shown: Vec<f64> = (0..=20).map(|step| many.let_through(f64::from(step) / 10.0 - 1.0, -1.0)).collect();
         assert!(shown.windows(2).all(|pair| pair[1] <= pair[0] + 1e-9), "{shown:?}");

@@ -1,20 +1,28 @@
-//! Stage 3 of [`Composite::Weighted`] and [`Composite::Moments`]: order-independent transparency, which approximates what is
-//! [`sorted`](super::sorted) by sums over all fragments of a pixel, in any order. No list is made and nothing is sorted.
+//! Stage 3 of [`Composite::Weighted`] and [`Composite::Moments`]: order-independent transparency.
 //!
-//! With alphas `a_i = A w_i alpha_i` (A the opacity, w_i the kernel) and straight colours c_i at depths z_i (McGuire and Bavoil 2013, Eq. 2)
+//! It approximates [`sorted`](super::sorted) by sums over all fragments of a pixel, in any order.
+//! No list is made and nothing is sorted.
+//!
+//! With alphas `a_i = A w_i alpha_i` (A the opacity, w_i the kernel's weight) and straight colours
+//! c_i at depths z_i (McGuire and Bavoil 2013, Eq. 2)
 //!
 //!   `colour = sum(v_i a_i c_i) / sum(v_i a_i)`, `alpha = 1 - prod(1 - a_i)`.
 //!
-//! So what the background shows is exact, and the order shows only by v_i. It should be what lies before the fragment lets through, and is
+//! So the alpha over the background is exact, and order enters only through the visibility v_i. It
+//! approximates the transmittance in front of fragment i:
 //!
-//! - **weighted**: `max((1 - d)^3, 1 / 300,000)` (theirs, Eq. 10, over its greatest value), where d goes from 0 where the scene's body starts
-//!   to 1 where it ends; what strays lies at the one or the other. Theirs is between the clip planes, which a scene need not fill;
-//! - **moments**: what the moments of all fragments say ([`moments`]).
+//! - **weighted**: `max((1 - d)^3, 1 / 300,000)` (McGuire and Bavoil, Eq. 10, divided by its
+//!   largest value), where d runs from 0 at the near end of the scene's body to 1 at its far end;
+//!   outliers are clamped to these ends. The paper uses the clip planes instead, which a scene need
+//!   not fill.
+//! - **moments**: reconstructed from the moments of all fragments ([`moments`]).
 //!
-//! The product is kept as the sum of `-ln(1 - a_i)`. By the accumulator `fixed` sums are integers, so here too the order of fragments shows
-//! nowhere; by `float` and `cas`, which are as others have it, it does.
+//! The product is stored as the optical depth, `sum(-ln(1 - a_i))`. With the accumulator `fixed`
+//! the sums are integers, so the image does not depend on the order of the fragments; with `float`
+//! and `cas`, which renderers commonly use, it does.
 //!
-//! Splats are lit, not pixels, as the mean of the normals of several surfaces is that of none.
+//! Splats are lit, not pixels, because the mean of several surfaces' normals is the normal of none
+//! of them.
 
 use super::accumulate::{PixelSums, decision};
 use super::footprint::footprint;
@@ -27,37 +35,38 @@ use crate::plan::{Oit, RenderOptions, SceneNeeds};
 use crate::scene::Composite;
 use crate::scene::kernel::LEAST_WEIGHT;
 
-/// The least weight by depth.
+/// The smallest depth weight v_i of `weighted`.
 const LEAST_OF_DEPTH: f64 = 1.0 / 300_000.0;
 
-/// No alpha is nearer to 1.
+/// The smallest transmittance of a single fragment, so that its optical depth stays finite.
 const LEAST_LEFT: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// What a fragment of that alpha holds back: optical depth, at most 28.
+/// The optical depth of a fragment of this alpha, `-ln(1 - alpha)`, at most 28.
 pub(super) fn held_back(alpha: f64) -> f64 {
     -(1.0 - alpha).max(LEAST_LEFT).ln()
 }
 
-/// A fragment as the twins see it.
+/// A fragment of the f64 twins.
 pub(super) struct Fragment {
-    /// Its pixel in the strip.
+    /// The index of its pixel in the strip.
     pub pixel: usize,
     /// Camera-space z, world units.
     pub depth: f64,
-    /// Of the kernel.
+    /// The kernel's weight, times the low-pass's gain and the fade.
     pub weight: f64,
-    /// Premultiplied, lit if there is light.
+    /// Premultiplied linear colour, lit if the scene is.
     pub color: [f64; 4],
 }
 
 impl Fragment {
-    /// Times the opacity and the weight.
+    /// The fragment's alpha: opacity times weight times the colour's alpha.
     pub fn alpha(&self, options: &RenderOptions) -> f64 {
         f64::from(options.opacity) * self.weight * self.color[3]
     }
 }
 
-/// Visits what lies near the disks of `strip`, and the fragments.
+/// Visits every footprint of the splats of `strip` (`near`, hit or not) and every fragment
+/// (`fragment`, hits only).
 pub(super) fn visit(strip: &Strip<'_>, mut near: impl FnMut(usize, Intersection), mut fragment: impl FnMut(Fragment)) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let of_splat = |splat: &Splat, near: &mut dyn FnMut(usize, Intersection), fragment: &mut dyn FnMut(Fragment)| {
@@ -77,7 +86,7 @@ pub(super) fn visit(strip: &Strip<'_>, mut near: impl FnMut(usize, Intersection)
     strip.splats.iter().for_each(|splat| of_splat(splat, &mut near, &mut fragment));
 }
 
-/// The twin: the sums of the pixels of `strip`.
+/// The f64 twin: the sums of the pixels of `strip`.
 pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
     let Strip { camera, options, rows, depths, .. } = *strip;
     let [first, last] = depths;
@@ -104,7 +113,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
     sums.into_iter().zip(decisions).map(|(sum, decision)| PixelSums { decision, ..sum }).collect()
 }
 
-/// The files, kernels and constants.
+/// The pass's files, kernels and constants.
 pub const PASS: Pass = Pass {
     name: "oit",
     files: |needs| match needs.oit {
@@ -118,12 +127,12 @@ pub const PASS: Pass = Pass {
 
 const MARK: Kernel = Kernel::new("mark_covered");
 
-/// Whether sums say where anything is, as there is no visibility pass.
+/// Whether sums mark the pixels that are not empty, because there is no visibility pass.
 pub fn marks(needs: &SceneNeeds) -> bool {
     needs.oit == Some(Oit::Weighted)
 }
 
-/// Where anything is.
+/// The stage that marks the pixels that are not empty.
 pub fn mark(band: usize) -> Stage {
     Stage::new("visibility", band, vec![Run { kernel: MARK, over: Over::Pixels }])
 }

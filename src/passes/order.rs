@@ -1,9 +1,12 @@
-//! Stage 0: the order in which surfels are stored on the device: along a Morton curve, so that neighbours in memory are
-//! neighbours in the image, cut into runs, and the runs dealt out over the scene.
+//! Stage 0: the order in which surfels are stored on the device: along a Morton curve, so that
+//! neighbours in memory are neighbours in the image, cut into runs that are dealt out over the
+//! scene.
 //!
-//! Invocations of a subgroup then draw splats of one place: they loop alike, and hidden ones fail together. Runs that are
-//! in work at the same time lie far apart, so that their atomics do not wait for each other. Sums and minima take no
-//! notice of order; of fragments at one depth what is sorted and the map of indices take the first, which depends on what surfels are alone. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
+//! The invocations of a subgroup then draw splats of one place: they loop alike, and hidden ones
+//! are rejected together. Runs that are processed at the same time lie far apart, so their atomics
+//! do not contend. Sums and minima do not depend on the order. Sorted lists and the index map take
+//! the first of several fragments at one depth (or of one weight), which depends only on the
+//! surfels' values. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
 //! Order Optimization".)
 
 use bytemuck::Zeroable;
@@ -13,26 +16,29 @@ use crate::gpu::layout::{BATCH, Page};
 use crate::morton;
 use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Surfel};
 
-/// [`layout::RUN`](crate::gpu::layout::RUN).
+/// Surfels per run, as [`layout::RUN`](crate::gpu::layout::RUN).
 const RUN: usize = crate::gpu::layout::RUN as usize;
 const _: () = assert!(RUN.is_multiple_of(BATCH as usize));
 
-/// Bits of each coordinate on the curve.
+/// Bits per coordinate on the curve.
 const BITS: u32 = 10;
 
-/// The last cell along each axis.
+/// The index of the last cell along each axis.
 const LAST: u32 = (1 << BITS) - 1;
 
-/// The indices of the surfels of `scene`, of which `core` holds nearly all, in the order in which they are stored. There are fewer
-/// than 2^32. Those outside are in the outermost cells, so that they make no cell larger.
+/// The indices of the surfels of `scene` in the order in which they are stored; there are fewer
+/// than 2^32.
 ///
-/// Within a cell what a surfel is decides, so that the device sees one scene whatever order its surfels came in; only of those that
-/// are the same in everything the index decides.
+/// `core` is a box that holds nearly all surfels. Those outside fall into the outermost cells, so
+/// that they do not enlarge the others.
+///
+/// Within a cell the surfels' values decide, so the device sees the same scene for any input order.
+/// Only surfels that are equal in every value are ordered by index.
 pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
     let surfels = &scene.surfels;
     let low = core.min.as_vec3();
     let extent = core.extent().max_element() as f32;
-    // Without an extent every surfel is in one cell.
+    // Without an extent all surfels are in one cell.
     let cells = if extent > 0.0 { LAST as f32 / extent } else { 0.0 };
     let place = |(index, surfel): (usize, &Surfel)| {
         let cell = std::array::from_fn(|k| (((surfel.center[k] - low[k]) * cells) as u32).min(LAST).into());
@@ -48,14 +54,14 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
         let by_content = || content(*a).cmp(&content(*b)).then_with(|| harmonics(*a).cmp(harmonics(*b)));
         (a >> 32).cmp(&(b >> 32)).then_with(by_content).then_with(|| a.cmp(b))
     });
-    // What is left of the last run stays last, so that each run is stored as one batch.
+    // The incomplete last run stays last, so that each run is stored as one batch.
     let (runs, rest) = along.as_chunks::<RUN>();
     let stride = dealing(runs.len());
     let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
     dealt.chain(rest).map(|place| *place as u32).collect()
 }
 
-/// The bits of a surfel, its colour and its fade.
+/// The bits of a surfel's geometry, colour and fade, as a sort key.
 fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>) {
     let Surfel { center, s, t } = scene.surfels[index];
     let low = scene.low.get(index).copied().unwrap_or_default();
@@ -73,15 +79,17 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>
     )
 }
 
-/// How the surfels of a cut that a page has room for are dealt out over it (`wgsl/select.wgsl`): of what is `chosen`, which starts there, those from the
-/// `first` on.
+/// The page of a cut (`wgsl/select.wgsl`) that draws `surfels` chosen surfels from the `first` on,
+/// with their runs dealt out.
+///
+/// The list of the chosen surfels starts at word `chosen`.
 pub(crate) fn dealt(surfels: u64, (chosen, first): (u32, u32)) -> Page {
     let runs = surfels / RUN as u64;
     let stride = dealing(runs as usize) as u32;
     Page { first, surfels: surfels as u32, runs: runs as u32, stride, chosen, ..Zeroable::zeroed() }
 }
 
-/// A step near the golden ratio of `runs` that comes to each of them once.
+/// A stride near the golden ratio of `runs` and coprime to it, so that it visits each run once.
 fn dealing(runs: usize) -> usize {
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {
@@ -137,7 +145,7 @@ mod tests {
     #[test]
     fn the_same_surfels_in_any_order_are_stored_in_one() {
         let (first, core) = sphere(5000);
-        // Several in a cell, as their neighbours are copies that lie elsewhere by less than one.
+        // Several surfels per cell: each has a copy that is shifted by less than a cell.
         let beside = first.surfels.iter().map(|s| Surfel { center: s.center.map(|c| c + 1e-7), ..*s });
         let first = scene(first.surfels.iter().copied().chain(beside).collect());
         let stored = |scene: &Scene| -> Vec<Surfel> {
@@ -167,7 +175,8 @@ mod tests {
     #[test]
     fn a_surfel_outside_the_core_spoils_no_neighbourhood() {
         let (mut scene, core) = sphere(100_000);
-        // Not in the first cells again, past the last one, but at the end of the curve, which is stored last.
+        // A surfel past the last cell must be stored at the end of the curve, and not wrap around
+        // to the first cells.
         scene.surfels.push(Surfel::disk(Vec3::splat(1.5), Vec3::Z, 0.1));
         assert_eq!(order(&scene, &core).last(), Some(&100_000));
         let stray = DVec3::splat(500.0);

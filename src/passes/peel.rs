@@ -1,22 +1,25 @@
-//! Stages 2 to 4 where the rasteriser shows [`Composite::Layers`]: depth peeling (Everitt 2001), which the lists of
-//! [`fragments`](super::fragments) are compared with. The visibility and the attribute pass are drawn once a layer, each time of what no
-//! layer before has, and what they blend is composited behind those.
+//! Stages 2 to 4 of [`Composite::Layers`] by the rasteriser: depth peeling (Everitt 2001), the
+//! baseline for the lists of [`fragments`](super::fragments).
 //!
-//! A layer is an epsilon's window behind its nearest fragment ([`Parting::Window`](super::layers::Parting::Window)): where a run of fragments
-//! ends the rasteriser cannot know before it has drawn all of them.
+//! The visibility and the attribute pass are drawn once per layer, each time without the fragments
+//! of the layers before, and the result is composited behind those layers.
+//!
+//! A layer is a window of one epsilon behind its nearest fragment
+//! ([`Parting::Window`](super::layers::Parting::Window)): the rasteriser cannot know where a run of
+//! fragments ends before it has drawn all of them.
 
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step};
 use crate::plan::{Plan, RenderOptions};
 use crate::scene::Composite;
 
-/// More layers are not peeled.
+/// The largest number of layers that can be peeled.
 pub const MOST_LAYERS: u32 = 64;
 
-/// Words of a pixel (`peeled.wgsl`).
+/// Words per pixel in the buffer `peeled` (`peeled.wgsl`).
 pub const PEELED_WORDS: u32 = 8;
 
-/// The layers that the rasteriser peels for `options`, if it peels at all.
+/// The number of layers that the rasteriser peels for `options`; `None` if it does not peel.
 pub fn layers(options: &RenderOptions) -> Option<u32> {
     match options.composite {
         Composite::Layers(layers) if options.raster.is_some() => Some(layers),
@@ -24,7 +27,7 @@ pub fn layers(options: &RenderOptions) -> Option<u32> {
     }
 }
 
-/// The kernels and files.
+/// The pass's kernels and files.
 pub const PASS: Pass = Pass {
     name: "peel",
     files: |needs| if needs.peels.is_some() { vec!["peeled.wgsl"] } else { Vec::new() },
@@ -34,7 +37,7 @@ pub const PASS: Pass = Pass {
 
 const PEEL: Kernel = Kernel::new("peel");
 
-/// The steps of all layers of `plan`, in place of the one that draws the nearest surface.
+/// The steps of all layers of `plan`, in place of the one step that draws the nearest surface.
 pub fn steps(plan: &Plan, layers: u32) -> Vec<Step> {
     let words = u64::from(PEELED_WORDS) * plan.bands[0].pixels;
     let mut steps = vec![Step::Stage(Stage::new("visibility", 0, vec![]).after(vec![Clear::of("peeled", 0, words)]))];

@@ -1,7 +1,8 @@
-//! Stage 1: every surfel becomes a splat, once: its [`homography`], the pixels that it may touch, and its
-//! [`lowpass`].
+//! Stage 1: projects every surfel to a splat, once: its [`homography`], the pixels that it may
+//! touch, and its [`lowpass`].
 //!
-//! Bounds only save work: [`footprint`](super::footprint) decides.
+//! The pixel bounds only save work: [`footprint`](super::footprint) decides which pixels are
+//! covered.
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -17,11 +18,12 @@ use crate::plan::{Facts, RenderOptions, Sides, composited, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
-/// A surfel with its index; and its cap, in a scene in which some surfel curves.
+/// A surfel with its index, and with its cap if some surfel of the scene curves.
 pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
 
-/// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
-/// pixel can be touched.
+/// The f64 twin of `wgsl/project.wgsl` for one surfel; `None` if it can touch no pixel.
+///
+/// `relative` is the surfel's centre relative to the camera's eye, world units.
 pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
     projected(of, relative, camera, design).ok()
 }
@@ -29,11 +31,11 @@ pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Des
 /// Why a surfel touches no pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Missed {
-    /// It lies behind the camera, or nearer than the near depth.
+    /// It lies behind the camera or nearer than the near depth.
     Behind,
     /// It lies beside the image.
     Outside,
-    /// It lies between the centres of pixels: it is small, or seen edge-on.
+    /// It lies between pixel centres, because it is small or seen edge-on.
     Between,
 }
 
@@ -65,7 +67,8 @@ pub(super) fn projected(
     if let Some(filter) = &filter {
         let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
         let (low, high) = (center - filter.extent, center + filter.extent);
-        // The disk itself shows only beside a filter that is not `ewa`'s.
+        // With `ewa` the filter includes the disk; with other low-passes the disk shows beside the
+        // filter.
         let beside = design.low_pass != LowPass::Ewa;
         projected.low = if beside { projected.low.min(low) } else { low };
         projected.high = if beside { projected.high.max(high) } else { high };
@@ -88,7 +91,7 @@ pub(super) fn projected(
         a: projected.a,
         b: projected.b,
         c: projected.c,
-        // Of a point nothing does.
+        // A point that faces the camera shows no back.
         away: projected.away && point.is_none(),
         sides: Sides::None,
         normal,
@@ -102,15 +105,16 @@ pub(super) fn projected(
     })
 }
 
-/// All splats of a scene that may touch a pixel, in the order of the surfels; one for all that are the same where one has many
-/// copies.
+/// All splats of a scene that may touch a pixel, in the order of the surfels.
+///
+/// Identical copies of a surfel become one splat, if the scene has many.
 pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
     let eye = camera.eye - scene.origin;
     let facts = Facts::of(scene);
     let (cull_back, sides) = (culls_back(&facts, camera, options), Sides::of(&facts, camera, options));
-    // Lists have each of them.
+    // Fragment lists hold every copy.
     let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
     let copies = (has_copies(scene) && once).then(|| copies(scene));
     let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
@@ -150,7 +154,7 @@ const ARRANGE_RARE: Kernel = Kernel::of("arrange_rare", [1; 3]);
 const PROJECT_RARE: Kernel = Kernel::new("project_rare");
 const ARRANGE: Kernel = Kernel::of("arrange", [1; 3]);
 
-/// Splats whose bounds hold more pixels than this are large.
+/// The number of pixels above which the bounds of a splat make it large.
 fn large(making: &Making<'_>) -> u32 {
     match (making.needs.tiles, making.options.organisation) {
         (true, Organisation::Tile) => 0,
@@ -159,8 +163,10 @@ fn large(making: &Making<'_>) -> u32 {
     }
 }
 
-/// The projection of `part` of the surfels, for `band` or for all from it on; where batches are left out, after [`cull`](super::cull) has listed them. Splats that take
-/// long are listed, and projected by a dispatch of their own.
+/// The stage that projects `part` of the surfels, for `band` or for it and all later bands.
+///
+/// If [`cull`](super::cull) leaves batches out, it has listed the others before. Splats that take
+/// long to project are listed and projected by a dispatch of their own.
 pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
     let mut clears = vec![start("rare")];

@@ -1,24 +1,30 @@
-//! Stages 2 and 3 by the rasteriser (Botsch et al. 2005): what compute is compared with.
+//! Stages 2 and 3 by the rasteriser (Botsch et al. 2005), the baseline for the compute kernels.
 //!
-//! The splats are those of [`project`](super::project), their footprint and attributes the same kernels'. A quad covers
-//! the pixels that a splat may touch. The **visibility pass** keeps the nearest depth in a depth buffer, the **attribute
-//! pass** adds each accepted fragment's terms by additive blending, four channels a target, and
-//! [`resolve`](super::resolve) reads the targets. [`RasterDepth`] says how fragments are accepted:
+//! The splats are those of [`project`](super::project), and footprint and attributes use the same
+//! WGSL. A quad covers the pixels that a splat may touch. The **visibility pass** stores the
+//! nearest depth in a depth buffer, the **attribute pass** adds each accepted fragment's terms by
+//! additive blending, four channels per target, and [`resolve`](super::resolve) reads the targets.
+//! [`RasterDepth`] says how fragments are accepted:
 //!
-//! - **exact**: fragments write their own depth, scaled by a power of two, and the attribute pass compares in the shader.
-//!   It accepts the very fragments that compute accepts.
-//! - **offset**: both sides of a surface are blended, and normals as they are given, as in the papers. The quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
-//!   interpolation (a fragment within about 2^-20 of epsilon may be decided otherwise), absolute tolerances are applied at
-//!   the quads' corners, and a plane that passes the eye within its quad is bent. OpenGL has no such depths: it takes them
-//!   from -1 to 1, of which those far from the eye, all near the end that is 0 elsewhere, keep no digits.
+//! - **exact**: fragments write their own depth, scaled by a power of two, and the attribute pass
+//!   compares in the shader. It accepts exactly the fragments that the compute kernels accept.
+//! - **offset**: the quads lie in the disks' planes, and the rasteriser interpolates and compares
+//!   depths. Both sides of a surface are blended, with normals as they are given, as in the papers.
+//!   Depths err by the rasteriser's interpolation (a fragment within about 2^-20 of epsilon may be
+//!   decided otherwise), absolute tolerances are applied at the quads' corners, and a plane that
+//!   passes through the eye within its quad becomes bent. OpenGL cannot represent these depths: it
+//!   maps them to -1 to 1, where depths far from the eye, which are near 0 elsewhere, lie near -1
+//!   and keep no digits.
 //!
-//! Triangles beside them are drawn before, each with its number, into a texture: its coverage and its interpolated depths are the
-//! rasteriser's, what is nearest is shaded as the compute path's is ([`triangles`]).
+//! Triangles are drawn first, each with its number, into a texture. Their coverage and interpolated
+//! depths are the rasteriser's; the nearest one is shaded as in the compute path ([`triangles`]).
 //!
-//! **Error.** A sum of n terms in a format of unit roundoff r, in the rasteriser's order, errs by at most `n r` of itself
-//! if the format is floating (r = 2^-11 or 2^-24), so a mean by `2 n r + 4 u`; in 8 bits each of the n sums errs by half a
-//! step of 1/255 of the [`BlendFormat::MOST_WEIGHTS_8`] weights that it can hold: `8 n / (255 w)` for a summed weight w,
-//! and what passes 8 weights is lost. Blending rounds in the order of the quads, so the order of the surfels shows.
+//! **Error.** A sum of n terms in a format of unit roundoff r, added in the rasteriser's order,
+//! errs by at most `n r` of itself if the format is floating (r = 2^-11 or 2^-24), so a mean errs
+//! by `2 n r + 4 u`. In 8 bits, each of the n additions errs by half a step of 1/255 of the
+//! [`BlendFormat::MOST_WEIGHTS_8`] weights that a sum can hold: `8 n / (255 w)` for a summed weight
+//! w, and anything above 8 weights is lost. Blending rounds in the order of the quads, so the image
+//! depends on the order of the surfels.
 
 use super::triangles;
 use crate::gpu::program::Draw;
@@ -26,7 +32,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::Step;
 use crate::plan::{BlendFormat, PixelLayout, Plan, Raster, RasterDepth, SceneNeeds};
 
-/// The files and constants; the pipelines are [`draws`].
+/// The pass's files and constants; its pipelines are those of [`draws`].
 pub const PASS: Pass = Pass {
     name: "raster",
     files: |needs| match needs.raster {
@@ -50,28 +56,29 @@ pub const PASS: Pass = Pass {
         Some(raster) => vec![
             ("VERTICES", vertices(making.needs).into()),
             ("BLEND_SCALE", if making.needs.winner.is_some() { 1.0 } else { blend_scale(raster.format) }),
-            // The visibility pass's pipeline says otherwise.
+            // The visibility pass's pipeline overrides this.
             ("MOVED", 0.0),
         ],
     },
 };
 
-/// Vertices of a splat; see raster.wgsl.
+/// Vertices per splat; see raster.wgsl.
 pub fn vertices(needs: &SceneNeeds) -> u32 {
     if needs.triangles { 3 } else { 6 }
 }
 
-/// The file that declares as many targets as `needs` have.
+/// The file that declares as many targets as `needs` requires.
 fn targets_file(needs: &SceneNeeds) -> &'static str {
     match PixelLayout::of(needs).targets() {
         1 => "raster_targets_1.wgsl",
         2 => "raster_targets_2.wgsl",
-        // Weight, four of colour, a gap, three of the normal, depth and its weights, count: twelve channels at most.
+        // Weight, four of colour, a gap, three of the normal, depth and its weights, count: at most
+        // twelve channels.
         _ => "raster_targets_3.wgsl",
     }
 }
 
-/// What terms are multiplied with.
+/// The factor on terms, so that a target of `format` can hold their sums.
 fn blend_scale(format: BlendFormat) -> f64 {
     match format {
         BlendFormat::Rgba8Unorm => 1.0 / f64::from(BlendFormat::MOST_WEIGHTS_8),
@@ -79,7 +86,7 @@ fn blend_scale(format: BlendFormat) -> f64 {
     }
 }
 
-/// The format of the blended targets.
+/// The texture format of the blended targets.
 pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
     match format {
         BlendFormat::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
@@ -88,10 +95,11 @@ pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
     }
 }
 
-/// The format of nearest depths.
+/// The texture format of nearest depths.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// The pipelines of the two passes and of triangles, or of the one in which the nearest fragment's terms replace those of others.
+/// The pipelines of the two passes and of triangles; or the single one in which the nearest
+/// fragment's terms replace those of others.
 pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     let pixel = PixelLayout::of(needs);
     let depth = |compare, write| {
@@ -105,7 +113,7 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     };
     let (near_first, test) = match raster.depth {
         RasterDepth::Exact => (wgpu::CompareFunction::Less, None),
-        // Their depths are largest in front.
+        // With offsets, depths are largest in front.
         RasterDepth::Offset => (wgpu::CompareFunction::Greater, depth(wgpu::CompareFunction::GreaterEqual, false)),
     };
     let add = wgpu::BlendComponent {
@@ -154,13 +162,14 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     .collect()
 }
 
-/// Both passes, over the whole image.
+/// The step that draws both passes, over the whole image.
 pub const STEP: Step = Step::Draw;
 
 /// The names of the blended targets in WGSL.
 pub const SUM_NAMES: [&str; 3] = ["sums_0", "sums_1", "sums_2"];
 
-/// The vertices of the splats in `slots` slots; None for more than a draw has, of which a binding would have 45 GB.
+/// The number of vertices of `slots` splats; `None` if a draw cannot have so many. A binding for
+/// them would take 45 GB.
 pub fn vertices_of(plan: &Plan, slots: u64) -> Option<u32> {
     u32::try_from(slots * u64::from(vertices(&plan.needs))).ok()
 }

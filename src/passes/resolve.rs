@@ -1,4 +1,5 @@
-//! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
+//! Stage 4: sums become the image: divided by the weight (paper 000, section 5.4), shaded,
+//! composited over the background.
 
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -15,8 +16,10 @@ use crate::scene::maps::SURFACES;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
-/// The twin: what the splats of each pixel show, by their `sums`, which start at row `first_row` of the image, and what is `nearest` of them,
-/// where that is known.
+/// The f64 twin: the surface that each pixel's splats show.
+///
+/// `sums` start at row `first_row` of the image. `nearest` may be empty; then the surfaces' `front`
+/// is +inf.
 pub fn surfaces(
     sums: &[PixelSums],
     nearest: &[Nearest],
@@ -40,7 +43,8 @@ pub fn surfaces(
     sums.iter().enumerate().map(of).collect()
 }
 
-/// The twin: `surfaces`, and triangles beside them if there are any, into `frame`, which holds just their rows.
+/// The f64 twin: writes `surfaces`, joined with triangles if there are any, to `frame`, which holds
+/// just their rows.
 pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &RenderOptions, frame: &mut Frame) {
     for (pixel, of_splats) in surfaces.iter().enumerate() {
         let surface = match beside.triangles.get(pixel) {
@@ -62,29 +66,29 @@ pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &RenderOpti
     }
 }
 
-/// What a pixel shows of one surface.
+/// The surface that a pixel shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
-    /// Straight, lit.
+    /// Straight linear colour and alpha, lit.
     pub color: [f64; 4],
-    /// World space, unit.
+    /// World space, unit length.
     pub normal: DVec3,
-    /// Mean texture coordinates of surfels.
+    /// The mean texture coordinates of the surfels.
     pub place: [f64; 2],
     /// Camera-space z, world units.
     pub depth: f64,
-    /// That of the nearest fragment.
+    /// The depth of the nearest fragment: camera-space z, world units.
     pub front: f64,
-    /// Summed; 1 of a triangle.
+    /// The sum of weights; 1 for a triangle.
     pub weight: f64,
-    /// Fragments; 1 of a triangle.
+    /// The number of fragments; 1 for a triangle.
     pub count: u32,
     /// See [`Map::Decision`].
     pub decision: f64,
 }
 
 impl Surface {
-    /// None.
+    /// An empty pixel.
     pub const NOTHING: Self = Self {
         color: [0.0; 4],
         normal: DVec3::ZERO,
@@ -96,19 +100,19 @@ impl Surface {
         decision: f64::INFINITY,
     };
 
-    /// Whether it is one.
+    /// Whether the pixel is not empty.
     pub fn exists(&self) -> bool {
         self.weight > 0.0
     }
 }
 
-/// Sets a pixel of a map, if the frame has that.
+/// Sets a pixel of a map, if the frame has that map.
 pub(super) fn set(frame: &mut Frame, pixel: usize, map: Map, values: &[f64]) {
     let of_pixel = frame.map_mut(map).and_then(|all| all.chunks_exact_mut(map.width()).nth(pixel));
     of_pixel.into_iter().flatten().zip(values).for_each(|(into, value)| *into = *value as f32);
 }
 
-/// The straight colour and the normal of the surface that `sum`, which is not nothing, is of.
+/// The straight colour and the normal that the pixel's `sum` resolves to; its weight must not be 0.
 pub(super) fn surface(
     sum: &PixelSums,
     scene: &Scene,
@@ -121,7 +125,7 @@ pub(super) fn surface(
         Colors::Textured(textured) => textured.resolve(sum.place.map(|total| total / sum.weight), blended),
         _ => blended,
     };
-    // Each normal was turned toward the viewer.
+    // Each summed normal was turned toward the viewer.
     let turned = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
     let normal = if sum.back { -turned } else { turned };
     let mut color = shaded(mean, normal, camera, options, (x, y));
@@ -131,7 +135,9 @@ pub(super) fn surface(
     (color, normal)
 }
 
-/// The straight colour, lit unless splats are, of a premultiplied one of unit `normal`, and its alpha times the opacity.
+/// The straight colour of a premultiplied one, with its alpha times the opacity.
+///
+/// It is lit with the unit `normal`, unless splats were lit before.
 pub(super) fn shaded(
     [r, g, b, alpha]: [f64; 4],
     normal: DVec3,
@@ -146,13 +152,13 @@ pub(super) fn shaded(
     [shaded.x, shaded.y, shaded.z, alpha * f64::from(options.opacity)]
 }
 
-/// The normalised mean; 0 where opposite normals cancel.
+/// The mean, normalised; 0 where opposite normals cancel.
 fn unit_or_zero(mean: DVec3) -> DVec3 {
     if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
 }
 
-/// The twin for several `samples` a pixel: the mean of the premultiplied colours of `fine`, whose pixels are the samples, and their least
-/// [`Map::Decision`].
+/// The f64 twin for several `samples` per pixel: the mean of the premultiplied colours of `fine`,
+/// whose pixels are the samples, and their smallest [`Map::Decision`].
 pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
     let (across, down) = (samples.across as usize, samples.down as usize);
     let (width, height) = (fine.width as usize / across, fine.height as usize / down);
@@ -177,7 +183,8 @@ pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
     mean.with(Map::Decision, (0..width * height).map(least).collect())
 }
 
-/// The linear colour that a surface of colour `straight` and unit `normal` sends in the direction `toward_eye`, unit.
+/// The linear colour that a surface of colour `straight` and unit `normal` sends in the unit
+/// direction `toward_eye`.
 pub(super) fn shade(straight: DVec3, normal: DVec3, toward_eye: DVec3, options: &RenderOptions) -> DVec3 {
     match options.shading {
         Shading::Unlit => straight,
@@ -195,8 +202,11 @@ pub(super) fn shade(straight: DVec3, normal: DVec3, toward_eye: DVec3, options: 
     }
 }
 
-/// For each light its intensity times its cosine (the headlight lights both sides, a directional light the
-/// side the normal is on), and the cosine between its mirrored direction and the one toward the eye.
+/// For each light, the received intensity and the cosine between its mirrored direction and the
+/// eye.
+///
+/// The received intensity is the intensity times the cosine at the surface. A headlight lights both
+/// sides, a directional light only the side that the normal is on.
 fn irradiances(normal: DVec3, toward_eye: DVec3, lights: &[Light]) -> impl Iterator<Item = (f64, f64)> {
     lights.iter().map(move |light| {
         let (toward, intensity) = match *light {
@@ -210,7 +220,7 @@ fn irradiances(normal: DVec3, toward_eye: DVec3, lights: &[Light]) -> impl Itera
     })
 }
 
-/// Straight alpha over straight alpha.
+/// Composites straight alpha over straight alpha.
 pub(super) fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     let behind = back[3] * (1.0 - front[3]);
     let alpha = front[3] + behind;
@@ -265,7 +275,7 @@ pub const PASS: Pass = Pass {
 
 const RESOLVE: Kernel = Kernel::new("resolve");
 
-/// The pass over the tiles that anything covers.
+/// The stage that resolves the covered tiles.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
     let lists = if plan.needs.separate { individuals::LISTS } else { covered::LISTS };
     let mut runs = covered::runs(lists).to_vec();
@@ -279,13 +289,14 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
     Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(twin)
 }
 
-/// Words of a pixel of [`Map::Surfaces`].
+/// Words per pixel of [`Map::Surfaces`].
 const WORDS_OF_SURFACES: usize = 2 * SURFACES;
 
-/// Puts `bytes` of resolved pixels under those that `frame` has; its rows are counted by whoever knows when they are whole.
+/// Appends the resolved pixels in `bytes` to those of `frame`. The caller counts the rows, as it
+/// knows when they are complete.
 pub fn unpack(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
-    // The N words of each pixel from `word` on.
+    // Copies N words of each pixel, from `word` on.
     fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
         let at = word as usize * 4;
         map.par_iter_mut().zip(bytes.par_chunks_exact(record)).with_min_len(1 << 14).for_each(|(value, bytes)| {

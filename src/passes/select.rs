@@ -1,15 +1,20 @@
-//! Stage 0 of scenes with levels of detail: the cut, which is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1).
+//! Stage 0 with levels of detail: chooses the cut, which is drawn in place of all surfels (Pajarola
+//! 2003, section 5.1, step 1).
 //!
-//! From the root down: what is out of view, or all turned away where backs are left out, is passed over; a node that is seen smaller than the size
-//! asked for is drawn, but where backs are left out none that would be though some of what is below would not; of a leaf that is not, its surfels
-//! are; and of other nodes what is below. The cut depends on the tree, the camera and on whether backs are left out alone.
+//! The tree is walked from the root down. A node out of view is skipped; with back-face culling so
+//! is one below which everything faces away. A node that appears smaller than the requested size is
+//! drawn; with culling only if its own plane faces the viewer, since otherwise it would be culled
+//! although surfels below it may be visible. Any other leaf is replaced by its surfels, any other
+//! node by its children. The cut depends only on the tree, the camera and whether backs are culled.
 //!
-//! Where views fade, the cuts of [`STEPS`] sizes from half of that on are drawn at once: a node or surfel is in those of its [`Fade`](crate::scene::Fade), which follows
-//! from its size and from those of the nodes above it. So what a view shows changes by a part of so many when a node comes to its next size, and what
-//! is larger than the size asked for is drawn by none.
+//! With fades, the cuts of [`STEPS`] sizes, from half the requested size on, are drawn at once. A
+//! node or surfel belongs to the cuts of its [`Fade`](crate::scene::Fade), which follows from its
+//! size and those of the nodes above it. So when a node passes one of these sizes, its weight
+//! changes by `1 / STEPS`, and no cut draws a node larger than the requested size.
 //!
-//! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other. What was chosen of each is drawn from where it
-//! lies, page by page: nothing that follows knows of trees.
+//! On a device the tree lies in [`branches`](super::branches), which are processed one after the
+//! other. The chosen surfels and nodes are drawn from where they lie, page by page: no later pass
+//! knows of trees.
 
 use glam::{DVec2, DVec3};
 
@@ -24,7 +29,7 @@ use crate::scene::fade::STEPS;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 
-/// The pass's kernels, files and constants.
+/// The pass's files and constants. Its kernels are [`CHOOSING`].
 pub const PASS: Pass = Pass {
     name: "select",
     files: |needs| {
@@ -47,10 +52,12 @@ const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
 
-/// The kernels that choose what is drawn: what follows depends on how much that is, so they are compiled before all others.
+/// The kernels that choose the cut. Later steps depend on its size, so these kernels are compiled
+/// before all others.
 pub const CHOOSING: [Kernel; 4] = [SELECT_TOP, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
 
-/// The dispatches that choose what of a branch is drawn: one for the levels that a workgroup can judge, and those for so many others.
+/// The dispatches that choose the cut of a branch: one for the small levels, which one workgroup
+/// judges, and three for each of its `large_levels`.
 pub fn choose(large_levels: u32) -> Vec<Run> {
     let level = [
         Run { kernel: SELECT_JUDGE, over: Over::Judged },
@@ -62,23 +69,24 @@ pub fn choose(large_levels: u32) -> Vec<Run> {
     runs
 }
 
-/// Which cut is wanted.
+/// The options of a cut.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {
-    /// The size of what is drawn in place of what is below it.
+    /// The size in the image below which a node is drawn in place of what is below it.
     pub detail: Detail,
-    /// How that is measured.
+    /// How that size is measured.
     pub measure: DetailMeasure,
-    /// Surfels that face away are left out.
+    /// Whether surfels that face away are left out.
     pub backs_out: bool,
-    /// Coarser and finer cuts fade into each other.
+    /// Whether coarser and finer cuts fade into each other.
     pub fades: bool,
-    /// How far beside the image a node may be seen and not be left out, pixels: as far as a low-pass reaches ([`cull::filter_reach`]), and two samples.
+    /// How far outside the image, in pixels, a node is still drawn: the reach of the low-pass
+    /// ([`cull::filter_reach`]) plus two samples.
     pub margin: DVec2,
 }
 
 impl Wanted {
-    /// That of a picture with `options`, of which backs are left out or not.
+    /// The cut of a picture with `options`; `backs_out` says whether backs are left out.
     pub fn of(options: &RenderOptions, backs_out: bool) -> Self {
         let samples = DVec2::new(options.samples.across.into(), options.samples.down.into());
         let margin = (cull::filter_reach(&Design::of(options)) + 2.0) / samples;
@@ -87,55 +95,64 @@ impl Wanted {
     }
 }
 
-/// The size for a number of splats as square pixels in the view of the image's `camera`; every other one as it is.
+/// Converts a requested number of splats to a size in square pixels for the view of the image's
+/// `camera`. Any other size is returned as it is.
 ///
-/// The fewer square pixels, the more is drawn but for few nodes at the image's edges of which less is in view than they stand for, so that going down by
-/// powers of two and then halving an interval finds a size with which no more are drawn than asked for, and hardly fewer. What reaches the near
-/// depth is divided at any size, and may be more. Where cuts fade into each other more than all surfels may be drawn of some sizes: if there is room for all
-/// of them the size is the smallest.
+/// A smaller size draws more, except for a few nodes at the image's edges that stand for more than
+/// is in view. So a search by powers of two, then by bisection, finds a size that draws at most the
+/// requested number, and hardly fewer. Nodes that reach the near depth are divided at any size, so
+/// even the coarsest cut may draw more. With fades some sizes may draw more than all surfels: if
+/// the number allows the smallest size, that one is returned.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
     let fits_at = |size: f64| {
         let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
         bounded(hierarchy, origin, camera, &wanted, splats).is_some()
     };
-    // The size that is found is hardly above that of a node, which a device may round to the other side of it, but not of one so much larger.
+    // The size found is just above that of some node, which a device may round to the other side. A
+    // slightly larger size is safe, so it must fit too.
     let fits = |size: f64| fits_at(size) && fits_at(size * SIZE_SLACK);
     let size = if wanted.fades && fits(SMALLEST) { SMALLEST } else { finest(fits) };
     Detail::Pixels(size * SIZE_SLACK)
 }
 
-/// Square pixels that no node is seen as small as.
+/// A size in square pixels that is smaller than any node's.
 const SMALLEST: f64 = 1e-30;
 
-/// By how much a device may err in the size of a node.
+/// The factor by which a device may err in the size of a node.
 const SIZE_SLACK: f64 = 1.0 + 1e-5;
 
-/// By how much a device may err in a ball's place and size, of its distance.
+/// A device's error in a ball's position and radius, relative to the ball's distance.
 const BALL_ROUNDING: f64 = 1e-6;
 
-/// By how much a device may err in a sine.
+/// A device's error in a sine.
 const SINE_SLACK: f64 = 1e-5;
 
-/// The cut of `hierarchy`, which is relative to `origin`, in the view of `camera`.
+/// The cut of `hierarchy` in the view of `camera`. Node positions are relative to `origin`.
 pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Cut {
     bounded(hierarchy, origin, camera, wanted, u64::MAX).unwrap_or_default()
 }
 
-/// The same, or None if it has more than `most` surfels and nodes.
+/// The same; `None` if the cut has more than `most` surfels and nodes.
 fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
     let fate = |index: u32| fate(&hierarchy.nodes[index as usize], hierarchy.low(index), (origin, camera), wanted, 0.0);
     Cut::of(hierarchy, most, fate)
 }
 
-/// Whether a picture may come to what is below a node of a tree about `origin` in the view of `camera`: whether a device, which may err, or the twin
-/// may divide it in some of the cuts that are wanted. `low` is what its f32 centre leaves out.
+/// Whether a render may need what is below a node: whether the twin, or a device within its error,
+/// may divide the node in some of the wanted cuts.
+///
+/// The tree's positions are relative to the origin in `at`; `low` is the part of the node's centre
+/// that f32 leaves out.
 pub fn may_divide(node: &Node, low: DVec3, at: (DVec3, &Camera), wanted: &Wanted) -> bool {
-    // One surfel is always itself.
+    // A leaf of one surfel is always drawn as that surfel.
     matches!(fate(node, low, at, wanted, 1.0), Fate::Divided(cuts) if cuts > 0 || (node.leaf && node.count == 1))
 }
 
-/// What becomes of a node: with so much `slack`, in units of what a device may err, what is nearly seen is, and what is nearly divided.
+/// Decides whether a node is unseen, drawn or divided.
+///
+/// `slack` is a tolerance in units of the device's error: with it, nodes that are nearly in view
+/// count as in view, and nodes that are nearly divided count as divided.
 fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wanted, slack: f64) -> Fate {
     let Wanted { detail, measure, backs_out, fades, margin } = *wanted;
     let size = detail.pixels(camera.pixels() as f64);
@@ -147,20 +164,22 @@ fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wa
     if outside || turned > spread + (1.0 + slack) * SINE_SLACK {
         return Fate::Unseen;
     }
-    // The place of what reaches the near depth in the image says nothing.
+    // The image of a node that reaches the near depth has no meaningful size.
     let near = at.z - radius <= camera.near;
     let seen = if near { f64::INFINITY } else { measure.of(node, center, camera) };
     let seen = seen * (1.0 + slack * (SIZE_SLACK - 1.0));
-    // The plane of one that faces away is left out, whatever is below it.
+    // A node whose plane faces away would be culled, whatever is below it, so it is divided.
     if turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
 }
 
-/// In how many cuts, the first ones, a node that is `seen` so large is divided, where the largest of their sizes is `size`; all or none if they do not
-/// fade into each other, and are one.
+/// The number of cuts, the finest first, that divide a node that appears as large as `seen`. The
+/// requested size is `size`.
+///
+/// Without fades there is one cut, which counts as all [`STEPS`].
 fn divided(seen: f64, size: f64, fades: bool) -> u8 {
     let steps = f64::from(STEPS);
     match fades {
-        // So is it of no size.
+        // Tested first, as `size` may be 0.
         true if seen >= size => STEPS,
         true => (steps * (2.0 * seen / size - 1.0) + 1.0).floor().clamp(0.0, steps) as u8,
         false if seen < size => 0,
@@ -168,8 +187,12 @@ fn divided(seen: f64, size: f64, fades: bool) -> u8 {
     }
 }
 
-/// The sine by which a node's normal points away from the eye, and that past which all below it does, whatever point of the ball around it is looked
-/// at (specification S12): that of its cone and the ball's half-angle together, if they are less than a right angle; else 1.
+/// The sine by which a node's normal points away from the eye, and the one above which everything
+/// below the node faces away, seen from the eye at any point of the node's ball (specification
+/// S12).
+///
+/// The latter is the sine of the sum of the cone's angle and the ball's half-angle, if that sum is
+/// less than a right angle; else 1.
 fn turned_away(node: &Node, (center, radius): (DVec3, f64), camera: &Camera) -> [f64; 2] {
     let (toward, ball) = match camera.projection {
         Projection::Pinhole => {
@@ -178,7 +201,7 @@ fn turned_away(node: &Node, (center, radius): (DVec3, f64), camera: &Camera) -> 
         }
         Projection::Orthographic => (-camera.rotation.row(2), 0.0),
     };
-    // Cosine and sine of each angle, of the ball up to a right one, and of both together.
+    // Cosine and sine of each angle (the ball's at most a right angle), and of their sum.
     let across = |one: f64| (1.0 - one * one).sqrt();
     let cone = f64::from(node.cone).clamp(-1.0, 1.0);
     let cone = DVec2::new(cone, across(cone));
@@ -258,7 +281,7 @@ mod tests {
         }
     }
 
-    /// What is in a cut of those that fade into each other is the cut by its size alone.
+    /// The part of a fading cut that belongs to one size is the cut of that size alone.
     #[test]
     fn cuts_that_fade_are_cuts_of_sizes_from_half_on() {
         let (_, tree) = sphere();
@@ -283,7 +306,7 @@ mod tests {
         }
     }
 
-    /// No more than asked for are drawn, and hardly fewer; of a hundredth more the cut is another one.
+    /// At most the requested number is drawn, and hardly fewer.
     #[test]
     fn a_number_of_splats_is_kept() {
         let (_, tree) = sphere();
@@ -304,7 +327,7 @@ mod tests {
         DVec3::from_array(tree.nodes[index as usize].surfel.center.map(f64::from))
     }
 
-    /// Angles of cones and balls add up, whatever they are.
+    /// The angles of cone and ball add up for all values.
     #[test]
     fn a_cone_and_a_ball_turn_by_their_angles_together() {
         let camera = camera(DVec3::new(0.0, 0.0, 3.0), Lens::Fov(50.0));
@@ -323,11 +346,11 @@ mod tests {
         }
     }
 
-    /// What is passed over is out of view, or faces away; and some is.
+    /// Surfels that are left out are out of view or face away, and some are left out.
     #[test]
     fn what_is_left_out_cannot_be_seen() {
         let (scene, tree) = sphere();
-        // From within, and from near.
+        // Seen from within, and from close by.
         for (eye, back) in
             [(DVec3::new(0.0, 0.0, 0.4), false), (DVec3::new(0.2, 0.1, 1.6), false), (DVec3::new(0.2, 0.1, 1.6), true)]
         {

@@ -1,8 +1,9 @@
-//! What every module has: the layout that host and device share, how records are read, and where a surfel lies.
+//! The files of every module: the layout that host and device share, reading of records, and surfel
+//! centres.
 
 use crate::plan::pass::Pass;
 
-/// The files.
+/// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "shared",
     files: |needs| {
@@ -21,7 +22,7 @@ pub const PASS: Pass = Pass {
             pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
             pick(needs.fades, "fade.wgsl", "fade_absent.wgsl"),
         ];
-        // Those of a cut come with it.
+        // With a cut, select_fades.wgsl reads the fades that the cut assigns.
         files.extend((needs.fades && !needs.levels).then_some("fade_own.wgsl"));
         files
     },

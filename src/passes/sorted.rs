@@ -1,5 +1,7 @@
-//! Stage 4 of [`Composite::Sorted`] and [`Composite::Gaussians`]: every fragment of a pixel by itself, from front to back, lit at its own normal. What it shows
-//! is its surfel's alpha times its weight, which the rules of Gaussians cut off.
+//! Stage 4 of [`Composite::Sorted`] and [`Composite::Gaussians`]: composites every fragment of a
+//! pixel by itself, from front to back, lit at its own normal.
+//!
+//! A fragment's alpha is its surfel's alpha times its weight, limited by the rules of Gaussians.
 
 use super::Strip;
 use super::fragments::{self, Fragment};
@@ -11,21 +13,22 @@ use crate::plan::{Lists, RenderOptions};
 use crate::scene::composite::LEAST_TRANSMITTANCE;
 use crate::scene::{Composite, gaussian};
 
-/// What of a pixel's fragments shows.
+/// The rules by which a pixel's fragments are composited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
-    /// Those with a smaller alpha are not listed.
+    /// Fragments of smaller alpha are not listed.
     pub least_alpha: f64,
-    /// Greater alphas become this one.
+    /// Greater alphas are clamped to this one.
     pub most_alpha: f64,
-    /// What would let less through than this is left out, with all behind it; else what lies behind it alone.
+    /// The smallest transmittance at which compositing goes on.
     pub least_shown: f64,
-    /// The former.
+    /// Whether the fragment that would go below `least_shown` is left out too, and not only those
+    /// behind it.
     pub leaves_last: bool,
 }
 
 impl Rules {
-    /// Those of `options`.
+    /// The rules for `options`.
     pub fn of(options: &RenderOptions) -> Self {
         match options.composite {
             Composite::Gaussians => Self {
@@ -39,11 +42,12 @@ impl Rules {
     }
 }
 
-/// The twin: the image of `strip`.
+/// The f64 twin: the image of `strip`.
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let rules = Rules::of(options);
-    // At one place the depths of two fragments are the same numbers, and the order of their surfels decides.
+    // Two fragments of surfels at the same place have exactly the same depth, and the order of
+    // their surfels decides.
     let place = |f: &Fragment| {
         let surfel = f.surfel as usize;
         (scene.surfels[surfel], scene.low.get(surfel), scene.caps.get(surfel))
@@ -55,7 +59,8 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
         for f in &list.fragments {
             let normal = if f.back { -f.normal } else { f.normal };
             let [r, g, b, alpha] = shaded(f.color, normal, camera, options, at);
-            // Where a kernel falls steeply its weight errs by more than the place in the disk does.
+            // Where a kernel falls steeply, its weight errs by more than the position in the disk
+            // does.
             let steepness = 1.0 - f.weight.ln();
             let alpha = f.weight * alpha;
             if rules.least_alpha > 0.0 {
@@ -65,13 +70,14 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
                 continue;
             }
             let alpha = alpha.min(rules.most_alpha);
-            // Where two depths are one but for rounding, either may come first.
+            // If two depths are equal but for rounding, either fragment may come first.
             if let Some(before) = before.filter(|before| place(before) != place(f)) {
                 decision = decision.min(1.0 - before.depth / f.depth);
             }
             before = Some(f);
             let next = shown.with([r, g, b, alpha], f.depth);
-            // So does what an alpha near 1 lets through; where what lies behind would hardly show that is of no matter.
+            // The transmittance of an alpha near 1 also errs by more. Without `leaves_last` that
+            // does not matter, as what lies behind would hardly show.
             if rules.leaves_last {
                 sensitivity += alpha / (1.0 - alpha) * steepness;
             }
@@ -88,7 +94,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     }
 }
 
-/// The files and constants.
+/// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "sorted",
     files: |needs| if needs.lists == Some(Lists::Sorted) { vec!["sorted.wgsl"] } else { Vec::new() },

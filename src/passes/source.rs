@@ -1,5 +1,5 @@
-//! Where the surfels that a device draws come from: a [`Scene`] in memory, or whatever else can tell its facts and give its pages.
-//! Nothing but the f64 reference needs all of them at once.
+//! Where a device gets its surfels from: a [`Scene`] in memory, or any other source that knows its
+//! facts and provides pages. Only the f64 reference needs all surfels at once.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -16,44 +16,46 @@ use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Hierarchy, Node};
 use crate::scene::{Cap, Clip, Colors, Fade, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
 
-/// Surfels, page by page.
+/// A source of surfels, page by page.
 pub trait Source: Send + Sync {
-    /// The ranges of their values, and their counts.
+    /// The ranges of the surfels' values, and their counts.
     fn facts(&self) -> Facts;
 
-    /// Pages of at most `most` surfels as a render with `needs` draws them, in the [`order`] that draws well if they are to be `ordered`.
-    /// Where a surfel stands for its copies these are left out.
+    /// Pages of at most `most` surfels, as a render with `needs` draws them.
+    ///
+    /// With `ordered` they are in the [`order`] that draws well. Copies that another surfel stands
+    /// for are left out.
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
-    /// What paints them, by the numbers of an [`Atlas`](crate::scene::Atlas).
+    /// The surfels' textures, by their numbers in an [`Atlas`](crate::scene::Atlas).
     fn textures(&self) -> &[Mipmap];
 
-    /// The triangles beside them.
+    /// The triangles of the scene.
     fn triangles(&self) -> Option<&Triangles> {
         None
     }
 
-    /// Their levels of detail.
+    /// The surfels' levels of detail.
     fn levels(&self) -> Option<&Hierarchy> {
         None
     }
 
-    /// The surfels of a branch of these levels, and behind them those of its nodes, as a render with `needs` draws them: of a leaf of one surfel once more
-    /// that one, which is drawn for it.
+    /// The surfels of a branch of these levels, followed by those of its nodes, as a render with
+    /// `needs` draws them. For a leaf of one surfel the node's is that surfel again.
     fn branch<'a>(&'a self, _needs: &SceneNeeds, _branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         None
     }
 
-    /// Which points of which inputs they are, by the numbers that pages give.
+    /// The input and the point that each surfel comes from, by the numbers that pages give.
     fn provenance(&self) -> Cow<'_, Provenance>;
 
-    /// All of them in memory, for the reference.
+    /// All surfels in memory, for the f64 reference.
     fn whole(&self) -> Option<&Scene>;
 }
 
 /// Consecutive surfels of a [`Source`].
 pub trait Page: Sync {
-    /// The number of each in the source.
+    /// The number of each surfel in the source.
     fn numbers(&self) -> Cow<'_, [u32]>;
 
     /// The surfels of a range.
@@ -62,14 +64,15 @@ pub trait Page: Sync {
     /// The attributes of a range, as records of [`SurfelLayout::words`].
     fn attributes(&self, range: Range<usize>) -> Vec<u32>;
 
-    /// The bounding ball of each batch: centre and radius, world units relative to the origin.
+    /// The bounding ball of each batch: centre and radius, world units relative to the scene's
+    /// origin.
     fn balls(&self) -> Vec<[f32; 4]>;
 
-    /// Surfels that they stand for together.
+    /// The number of surfels that the page stands for, copies included.
     fn stand_for(&self) -> u64;
 }
 
-/// A source that another value leads to is one too.
+/// Implements [`Source`] for pointers to a source.
 macro_rules! leads_to_source {
     ($($other:ty),*) => {$(
         impl<S: Source + ?Sized> Source for $other {
@@ -156,7 +159,7 @@ impl Source for Scene {
 
     fn branch<'a>(&'a self, needs: &SceneNeeds, branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         let first = self.surfels.len() as u32;
-        // One surfel has its lines and its cap.
+        // A leaf of one surfel is drawn as that surfel, with its clip lines and its cap.
         let of_node = |index: usize| branch.only_surfel(index).unwrap_or(first + branch.numbers[index]);
         let records = branch.surfels.len() + branch.numbers.len();
         let surfels = branch.surfels.clone();
@@ -184,24 +187,24 @@ impl Source for Scene {
     }
 }
 
-/// The surfels of a scene at `indices`, of which those past the last are nodes.
+/// The surfels of a scene at `indices`; indices past the last surfel are nodes.
 struct ScenePage<'a> {
     scene: &'a Scene,
     nodes: Option<&'a Hierarchy>,
     needs: SceneNeeds,
     layout: SurfelLayout,
     indices: Box<[u32]>,
-    /// Of every surfel of the scene; 0 of those that another stands for.
+    /// The number of copies of every surfel of the scene; 0 for those that another stands for.
     copies: Option<Arc<[u32]>>,
 }
 
-/// The bits of numbers.
+/// Stores the bits of floats.
 fn write(values: &[f32], into: &mut [u32]) {
     values.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
 }
 
 impl ScenePage<'_> {
-    /// The node that an index past the last surfel is of, with its number.
+    /// The node of an index past the last surfel, with its number.
     fn node(&self, index: usize) -> Option<(usize, &Node)> {
         let number = index.checked_sub(self.scene.surfels.len())?;
         Some((number, self.nodes?.nodes.get(number)?))
@@ -211,7 +214,7 @@ impl ScenePage<'_> {
         self.node(index).map_or_else(|| self.scene.surfels[index], |(_, node)| node.surfel)
     }
 
-    /// Those of a node: it ends at no lines.
+    /// Writes the attributes of a node, which has no clip lines.
     fn write_node(&self, (number, node): (usize, &Node), into: &mut [u32]) {
         match self.needs.color {
             ColorNeed::Srgb8 => into[0] = u32::from_le_bytes(srgb8(node.color)),
@@ -272,7 +275,7 @@ impl ScenePage<'_> {
         if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
             write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
-        // In a tree fades are no surfels', but a cut's.
+        // In a tree a fade belongs to a cut, not to a surfel.
         if let Some(fade) = into.get_mut(self.layout.fade as usize) {
             *fade = self.scene.fades.get(index).copied().unwrap_or(Fade::WHOLE).word();
         }

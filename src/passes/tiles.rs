@@ -1,16 +1,22 @@
-//! Stages 2 to 4 by tiles of the image: the same minima, sums and pixels as [`visibility`](super::visibility),
-//! [`accumulate`](mod@super::accumulate) and [`resolve`](mod@super::resolve) make, to the bit.
+//! Stages 2 to 4 by tiles of the image. The nearest depths, sums and pixels equal those of
+//! [`visibility`](super::visibility), [`accumulate`](mod@super::accumulate) and
+//! [`resolve`](mod@super::resolve) to the bit.
 //!
-//! Scatter, an invocation a splat, adds each fragment to memory by atomics. A tile has a list of the splats that may touch it,
-//! made by count, scan and place, and keeps its pixels' nearest depths, and then their sums, in registers. A splat costs each
-//! tile that it touches about as much as a dozen of scatter's fragments, so large splats are cheaper by tiles on any adapter:
-//! those whose bounds hold more than [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are. On a software adapter,
-//! whose atomics are slow, all splats are summed so if they are not tiny ([`touched`]) and those that blend have one page
-//! ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
-//! stored. Nearest depths of small splats are found by scatter in any case, and all splats share the nearest depths before any
-//! is accumulated. Opaque blending within epsilon does not ask for an order, so no list is sorted.
+//! The scatter kernels, with one invocation per splat, add each fragment to memory by atomics. A
+//! tile instead has a list of the splats that may touch it, made by count, scan and place, and
+//! keeps its pixels' nearest depths, then their sums, in registers. A splat costs each tile that it
+//! touches about as much as a dozen fragments cost scatter, so large splats are cheaper by tiles on
+//! any adapter: those whose bounds hold more than
+//! [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are drawn so. On a software
+//! adapter, whose atomics are slow, all splats are summed by tiles if they are not tiny
+//! ([`touched`]) and those that blend with each other are in one page
+//! ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)). A tile then resolves its pixels at
+//! once, and no sum is stored. Nearest depths of small splats are found by scatter in any case, and
+//! the nearest depths of all splats are known before any is accumulated. Opaque blending within
+//! epsilon needs no order, so no list is sorted.
 //!
-//! What room the lists need is read from the device once; a later frame that needs more is rendered again.
+//! The size that the lists need is read from the device once; a later frame that needs more is
+//! rendered again.
 
 use std::ops::Range;
 
@@ -23,7 +29,7 @@ use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
 use crate::plan::{Band, ColorNeed, Facts, Plan, RenderOptions, SceneNeeds};
 use crate::scene::{Camera, LowPass, Samples};
 
-/// The kernels and files of the tiles' module, beside those of others.
+/// The files and kernels that the tiles' module adds to those of every module.
 pub const PASS: Pass = Pass {
     name: "tiles",
     files: |needs| {
@@ -65,13 +71,15 @@ const VISIBILITY: Kernel = Kernel::new("tile_visibility");
 const ACCUMULATE: Kernel = Kernel::new("tile_accumulate");
 const RESOLVE: Kernel = Kernel::new("tile_resolve");
 
-/// Pixels of a tile, down.
+/// The height of a tile, pixels.
 pub fn rows(needs: &SceneNeeds) -> u32 {
     if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN }
 }
 
-/// The tiles of [`TILE_ROWS_SHARED`] rows that a splat touches on average in the view of `camera`, by the sample of `facts`; infinite
-/// if the view shows none of it.
+/// The mean number of tiles of [`TILE_ROWS_SHARED`] rows that a splat touches in the view of
+/// `camera`, estimated from the sample in `facts`.
+///
+/// Infinite if the view shows no splat of the sample.
 pub fn touched(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
     let design = Design::of(options);
     let eye = camera.eye - facts.origin;
@@ -88,12 +96,14 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
-/// The longest list that is drawn. Mesa's llvmpipe ends the loops of an invocation after 65,535 rounds in all, of which the last
-/// look at a condition is one. An entry that is fetched alone takes four: to be fetched, to be drawn, and a last look for each half
-/// of the tile; of those fetched in eights, eight take 19, if both halves draw them. There are two lists.
+/// The longest list that is drawn. Mesa's llvmpipe ends the loops of an invocation after 65,535
+/// rounds in total, and the last test of a loop's condition counts as one. An entry that is fetched
+/// alone takes four: to be fetched, to be drawn, and a last test for each half of the tile. When
+/// entries are fetched in eights, eight take 19 if both halves draw them. There are two lists.
 pub const LONGEST: u64 = 8_000;
 
-/// Words of the lists of a kind before their entries: what the frame needed, and where each list ends (`wgsl/bin.wgsl`).
+/// Words of a kind of lists before their entries: the sizes that the frame needed, and the end of
+/// each list (`wgsl/bin.wgsl`).
 pub fn list_words(plan: &Plan, of: Listed, band: &Band) -> u64 {
     let [across, down] = match of {
         Listed::Large => [BLOCK_SIDE; 2],
@@ -103,7 +113,7 @@ pub fn list_words(plan: &Plan, of: Listed, band: &Band) -> u64 {
     u64::from(LIST_ENDS) + 1 + cells
 }
 
-/// The buffer of the lists of a kind, by its name in WGSL.
+/// The name in WGSL of the buffer of a kind of lists.
 pub fn list_name(of: Listed) -> &'static str {
     match of {
         Listed::Large => "large_lists",
@@ -111,11 +121,13 @@ pub fn list_name(of: Listed) -> &'static str {
     }
 }
 
-/// What lists the splats of a page; only how long the lists become unless it `places` them. What the frame needs is not known yet if
-/// it is `fresh`.
+/// The stage that lists the splats of a page. Unless it `places` them, it only finds how long the
+/// lists become.
+///
+/// If it is `fresh`, it also resets the sizes that the frame needs.
 fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, places: bool) -> Stage {
     let most = plan.bands.iter().map(|band| list_words(plan, of, band)).max().unwrap_or(0);
-    // The first two words are what it needs.
+    // The first two words are those sizes.
     let first = if fresh { 0 } else { u64::from(LIST_ENDS) };
     let (kernels, over) = match of {
         Listed::Large => ([COUNT_LARGE, SCAN_LARGE, PLACE_LARGE], Over::Listing),
@@ -126,7 +138,8 @@ fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, place
     Stage { page: Some(page), ..stage }.after(vec![Clear::of(list_name(of), first, most - first)])
 }
 
-/// Counts the entries of all lists of a kind of some pages, in the bands that have their splats from `band` on.
+/// Counts the entries of all lists of a kind for some pages, in the bands that use the projection
+/// of `band`.
 pub fn look(plan: &Plan, of: Listed, band: usize, pages: Range<usize>) -> Step {
     let bands = if plan.projects_each_band { band..band + 1 } else { 0..plan.bands.len() };
     let cuts = bands.flat_map(|band| pages.clone().map(move |page| (band, page)));
@@ -150,13 +163,14 @@ pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
         let stage = Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
-    // Of one page the lists stay from the first pass to the second.
+    // With one page the lists of the first pass are still there in the second.
     let several = pages.len() > 1;
     let again = |page| several.then(|| bin(plan, Listed::Large, (band, page), false, true));
     pages.flat_map(|page| again(page).into_iter().chain([draw(page)])).collect()
 }
 
-/// The attribute pass of all splats of a page, and what becomes of the sums: the image, or what an individual shows.
+/// The attribute pass of all splats of a page, which also resolves the sums: to the image, or to
+/// the surfaces of a separate input.
 pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
@@ -174,7 +188,8 @@ mod tests {
     use crate::scene::{Colors, Lens, Scene, Surfel, Up};
     use glam::{DMat3, DVec3, Vec3};
 
-    /// A grid of disks of `radius` that faces a camera which sees its unit square in 100 pixels squared.
+    /// Whether splats are gathered for a grid of disks of `radius` in front of a camera that sees
+    /// its unit square as 100 x 100 pixels.
     fn gathered(radius: f32) -> bool {
         let at = |i: u32| (i as f32 + 0.5) / 40.0 - 0.5;
         let surfels =
@@ -189,7 +204,7 @@ mod tests {
 
     #[test]
     fn splats_that_touch_two_tiles_each_are_gathered() {
-        // A square of n pixels touches (1 + (n - 1) / 8)^2 tiles on average, 2 where n is 4.3.
+        // A square of n pixels touches (1 + (n - 1) / 8)^2 tiles on average: 2 for n = 4.3.
         assert!(gathered(0.03));
         assert!(!gathered(0.015));
     }

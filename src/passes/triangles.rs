@@ -1,35 +1,45 @@
-//! Triangles beside splats: corners, the nearest triangle of each pixel, and what it shows there.
+//! Triangles beside splats: projects their corners, finds the nearest triangle of each pixel, and
+//! shades it.
 //!
 //! # A triangle at a pixel
 //!
-//! Seen from the image point p, a vertex is the spoke `q = (x, y) - p w`: of one before the near depth (x, y) is its image and w = 1; of
-//! another one (x, y) is `(fx X + cx Z, fy Y + cy Z)` and w = Z, which has no quotient (Olano and Greer 1997). Of each pair of corners
-//! the area `E_k = q_i x q_j` says on which side of their edge p lies, and p is in the triangle if all three say the same. With shares
-//! s_k (1 / Z of what has an image in perspective, else 1) the corners' parts are `E_k s_k / sum E s`, which are the perspective-correct
-//! barycentric coordinates, and the depth is the mean of the corners' by them. Nothing is clipped: what is nearer than the near depth is
-//! so at its pixels.
+//! Seen from the image point p, a vertex is the spoke `q = (x, y) - p w`. For a vertex beyond the
+//! near depth (x, y) is its image and w = 1. For any other vertex (x, y) is
+//! `(fx X + cx Z, fy Y + cy Z)` and w = Z, which needs no division (Olano and Greer 1997). For each
+//! pair of corners the sign of the area `E_k = q_i x q_j` says on which side of their edge p lies;
+//! p is in the triangle if all three signs agree. With shares s_k (1 / Z for a vertex with an image
+//! in perspective, else 1) the corners' parts are `E_k s_k / sum E s`: the perspective-correct
+//! barycentric coordinates. They weight the corners' depths. Nothing is clipped: the near depth is
+//! tested at each pixel.
 //!
-//! **Each pixel belongs to one of two triangles at an edge.** A vertex is seen once, whichever triangles it is of, in doubled f32
-//! arithmetic, and relative to a pixel it is the same spoke for all of them. How E is rounded follows from the edge's two ends alone: in
-//! f32, as `x1 y2 - y1 x2`, whose sign turns with the edge's direction and nothing else does, or, if an end has no image or one beyond 2^16
-//! pixels, in doubled arithmetic from the end of the lower number on. So the two triangles at an edge get opposite signs whatever is
-//! rounded. Where E is 0, p is taken to lie a little to the right, and then a little below: `dE/dx`, or else `dE/dy`, decides.
+//! **Each pixel belongs to one of the two triangles at an edge.** A vertex is projected once, for
+//! all its triangles, in doubled f32 arithmetic, so its spoke from a pixel is the same for all of
+//! them. The rounding of E depends only on the edge's two ends. In f32 it is `x1 y2 - y1 x2`:
+//! reversing the edge changes its sign and nothing else. If an end has no image, or one beyond 2^16
+//! pixels, E is computed in doubled arithmetic from the end of the lower number on. So the two
+//! triangles at an edge get opposite signs however E is rounded. Where E is 0, p is taken to lie
+//! slightly to the right, then slightly below: `dE/dx`, or else `dE/dy`, decides.
 //!
-//! *No crack shows*: around a vertex that p is near to, signs of edges go from one to the other at least once, and where they do a triangle
-//! has p; near an edge's middle its sign alone is unsure, and one of its two triangles has p. Signs err where E is less than 2^-22 of its
-//! products, so that p may belong to the neighbour, or to both, of which the nearest shows.
+//! *No crack shows*: around a vertex close to p the signs of its edges change at least once, and
+//! the triangle at such a change has p. Near the middle of an edge only the sign of that edge is
+//! uncertain, and one of its two triangles has p. Signs may be wrong where E is less than 2^-22 of
+//! its products: p may then belong to the neighbour, or to both, and the nearer one shows.
 //!
-//! **Rare triangles**, whose parts f32 would blur, are drawn by a kernel of their own, which takes areas in doubled arithmetic: those with
-//! other ends than above, and those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`, as parts err
-//! by `2^-23 L^2 / 2A`; and those for which that is an eighth or more, `2A < 1e-6 L^2`, whose parts would be anybody's. So do those of the attribute pass, which is as exact for all.
+//! **Rare triangles**, whose parts f32 would blur, have a kernel of their own that computes areas
+//! in doubled arithmetic. They are those with an end that needs doubled arithmetic (see above), and
+//! those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`,
+//! since parts err by `2^-23 L^2 / 2A`; and those for which that error is about an eighth or more,
+//! `2A < 1e-6 L^2`, whose parts would be arbitrary. The attribute pass computes the parts of all
+//! triangles as exactly.
 //!
 //! **Far corners**: f32 relative to the scene's origin has too few digits for a mesh far from it.
-//! Such scenes keep two f32 a coordinate (`vertex_doubled.wgsl`); others have neither the words nor
-//! the code.
+//! Such scenes store two f32 per coordinate (`vertex_doubled.wgsl`); others have neither the words
+//! nor the code.
 //!
-//! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
-//! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image. By the rasteriser, for
-//! comparison, it is the first that is drawn of those that are nearest by its own depths, at the points that it covers.
+//! **The nearest** triangle is an atomic maximum of (bits(+inf) - bits(depth), number). The order
+//! of [`Triangles`](crate::scene::Triangles) does not depend on the order in files, so no bit of
+//! the image does. By the rasteriser, for comparison, it is the first triangle drawn among those
+//! nearest by the rasteriser's own depths, at the points that it covers.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -44,16 +54,16 @@ use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step, Twin};
 use crate::plan::{Band, ColorNeed, Plan};
 use crate::scene::{Camera, Projection, Scene};
 
-/// A vertex as the camera sees it. Relative to the point p of the image it is `place - p w`.
+/// A vertex in the image of a camera. Relative to the image point p it is `place - p w`.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// Pixels, times w.
+    /// Image position times w, pixels.
     pub place: DVec2,
-    /// 1 of what has an image, else the depth.
+    /// 1 for a vertex with an image, else its depth.
     pub w: f64,
     /// Camera-space z, world units.
     pub depth: f64,
-    /// What weighs its part of a triangle's pixel beside the part's area.
+    /// The factor of its area in the barycentric coordinates (s_k above).
     pub share: f64,
 }
 
@@ -64,7 +74,7 @@ impl Corner {
     }
 }
 
-/// The twin of the first stage: all corners, in the order of the scene's vertices.
+/// The f64 twin of the first stage: all vertices, in the order of the scene's.
 pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
     let eye = camera.eye - scene.origin;
     let focal = DVec2::new(camera.fx, camera.fy);
@@ -83,23 +93,24 @@ pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
     (0..scene.triangles.vertices().len()).into_par_iter().map(corner).collect()
 }
 
-/// What of a triangle is at a point of the image.
+/// A triangle at a point of the image.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
     /// Camera-space z, world units.
     pub depth: f64,
-    /// The corners' parts, whose sum is 1.
+    /// The barycentric coordinates, whose sum is 1.
     pub parts: [f64; 3],
-    /// How much of them a pixel has: the determinant of the parts by columns and rows.
+    /// The barycentric area of a pixel: the absolute determinant of the coordinates' change per
+    /// column and row.
     pub spread: f64,
-    /// It is in the triangle, and not nearer than the near depth.
+    /// Whether the point is in the triangle and not nearer than the near depth.
     pub hit: bool,
-    /// The least distance to a decision: an area's by an edge, as a part of the products that it is a difference of, negative outside, or
-    /// the depth's from the near depth, relative.
+    /// The smallest distance to a decision: an edge's area relative to the products that it is a
+    /// difference of, negative outside, or the depth's relative distance from the near depth.
     pub decision: f64,
 }
 
-/// A triangle, by its corners and their numbers, at the point `p`; `None` where it has no side.
+/// A triangle, by its corners and their numbers, at the point `p`; `None` if it has no area there.
 pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -> Option<Crossing> {
     let edge = |from: usize, to: usize| {
         let (from, to, turned) = if numbers[from] < numbers[to] { (from, to, 1.0) } else { (to, from, -1.0) };
@@ -121,11 +132,12 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
     let parts = weighed.map(|part| part / sum);
     let depth: f64 = (0..3).map(|k| parts[k] * of[k].depth).sum();
     let inside = sides.iter().all(|side| *side == sides[0]);
-    // An edge is on the wrong side if it is not on that of the most.
+    // An edge is on the wrong side if its sign is not that of the majority.
     let most = sides.iter().sum::<f64>().signum();
     let distance = edges.map(|(_, side, distance)| side * most * distance).into_iter().fold(f64::INFINITY, f64::min);
     let beyond = depth / camera.near - 1.0;
-    // Of the homogeneous areas, whose sum is det / z, by Cramer's rule z^3 / det; of an orthographic image one over the doubled area.
+    // In perspective z^3 / det by Cramer's rule, as the homogeneous areas sum to det / z; in an
+    // orthographic image 1 over the doubled area.
     let units =
         of.map(
             |corner| {
@@ -146,22 +158,23 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
     })
 }
 
-/// What triangles show at a pixel.
+/// The nearest triangle at a pixel, shaded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
-    /// The triangle, by its number.
+    /// The triangle's number.
     pub triangle: u32,
-    /// Its corners' parts.
+    /// The barycentric coordinates.
     pub parts: [f64; 3],
-    /// How much of them the pixel has.
+    /// The barycentric area of the pixel.
     pub spread: f64,
-    /// Straight, lit.
+    /// Straight linear colour and alpha, lit.
     pub color: [f64; 4],
-    /// World space, unit.
+    /// World space, unit length.
     pub normal: DVec3,
-    /// Camera-space z, world units; +inf where nothing is.
+    /// Camera-space z, world units; +inf where no triangle is.
     pub depth: f64,
-    /// The smallest distance to a decision: to an edge, to another depth, relative.
+    /// The smallest relative distance to a decision: to an edge, the near depth, or another
+    /// triangle's depth.
     pub decision: f64,
 }
 
@@ -177,7 +190,7 @@ impl Shown {
         decision: f64::INFINITY,
     };
 
-    /// With a crossing of another triangle: of one depth the greater number is nearest.
+    /// The nearest of this and another triangle. At equal depths the greater number is nearest.
     fn with(self, triangle: u32, crossing: Crossing) -> Self {
         let decision = self.decision.min(crossing.decision.abs());
         if !crossing.hit {
@@ -196,10 +209,10 @@ impl Shown {
     }
 }
 
-/// How far outside a triangle a point is still looked at to record its distance.
+/// How far outside a triangle, relative, a point still records its distance to a decision.
 const NEARBY: f64 = 1e-3;
 
-/// The twin: what triangles show at the pixels of `strip`.
+/// The f64 twin: the nearest triangle at each pixel of `strip`.
 pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let mut shown = vec![Shown::NOTHING; camera.width as usize * rows as usize];
@@ -231,7 +244,8 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
     shown
 }
 
-/// First and last pixel of the rows that a triangle may reach. One that is cut at the near depth may reach all.
+/// The first and the last pixel that a triangle may reach in the given rows. If the near depth cuts
+/// it, it may reach all of them.
 fn reach(camera: &Camera, of: &[Corner; 3], (first_row, rows): (u32, u32)) -> Option<[[u32; 2]; 2]> {
     let before = of.map(|corner| corner.is_before(camera));
     let places = of.map(|corner| corner.place);
@@ -249,26 +263,26 @@ fn reach(camera: &Camera, of: &[Corner; 3], (first_row, rows): (u32, u32)) -> Op
     first.cmple(last).all().then(|| [pixels(first), pixels(last)])
 }
 
-/// Words of a pixel's nearest triangle.
+/// Words per pixel of the buffer of nearest triangles.
 pub const NEAREST_TRIANGLE_WORDS: u32 = 2;
 
-/// Words of what triangles show at a pixel.
+/// Words per pixel of the shaded triangles.
 pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
 
-/// The word at which the list of tiles in which triangles show starts: after how many there are, and a grid.
+/// The word at which the list of tiles with triangles starts, after its count and a grid.
 const TRIANGLE_TILES: u64 = 8;
 
-/// Words of the list of tiles of a band.
+/// Words of a band's list of tiles.
 pub fn tile_words(band: &Band) -> u64 {
     TRIANGLE_TILES + band.tiles
 }
 
-/// Words of what triangles show in a band: of each pixel, and of each tile.
+/// Words of a band's shaded triangles: for each pixel, and four for each tile.
 pub fn pixel_words(band: &Band) -> u64 {
     u64::from(TRIANGLE_PIXEL_WORDS) * band.pixels + 4 * band.tiles
 }
 
-/// Words of a corner.
+/// Words of a projected vertex.
 pub const CORNER_WORDS: u32 = 9;
 
 /// The pass's kernels, files and constants.
@@ -287,7 +301,7 @@ pub const PASS: Pass = Pass {
         };
         let vertex = if mesh.doubled { "vertex_doubled.wgsl" } else { "vertex.wgsl" };
         let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
-        // Else surfels' colours need them.
+        // Otherwise the surfels' colours bring these files.
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
@@ -335,13 +349,14 @@ const LIST_TILES: Kernel = Kernel::new("list_triangle_tiles");
 const ARRANGE_TILES: Kernel = Kernel::of("arrange_triangle_tiles", [1; 3]);
 const SHADE: Kernel = Kernel::new("shade_triangles");
 
-/// By the rasteriser: corners, and the nearest triangle of each pixel of the whole image.
+/// The steps of the rasteriser: projected vertices, and the nearest triangle of each pixel of the
+/// whole image.
 pub fn drawn() -> [Step; 2] {
     let corners = vec![Run { kernel: SEE_CORNERS, over: Over::Vertices }];
     [Step::Stage(Stage::new("triangles", 0, corners)), Step::DrawTriangles]
 }
 
-/// The pipeline of the rasteriser's visibility pass: depths are largest in front.
+/// The pipeline of the rasteriser's visibility pass. Its depths are largest in front.
 pub fn draw() -> Draw {
     let target = wgpu::ColorTargetState { format: NUMBERS, blend: None, write_mask: wgpu::ColorWrites::ALL };
     let depth = wgpu::DepthStencilState {
@@ -361,13 +376,14 @@ pub fn draw() -> Draw {
     }
 }
 
-/// That pipeline's name.
+/// The name of that pipeline.
 pub const DRAWN: &str = "triangles";
 
-/// The format of the numbers that it leaves.
+/// The format of the texture of triangle numbers that it writes.
 pub const NUMBERS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
-/// The stages of a band: corners once, the nearest triangle of each pixel, and what it shows.
+/// The stages of a band: vertices once per frame, then the nearest triangle of each pixel, then its
+/// shading.
 pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
     let run = |kernel, over| Run { kernel, over };
     let once = plan.needs.mesh.is_some_and(|mesh| mesh.once);

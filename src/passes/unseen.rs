@@ -1,4 +1,4 @@
-//! Why nothing shows in a picture: a user who sees none of a scene needs to know where it is.
+//! Explains why a picture is empty: a user who sees nothing of a scene needs to know where it is.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::frame::Frame;
 use crate::plan::{Facts, RenderOptions, culls_back};
 use crate::scene::{Camera, Cut, Fade, Scene, Surfel};
 
-/// The surfels of a scene in a view that shows none of them, by the reason.
+/// The surfels of a scene in a view that shows none of them, counted by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unseen {
     /// Behind the camera, or nearer than its near depth.
@@ -17,16 +17,17 @@ pub struct Unseen {
     pub outside: u64,
     /// In the image, but over no pixel's centre: too small, or seen edge-on.
     pub between: u64,
-    /// Facing away, where those that do are left out.
+    /// Facing away, in a view that culls those.
     pub away: u64,
-    /// Over pixels that they do not change: seen edge-on, transparent, or of the background's colour.
+    /// Over pixels, but without effect: seen edge-on, transparent, or of the background's colour.
     pub over: u64,
     /// Triangles, wherever they lie.
     pub triangles: u64,
 }
 
 impl Unseen {
-    /// Those of `scene` in the view of `camera`; of one that holds a part of a scene the surfels and nodes that it has in place of all.
+    /// Counts the surfels of `scene` in the view of `camera`. For a scene of which only a part is
+    /// loaded, counts the surfels and nodes that are loaded.
     pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
         if let (Some(_), Some(tree)) = (&scene.part_of, &scene.hierarchy) {
             let nodes = (0..tree.nodes.len() as u32).filter(|&index| tree.nodes[index as usize].count == 0);
@@ -57,7 +58,7 @@ impl Unseen {
         Self { behind, outside, between, away, over, triangles: scene.triangles.len() as u64 }
     }
 
-    /// One sentence for people.
+    /// A one-line warning for users.
     pub fn sentence(&self) -> String {
         let total = self.behind + self.outside + self.between + self.away + self.over;
         let reasons = [
@@ -71,13 +72,13 @@ impl Unseen {
         let given = reasons.into_iter().filter(|(surfels, _)| *surfels > 0);
         let parts: Vec<String> = given.map(|(surfels, where_)| format!("{} lie {where_}", count(surfels))).collect();
         let surfels = (total > 0).then(|| format!("of {total} surfels {}", parts.join(", ")));
-        let triangles = (self.triangles > 0).then(|| format!("none of {} triangles is before the camera and over a pixel's centre, or has another colour than the background", self.triangles));
+        let triangles = (self.triangles > 0).then(|| format!("none of {} triangles covers a pixel's centre in front of the camera in a colour other than the background's", self.triangles));
         let reasons: Vec<String> = surfels.into_iter().chain(triangles).collect();
         format!("warning: nothing shows: {}", reasons.join("; "))
     }
 }
 
-/// Whether `frame` shows nothing but the background, which may have been coded and decoded.
+/// Whether `frame` shows only the background, up to the rounding of encoding and decoding.
 pub fn is_empty(frame: &Frame, options: &RenderOptions) -> bool {
     let near = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-6 * b.abs();
     frame.color.par_iter().all(|color| color.iter().zip(&options.background).all(near))

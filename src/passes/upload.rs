@@ -1,4 +1,4 @@
-//! Stage 0: a [`Source`]'s surfels in device memory, in pages that fit a binding.
+//! Stage 0: uploads the surfels of a [`Source`] to the device, in pages that fit a binding.
 
 use std::ops::Range;
 
@@ -18,44 +18,44 @@ use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::hierarchy::Hierarchy;
 use crate::scene::{Mipmap, Surfel, Triangles};
 
-/// Buffers by their names in WGSL.
+/// Buffers with their names in WGSL.
 pub type Named = Vec<(&'static str, Buffer<u32>)>;
 
 /// The scene on a device.
 pub struct Uploaded {
     /// Consecutive surfels; kernels see one page at a time.
     pub pages: Vec<Page>,
-    /// The branches of the levels of detail, if a cut is drawn: then there are no pages yet.
+    /// The branches of the levels of detail, if a cut is drawn. There are no pages yet then.
     pub branches: Vec<BranchBuffers>,
-    /// What is there once: the table that decodes 8-bit sRGB, the texture.
+    /// Buffers that exist once: the table that decodes 8-bit sRGB, the textures and the triangles.
     pub shared: Named,
 }
 
-/// A branch of a tree.
+/// The buffers of one branch of a tree.
 pub struct BranchBuffers {
-    /// Its surfels and nodes, with their attributes as far as the render needs them.
+    /// The branch's surfels and nodes, with the attributes that the render needs.
     pub buffers: Named,
-    /// How many levels it has that one workgroup cannot judge.
+    /// The number of its levels that are too large for one workgroup.
     pub large_levels: u32,
-    /// How many nodes.
+    /// The number of nodes.
     pub nodes: u64,
-    /// Where in the attributes what is chosen starts, words.
+    /// The word of the buffer `attributes` at which the list of chosen surfels starts.
     pub chosen: u32,
-    /// How many roots.
+    /// The number of roots.
     pub roots: u64,
 }
 
 /// One page of a scene.
 pub struct Page {
-    /// Surfels, their attributes as far as the render needs them, the bounding balls of their batches.
+    /// Surfels, the attributes that the render needs, and the bounding balls of the batches.
     pub buffers: Named,
     /// The number of each surfel in the source.
     pub numbers: Vec<u32>,
-    /// Surfels that they stand for together.
+    /// The number of surfels that the page stands for, copies included.
     pub stand_for: u64,
 }
 
-/// Uploads what `source` has, as far as `needs` asks for it, in the order that draws well or as it is.
+/// Uploads the parts of `source` that `needs` asks for, reordered for drawing if `ordered`.
 pub fn upload(
     gpu: &Gpu,
     source: &dyn Source,
@@ -76,10 +76,11 @@ pub fn upload(
     Ok(Uploaded { pages, branches: Vec::new(), shared })
 }
 
-/// The branches of the levels of detail that `source` has.
+/// Uploads the branches of the levels of detail of `source`.
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
     let words = SurfelLayout::of(needs).words as usize;
-    // Of each that is chosen its number, and in how many cuts it is; before them how many there are.
+    // Words per chosen surfel: its number and, with fades, its fade. One word before them counts
+    // them.
     let of_chosen = if needs.fades { 2 } else { 1 };
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))).saturating_sub(1);
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
@@ -109,7 +110,8 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     branches::branches(tree, most).into_iter().map(of).collect()
 }
 
-/// The rows of a branch of `tree`, which are made as they are written: all of them at once take time to have room for.
+/// Uploads the rows of a branch of `tree`. They are made while they are written, because allocating
+/// all of them at once takes time.
 fn rows_of(gpu: &Gpu, tree: &Hierarchy, branch: &Branch) -> Result<Buffer<u32>> {
     let count = branch.nodes.len();
     let row = |index: usize| branch.row(tree, index);
@@ -131,10 +133,13 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
     Ok(Page { buffers, numbers, stand_for: of.stand_for() })
 }
 
-/// The names of what records are in.
+/// The names of the buffers that hold surfel records.
 const RECORDS: [&str; 2] = ["surfels", "attributes"];
 
-/// The surfels of a page that has so many, and their attributes, of `words` each, with room for so many words `behind` them; if there are some.
+/// Uploads `count` surfels of a page and their attributes, `words` each, with `behind` more words
+/// after them.
+///
+/// There is no attribute buffer if it would be empty.
 fn records_of(
     gpu: &Gpu,
     (of, count): (&dyn source::Page, usize),
@@ -146,7 +151,7 @@ fn records_of(
     let mut buffers = vec![surfels.words()];
     if words + behind > 0 {
         let attributes = Buffer::writable(gpu, "attributes", (count * words + behind) as u64)?;
-        // Of whole records, in which a range of words may start and end anywhere.
+        // The range of words may start and end within a record.
         let values = |range: Range<usize>| {
             let mut values = of.attributes(range.start / words..range.end.div_ceil(words));
             values.drain(..range.start % words);
@@ -159,7 +164,8 @@ fn records_of(
     Ok(buffers)
 }
 
-/// The table that decodes 8-bit sRGB, where it is needed, and the texture.
+/// Uploads the buffers that exist once: the sRGB table if it is needed, the textures and the
+/// triangles.
 pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Named> {
     let mut shared = Vec::new();
     let textured = needs.mesh.is_some_and(|mesh| mesh.textured);
@@ -179,8 +185,10 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
     Ok(shared)
 }
 
-/// The buffers of triangles: what they are, and room for their corners and for the large and the rare ones. Before their textures are so many
-/// others.
+/// The buffers of triangles: vertices, corners and attributes, and space for projected corners and
+/// for the queues of large and rare triangles.
+///
+/// `textures` is the number of textures that precede theirs.
 fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u32) -> Result<Named> {
     let (vertices, corners) = (triangles.vertices(), triangles.corners());
     let queue = corners.len() as u64 + u64::from(QUEUE_START);
@@ -198,7 +206,7 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u3
     ])
 }
 
-/// A buffer that is `what`, of `words`.
+/// Creates a buffer named `what` that holds `words`.
 fn filled(gpu: &Gpu, what: &str, words: &[u32]) -> Result<Buffer<u32>> {
     let buffer = Buffer::writable(gpu, what, words.len() as u64)?;
     buffer.write(gpu, words.len(), |range| words[range].into(), &())?;

@@ -1,38 +1,43 @@
-//! Stage 2 of what is [`sorted`](super::sorted): where each pixel's list of fragments may end.
+//! Stage 2 of [`sorted`](super::sorted): where each pixel's list of fragments may end.
 //!
-//! Of a far cloud thousands of fragments may lie at a pixel, more than a device sorts or a buffer holds, though the nearest ones hide the
-//! others. So in a view in which lists turn out to be too long, the visibility pass adds up, in [`VEILS`] steps of depth, what the
-//! fragments hold back, `-ln(1 - alpha)`, and the list ends with the first step up to which the sum H is at least
-//! `ln(1 / s) + MARGIN`, s being the transmittance below which nothing more is composited
+//! For a far cloud thousands of fragments may lie at a pixel, more than a device sorts or a buffer
+//! holds, though the nearest ones hide the others. So in a view whose lists turn out to be too
+//! long, the visibility pass sums the fragments' optical depths, `-ln(1 - alpha)`, in [`VEILS`]
+//! steps of depth. The list ends with the first step up to which the sum H is at least
+//! `ln(1 / s) + MARGIN`, where s is the transmittance below which nothing more is composited
 //! ([`Rules::least_shown`](super::sorted::Rules)).
 //!
-//! **No bit of the image changes.** What is listed is a front part of all fragments in the order of depths, as steps do not overlap: depths
-//! are the same numbers in both kernels, as everywhere. Each term is of a fragment that is surely listed, is rounded down, and ends at that of
-//! an alpha of 0.999; a sum that wraps is smaller too. So what is let through behind the last one is at most `exp(-H) <= s exp(-MARGIN)`, but
-//! for two errors: an alpha that one kernel rounds by 2e-6 of itself changes its term by no more than 3e-4 of that, which is 0.006 of an H of
-//! 21, and the product of n factors in f32 errs by `2 n u`, u = 2^-24, which is 0.012 of n = 100,000. Both stay below MARGIN, so compositing
-//! stops within the list as it would in the whole one.
+//! **No bit of the image changes.** As steps do not overlap, the listed fragments are the front
+//! part of all fragments in depth order; depths are the same numbers in both kernels, as
+//! everywhere. Each term comes from a fragment that is surely listed, is rounded down, and is at
+//! most that of an alpha of 0.999; a sum that wraps is smaller too. So the transmittance behind the
+//! last listed fragment is at most `exp(-H) <= s exp(-MARGIN)`, but for two errors. An alpha that
+//! one kernel rounds by 2e-6 of itself changes its term by no more than 3e-4 of that, which is
+//! 0.006 for H = 21. The product of n factors in f32 errs by `2 n u`, u = 2^-24, which is 0.012 for
+//! n = 100,000. Together they stay below MARGIN, so compositing stops within the list as it would
+//! in the whole one.
 //!
-//! Views that need no veils have none, unless one of the same size before them did: on a software adapter they take 1.1 to 1.2 times as long.
+//! Views that need no veils have none, unless an earlier view of the same size did: on a software
+//! adapter they take 1.1 to 1.2 times as long.
 
 use super::sorted::Rules;
 use crate::plan::Plan;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
 
-/// Steps of depth.
+/// The number of steps of depth.
 pub const VEILS: u32 = 16;
 
-/// Words of a pixel.
+/// Words per pixel: the count and the optical depth of each step.
 pub const VEIL_WORDS: u32 = 2 * VEILS;
 
-/// Units of an optical depth of 1.
+/// Units per optical depth of 1.
 const UNITS: f64 = 1024.0;
 
-/// See above.
+/// The margin on the optical depth for rounding; see the module's proof.
 const MARGIN: f64 = 0.02;
 
-/// The kernels, files and constants.
+/// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "veils",
     files: |needs| if needs.veils { vec!["fragments_veils.wgsl"] } else { Vec::new() },
@@ -40,7 +45,8 @@ pub const PASS: Pass = Pass {
     constants: |making| {
         let rules = Rules::of(making.options);
         let enough = ((1.0 / rules.least_shown).ln() + MARGIN) * UNITS;
-        // A hair below what is listed: of a fragment that two kernels round to either side none is without a place.
+        // Two kernels may round a fragment's alpha to either side of the limit. Slightly fainter
+        // ones are counted too, so that each listed fragment has a place.
         vec![
             ("LEAST_COUNTED", rules.least_alpha * (1.0 - 1e-4)),
             ("LEAST_HELD", rules.least_alpha * (1.0 + 1e-4)),
@@ -51,13 +57,13 @@ pub const PASS: Pass = Pass {
 
 const END: Kernel = Kernel::new("end_lists");
 
-/// What is cleared before fragments are counted.
+/// The clear before fragments are counted.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = u64::from(VEIL_WORDS) * plan.bands[band].pixels;
     plan.needs.veils.then(|| Clear::of("veils", 0, words))
 }
 
-/// Where lists end, after fragments were counted.
+/// The stage that finds where lists end, after fragments were counted.
 pub fn steps(plan: &Plan, band: usize) -> Option<Stage> {
     let run = Run { kernel: END, over: Over::Pixels };
     plan.needs.veils.then(|| Stage::new("visibility", band, vec![run]))

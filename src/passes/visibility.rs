@@ -1,10 +1,12 @@
-//! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000, section 5.3, first
-//! pass; there the tolerance is added to the depths, here to the comparison, which is exact).
+//! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000,
+//! section 5.3, first pass). The paper adds the tolerance to the depths; here it enters the
+//! comparison, which is exact.
 //!
-//! On the device depths are positive f32, whose bits order as u32: an atomic min. They are kept as what they lack to +inf, so
-//! that it is an atomic max over a buffer of zeros. What is then farthest in each tile of
-//! pixels lets the next pass leave out splats that are hidden altogether. Where surfels have sides and both may be seen, the last bit of
-//! a depth says on which it is (side.wgsl).
+//! On the device depths are positive f32, whose bits order as u32, so an atomic minimum works. They
+//! are stored as `bits(+inf) - bits(depth)`, which makes it an atomic maximum over a buffer of
+//! zeros. The farthest of the nearest depths in each tile of pixels then lets the next pass skip
+//! splats that are hidden completely. Where surfels have sides and both may be seen, the last bit
+//! of a depth tells the side (side.wgsl).
 
 use super::footprint::footprint;
 use super::splat::Splat;
@@ -15,33 +17,34 @@ use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Band, Optimisation, Plan};
 use crate::scene::{Camera, LowPass};
 
-/// What is nearest at a pixel.
+/// The nearest fragment of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
-    /// Camera-space z, world units; +inf where nothing is.
+    /// Camera-space z, world units; +inf in an empty pixel.
     pub depth: f64,
-    /// It is the back of a surface that has sides ([`Splat::shows_back`]); of a front and a back at one depth the front is nearest.
+    /// Whether it shows the back of a two-sided surface ([`Splat::shows_back`]). If a front and a
+    /// back have the same depth, the front is nearest.
     pub back: bool,
 }
 
 impl Nearest {
-    /// Nothing is.
+    /// An empty pixel.
     pub const NOTHING: Self = Self { depth: f64::INFINITY, back: false };
 
-    /// With a fragment.
+    /// The nearest of this and another fragment.
     pub fn with(self, depth: f64, back: bool) -> Self {
         let nearer = depth < self.depth || (depth == self.depth && !back);
         if nearer { Self { depth, back } } else { self }
     }
 
-    /// Whether a fragment at `depth`, of a `back` or not, belongs to this surface: it lies no farther than the tolerance `behind` and
-    /// shows the same side.
+    /// Whether a fragment belongs to this surface: its depth is at most the tolerance `behind`, and
+    /// it shows the same side.
     pub fn shows(self, depth: f64, back: bool, behind: f64) -> bool {
         depth <= behind && back == self.back
     }
 }
 
-/// The twin: what is nearest in the rows `first_row..first_row + rows`.
+/// The f64 twin: the nearest fragments in the rows `first_row..first_row + rows`.
 pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat>,
     camera: &Camera,
@@ -78,7 +81,7 @@ pub const PASS: Pass = Pass {
         (Some(_), _) => Vec::new(),
     },
     constants: |making| {
-        // Of what shows through nothing is hidden.
+        // Fragments that are all summed (order-independent transparency) do not hide each other.
         let hides = making.options.has(Optimisation::Hiding) && making.needs.oit.is_none();
         vec![("HIDES", u32::from(hides).into())]
     },
@@ -89,12 +92,13 @@ const VISIBILITY_LARGE: Kernel = Kernel::of("visibility_large", [TILE, TILE, 1])
 const OCCLUDE: Kernel = Kernel::new("occlude");
 const OCCLUDE_OPEN: Kernel = Kernel::new("occlude_open");
 
-/// Words of the buffer of nearest depths: one a pixel, one a tile (occlusion.wgsl), then the covered tiles.
+/// Words of the buffer of nearest depths: one per pixel, one per tile (occlusion.wgsl), then the
+/// list of covered tiles.
 pub fn nearest_words(band: &Band) -> u64 {
     band.pixels + band.tiles + covered::words(band)
 }
 
-/// The pass of `part` of the small splats.
+/// The stage that draws `part` of the small splats.
 pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Slots(part) }]);
     match part {
@@ -107,12 +111,15 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     }
 }
 
-/// The pass of the large splats, a workgroup each.
+/// The stage that draws the large splats, one workgroup each.
 pub fn large(band: usize) -> Stage {
     Stage::new("visibility", band, vec![Run { kernel: VISIBILITY_LARGE, over: Over::Large }])
 }
 
-/// The farthest of the nearest depths in each tile; after [`Part::Near`], what is empty hides nothing.
+/// The stage that stores the farthest of the nearest depths in each tile.
+///
+/// After [`Part::Near`], a tile with an empty pixel hides nothing, since far splats may still fill
+/// that pixel.
 pub fn occlude(band: usize, part: Part) -> Stage {
     let kernel = if part == Part::Near { OCCLUDE_OPEN } else { OCCLUDE };
     Stage::new("visibility", band, vec![Run { kernel, over: Over::Occlusion }])

@@ -1,11 +1,12 @@
-//! Stages 2 and 3 where the nearest fragment alone shows, as with a depth test (Schuetz and Wimmer 2015, section III): nothing is blended,
-//! so there is no epsilon, no weight and nothing to sum.
+//! Stages 2 and 3 where only the nearest fragment shows, as with a depth test (Schuetz and Wimmer
+//! 2015, section III). Nothing is blended, so there is no epsilon, no weight and nothing to sum.
 //!
-//! A pixel shows the least (depth, colour): of fragments at one depth that of the greatest colour, as a word of four bytes, so the order
-//! of the surfels shows nowhere. With 64-bit atomics both are one number and the visibility pass is the only one over the fragments; else
-//! a second pass keeps the colours of those at the nearest depth, which makes the same bits. Finer
-//! colours are rounded to such words. Where all surfels have one colour, the
-//! nearest depth is all there is.
+//! A pixel shows the smallest (depth, colour): among fragments at one depth the one whose colour,
+//! as a word of four bytes, is greatest. So the image does not depend on the order of the surfels.
+//! With 64-bit atomics both are one number, and the visibility pass is the only one over the
+//! fragments. Otherwise a second pass stores the colours of the fragments at the nearest depth,
+//! which gives the same bits. Finer colours are rounded to such words. If all surfels have one
+//! colour, the nearest depth is all that is needed.
 
 use super::accumulate::{PixelSums, decision};
 use super::footprint::footprint;
@@ -16,11 +17,11 @@ use crate::plan::{Oit, Plan, RenderOptions, Winner};
 use crate::scene::color::{decoded, srgb8};
 use crate::scene::{Camera, Colors, Scene};
 
-/// The files.
+/// The pass's files.
 pub const PASS: Pass = Pass {
     name: "winner",
     files: |needs| match needs.winner {
-        // Moments and lists keep something else.
+        // Moments and lists store something else in place of nearest depths.
         None if needs.oit == Some(Oit::Moments) || needs.lists.is_some() => Vec::new(),
         None if needs.raster.is_none() => vec!["nearest_depth.wgsl"],
         None => Vec::new(),
@@ -35,22 +36,23 @@ pub const PASS: Pass = Pass {
     constants: |_| Vec::new(),
 };
 
-/// What is cleared before the visibility pass, where it keeps colours.
+/// The clear before the visibility pass, if that pass stores colours.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = plan.bands[band].pixels * u64::from(plan.sum_words);
     (plan.needs.winner == Some(Winner::Once)).then(|| Clear::of("sums", 0, words))
 }
 
-/// What wins a pixel.
+/// The fragment that wins a pixel.
 #[derive(Clone, Copy)]
 struct Best {
     depth: f64,
-    /// The bytes of the colour.
+    /// The bytes of the colour as a little-endian word.
     word: u32,
     surfel: usize,
 }
 
-/// The twin, over `rows` rows from `first_row` on: sums of the one fragment that each pixel shows.
+/// The f64 twin, over `rows` rows from `first_row` on: the sums of the one fragment that each pixel
+/// shows.
 pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat> + Clone,
     scene: &Scene,
@@ -59,7 +61,7 @@ pub fn reference<'a>(
     (first_row, rows): (u32, u32),
 ) -> Vec<PixelSums> {
     let (low, high) = scene.color_range();
-    // Finer ones are rounded, unless one is for all (src/plan/check.rs).
+    // Finer colours are rounded, unless all surfels share one (src/plan/check.rs).
     let code = |surfel: usize| match &scene.colors {
         Colors::Srgb8(codes) => Some(codes[surfel]),
         Colors::Linear(colors) if low != high => Some(srgb8(colors[surfel])),
@@ -89,7 +91,7 @@ pub fn reference<'a>(
     let mut sums = vec![PixelSums::ZERO; best.len()];
     fragments(&mut |pixel, splat, at| {
         let behind = match best[pixel] {
-            // The winner itself is decided by its rim alone.
+            // Whether the winner itself is accepted depends only on its rim and the near depth.
             Some(best) if best.surfel != splat.surfel as usize => best.depth,
             _ => f64::INFINITY,
         };

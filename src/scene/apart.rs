@@ -1,7 +1,9 @@
-//! What the default view shows: the body of a scene without the few points that lie apart from it.
+//! The box that the default view shows: the body of a scene without small groups of points far from
+//! the rest.
 //!
-//! The body leaves out what is so far away that nothing else would show. A bird or a reflection at two extents of a scan spoils no
-//! coordinate, but shrinks the rest to a third of the picture.
+//! The body leaves out points so far away that nothing else would be visible. Nearer strays matter
+//! too: a bird or a reflection at twice the extent of a scan does no harm to coordinates, but
+//! shrinks the rest to a third of the picture.
 
 use std::collections::HashMap;
 
@@ -10,17 +12,18 @@ use glam::{DVec3, IVec3};
 use super::Bounds;
 use super::body::Places;
 
-/// Two groups of points are one if they are nearer to each other than this part of the core's longest edge; farther than twice that,
-/// they are apart.
+/// Groups closer to each other than this fraction of the core's longest edge are one group; groups
+/// farther than twice that are separate.
 const APART: f64 = 0.125;
 
-/// A group apart is left out if it has at most this many points,
+/// A separate group is left out if it has at most this many points,
 const FEW: u64 = 16;
 
-/// and at most one in so many of all.
+/// and at most one in so many of all points.
 const SHARE: u64 = 1000;
 
-/// Of points in one cell of the grid: how many, their box, and whether a disk of them is as large as a cell.
+/// The points in one cell of the grid: their number, their box, and whether a disk among them has
+/// at least the cell's edge as radius.
 #[derive(Clone, Copy)]
 struct Cell {
     count: u64,
@@ -38,8 +41,13 @@ impl Cell {
     }
 }
 
-/// The box of those points in `body` that are not apart, and how many are: a group of at most [`FEW`] different points,
-/// and one in [`SHARE`] of all, that lies apart from `core` and from all others, and whose disks do not bridge that. It depends on the set of points alone.
+/// The box of the points in `body` without separate small groups, and the number of points left
+/// out.
+///
+/// A group is left out if it has at most [`FEW`] points and at most one in [`SHARE`] of all, or if
+/// all its points are at one position; if it is separate from `core` and from all other groups; and
+/// if none of its disks has a cell's edge or more as radius, which could bridge the gap. The result
+/// depends on the set of points alone.
 pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Places) -> (Bounds, u64) {
     let edge = APART * core.extent().max_element();
     let near = Bounds { min: core.min - 2.0 * edge, max: core.max + 2.0 * edge };
@@ -48,7 +56,7 @@ pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Plac
     if count < SHARE || holds(&near, body.min) && holds(&near, body.max) {
         return (*body, 0);
     }
-    // What is near the core is of it; the grid is of what is beyond.
+    // Points near the core need no cell: the grid has only those beyond.
     let grid = |p: DVec3| ((p - core.min) / edge).floor().as_ivec3();
     type Beyond = (Bounds, HashMap<IVec3, Cell>);
     let add = |(mut inside, mut cells): Beyond, p: DVec3, radius: f64| {
@@ -72,7 +80,7 @@ pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Plac
     let mut apart = 0;
     while let Some(&first) = cells.keys().next() {
         let group = taken(&mut cells, first);
-        // A gap of less than a cell to the core's surroundings is none.
+        // A group less than a cell away from the core's surroundings belongs to the core.
         let touches = group.bounds.min.cmple(near.max + edge).all() && group.bounds.max.cmpge(near.min - edge).all();
         let few = group.count <= FEW.min(count / SHARE) || group.bounds.extent() == DVec3::ZERO;
         if few && !touches && !group.large {
@@ -84,7 +92,8 @@ pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Plac
     (bounds, apart)
 }
 
-/// Takes the cells that hang together with `first`: each borders on another of them.
+/// Removes `first` and all cells connected to it, across faces, edges or corners, and returns their
+/// union.
 fn taken(cells: &mut HashMap<IVec3, Cell>, first: IVec3) -> Cell {
     let mut group = Cell { count: 0, bounds: Bounds::EMPTY, large: false };
     let mut places = vec![first];

@@ -1,25 +1,30 @@
-//! Several textures side by side in one plane of coordinates, so that surfels of all of them are blended alike.
+//! A common plane for several textures, so that surfels of all of them are blended alike.
 
-/// Free coordinates at each side of a texture in the plane: what its surfels show past its edges is its own, and what surfels of two textures
-/// blend to lies far enough from both that no mean passes for a place in either.
+/// The margin around the coordinates of each texture in the plane. Surfels that reach past an edge
+/// still show their own texture, and the mean of coordinates in two textures is far enough from
+/// both to be recognised as invalid.
 const BESIDE: f32 = 1.0;
 
-/// Where textures lie in a plane of coordinates: in cells of a square grid, which hold the coordinates of each as they are, but for a whole
-/// number of turns. Points that no texture paints have the cells after those of the textures.
+/// The layout of several textures in one plane of coordinates: the cells of a square grid.
 ///
-/// The places of two textures are so as far apart as those on two sides of a seam, and a pixel at which both meet is seen as one at a seam
-/// ([`Textured`](super::Textured)). The plane is as wide as the square root of the textures' number, which costs digits of the sums; and as the
-/// least reach there is a part of its width, seams within a texture are told the less sharply the more textures there are: of one between places
-/// that are 0.016 of it apart, of four between those 0.06, of sixteen 0.16.
+/// A cell holds the coordinates of one texture, translated by a whole number of repeats. Points
+/// without a texture have the cells after those of the textures.
+///
+/// The coordinates of two textures are thus as far apart as those on two sides of a seam, and a
+/// pixel where both meet is treated as one at a seam ([`Textured`](super::Textured)). The width of
+/// the plane grows with the square root of the number of textures, which costs digits of the sums.
+/// The smallest reach is a fraction of that width, so seams within a texture are detected less
+/// precisely the more textures there are: between places 0.016 apart for one texture, 0.06 for
+/// four, 0.16 for sixteen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Atlas {
     /// Whole numbers below every u and every v.
     pub corner: [f32; 2],
     /// The side of a cell, a whole number.
     pub cell: f32,
-    /// Cells in a row.
+    /// The number of cells in a row.
     pub columns: u32,
-    /// How many textures there are.
+    /// The number of textures.
     pub textures: u32,
 }
 
@@ -30,10 +35,11 @@ impl Default for Atlas {
 }
 
 impl Atlas {
-    /// Of one texture, whose coordinates stay what they are.
+    /// The layout of a single texture, whose coordinates are unchanged.
     pub const ONE: Self = Self { corner: [0.0; 2], cell: 1.0, columns: 1, textures: 1 };
 
-    /// That of `textures`, of which points have these numbers and finite coordinates; a number past them means none.
+    /// The layout of `textures` for points with these texture numbers and finite coordinates. A
+    /// number of `textures` or more means no texture.
     pub fn of(textures: u32, points: impl Iterator<Item = (u32, [f32; 2])> + Clone) -> Self {
         let bare = points.clone().any(|(number, _)| number >= textures);
         if textures == 1 && !bare {
@@ -51,20 +57,21 @@ impl Atlas {
         Self { corner: [left - BESIDE, bottom - BESIDE], cell, columns, textures }
     }
 
-    /// Where the coordinates of a texture lie in the plane.
+    /// The coordinates in the plane of `place` in texture `number`.
     pub fn joint(&self, number: u32, place: [f32; 2]) -> [f32; 2] {
         let number = number.min(self.textures);
         let cell = [number % self.columns, number / self.columns].map(f64::from);
         self.moved(place.map(f64::from), cell, 1.0).map(|turns| turns as f32)
     }
 
-    /// The number of the texture whose cell a place of the plane lies in; one past the textures' means none.
+    /// The number of the texture whose cell contains `place`; at least [`Self::textures`] for a
+    /// cell without one.
     pub fn number(&self, place: [f64; 2]) -> u32 {
         let [column, row] = self.cell_of(place).map(|cell| cell as u32);
         row * self.columns + column
     }
 
-    /// The coordinates in the texture of a place of the plane.
+    /// The coordinates within its texture of `place` in the plane.
     pub fn own(&self, place: [f64; 2]) -> [f64; 2] {
         self.moved(place, self.cell_of(place), -1.0)
     }
@@ -73,7 +80,8 @@ impl Atlas {
         [0, 1].map(|k| place[k] + sign * cell[k] * f64::from(self.cell))
     }
 
-    /// The twin of `cell_of` in `wgsl/texture.wgsl`.
+    /// The column and row of the cell that contains `place`. The twin of `cell_of` in
+    /// `wgsl/texture.wgsl`.
     fn cell_of(&self, place: [f64; 2]) -> [f64; 2] {
         let last = f64::from(self.columns - 1);
         [0, 1].map(|k| ((place[k] - f64::from(self.corner[k])) / f64::from(self.cell)).floor().clamp(0.0, last))
@@ -97,7 +105,7 @@ mod tests {
                 assert_eq!(atlas.number(exact), number.min(textures));
                 let [u, v] = atlas.own(exact).map(|turns| turns as f32);
                 assert!((u - place[0]).abs() < 1e-5 && (v - place[1]).abs() < 1e-5, "{number}: {u} {v}");
-                // Past its edges it is still its own.
+                // Past its edges it is still its own texture.
                 for (du, dv) in [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)] {
                     assert_eq!(atlas.number([exact[0] + du, exact[1] + dv]), number.min(textures));
                 }

@@ -1,7 +1,8 @@
-//! The body of a scene: the box of its points without those few that stray far from all others.
+//! The body of a scene: the box of its points without the few strays that lie far from all others.
 //!
-//! A coordinate of zero where a scanner saw nothing lies a thousand kilometres from a scene in map coordinates. Where such a
-//! point counted, f32 coordinates would be relative to the middle of the two, and the default view would show neither.
+//! A scanner that saw nothing may write a coordinate of zero, which in map coordinates lies a
+//! thousand kilometres from the scene. If such a point counted, f32 coordinates would be relative
+//! to the middle of the two, and the default view would show neither.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -10,27 +11,30 @@ use super::Bounds;
 use super::apart::without_apart;
 use crate::random;
 
-/// Positions that are looked at for the core, about.
+/// The approximate number of positions in the sample that determines the core.
 const SAMPLED: usize = 1 << 13;
 
-/// One in so many of them may lie beyond each side of the core.
+/// One in so many sampled positions may lie beyond each side of the core.
 const CUT: usize = 64;
 
-/// Of fewer positions none strays.
+/// With fewer positions than this, none is a stray.
 const FEWEST: usize = 16;
 
-/// A position strays if it lies farther past a side of the core than so many times the core's longest edge.
+/// A position is a stray if it lies farther past a side of the core than this many times the core's
+/// longest edge.
 const FAR: f64 = 16.0;
 
-/// The narrowest scene, world units, whose half-axes and depths have products that an f32 holds to the last digit.
+/// The narrowest scene, world units: products of its half-axes and depths keep all digits of an
+/// f32, as they are not subnormal.
 pub(crate) const SMALLEST_SCENE: f64 = 1e-15;
 
-/// Positions with the radii of what is there, wherever these are kept.
+/// Positions with a radius each, in memory or elsewhere.
 pub(crate) trait Places: Sync {
-    /// How many there are.
+    /// The number of positions.
     fn count(&self) -> usize;
 
-    /// Adds all to `nothing`, in parts that are joined, in any order.
+    /// Folds all positions and radii in parallel: `add` starts from `nothing`, `join` merges two
+    /// partial results, in any order.
     fn fold<T: Send>(
         &self,
         nothing: impl Fn() -> T + Sync + Send,
@@ -39,7 +43,7 @@ pub(crate) trait Places: Sync {
     ) -> T;
 }
 
-/// So many places in memory, by number.
+/// The positions and radii of the indices below a count, by a function of the index.
 pub(crate) struct Listed<F>(pub usize, pub F);
 
 impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
@@ -61,41 +65,44 @@ impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
     }
 }
 
-/// The box of `count` positions without those that stray, and how many do. It depends on the set of positions alone, on no order:
-/// the core, which holds all but one in 64 beyond each side, is that of a sample chosen by the coordinates' own bits. Positions
-/// that are not finite are in no box.
+/// The body of `count` positions, and the number of strays outside it.
+///
+/// The result depends on the set of positions alone, not on their order: the core, which holds all
+/// but one in 64 beyond each side, is that of a sample chosen by a hash of the coordinates.
+/// Positions that are not finite are in no box.
 pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (Bounds, u64) {
     body_of(&Listed(count, |index| (position(index), 0.0)))
 }
 
-/// The same of places.
+/// As [`body`], for [`Places`].
 fn body_of(places: &impl Places) -> (Bounds, u64) {
     let (core, all) = core_and_box(places);
     body_within(core, all, places)
 }
 
-/// The same, where the core, and the box of all places, are known.
+/// As [`body`], where `core` and `all`, the box of all positions, are known.
 pub(crate) fn body_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, u64) {
     let Some(core) = core else { return (all, 0) };
     let far = FAR * core.extent().max_element();
     let (low, high) = (core.min - far, core.max + far);
     let holds = |p: DVec3| p.cmpge(low).all() && p.cmple(high).all();
-    // Nearly all at one place is no core to go by.
+    // If nearly all positions coincide, the core has no size to measure distances by.
     if far < FAR * SMALLEST_SCENE || all.is_empty() || holds(all.min) && holds(all.max) {
         return (all, 0);
     }
     box_of(places, holds)
 }
 
-/// The box of what the default view shows of places, each with its radius, and how many are not in it: those that stray
-/// from the body, and those few that lie [apart](super::apart) from it.
+/// The box that the default view shows, and the number of positions outside it: strays, and small
+/// groups that lie [apart](super::apart) from the body.
 pub(crate) fn framed(places: &impl Places) -> (Bounds, u64) {
     let (core, all) = core_and_box(places);
     let (_, framed, left_out) = framed_within(core, all, places);
     (framed, left_out)
 }
 
-/// The body, the box of what the default view shows, and how many are not in that, where the core, and the box of all places, are known.
+/// The body, the box that the default view shows, and the number of positions outside that box,
+/// where `core` and `all`, the box of all positions, are known.
 pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, Bounds, u64) {
     let (body, strays) = body_within(core, all, places);
     let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
@@ -105,7 +112,7 @@ pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Pla
     (body, bounds, strays + apart)
 }
 
-/// The box of the finite positions that are wanted, and how many are not.
+/// The box of the finite positions that are `wanted`, and the number of the others.
 fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) -> (Bounds, u64) {
     let add = |(bounds, others): (Bounds, u64), p: DVec3, _| {
         let unwanted = p.is_finite() && !wanted(p);
@@ -114,7 +121,9 @@ fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) ->
     places.fold(|| (Bounds::EMPTY, 0), add, |a, b| (a.0.union(b.0), a.1 + b.1))
 }
 
-/// The box between the quantiles of the sampled positions, axis by axis, none if there are too few; and that of all.
+/// The core, or None if there are too few positions, and the box of all positions.
+///
+/// The core is the box between the quantiles of the sampled positions, axis by axis.
 pub(crate) fn core_and_box(places: &impl Places) -> (Option<Bounds>, Bounds) {
     let add = |(mut sample, all): (Sample, Bounds), p: DVec3, _| {
         sample.add(p);
@@ -125,7 +134,8 @@ pub(crate) fn core_and_box(places: &impl Places) -> (Option<Bounds>, Bounds) {
     (sample.core(), all)
 }
 
-/// Positions that are looked at for the core: which of so many depends on the coordinates' own bits.
+/// A sample of the positions, chosen by a hash of their coordinates, so that it does not depend on
+/// their order.
 #[derive(Clone)]
 pub(crate) struct Sample {
     most: u64,
@@ -133,24 +143,25 @@ pub(crate) struct Sample {
 }
 
 impl Sample {
-    /// Of `count` positions, none yet.
+    /// An empty sample of `count` positions.
     pub fn of(count: usize) -> Self {
         let share = SAMPLED as f64 / count.max(1) as f64;
         let most = if share < 1.0 { (share * 2f64.powi(64)) as u64 } else { u64::MAX };
         Self { most, chosen: Vec::new() }
     }
 
-    /// Looks at a position, if it is one of those.
+    /// Adds a position if its hash selects it.
     pub fn add(&mut self, p: DVec3) {
         if p.is_finite() && hash(p) <= self.most {
             self.chosen.push(p);
         }
     }
 
-    /// Those of two parts.
+    /// The union of the samples of two parts.
     pub fn both(mut self, mut other: Self) -> Self {
         self.chosen.append(&mut other.chosen);
-        // What a scanner writes for nothing may be there a million times; it is one position.
+        // The point that a scanner writes for nothing may occur a million times; removing
+        // duplicates bounds the memory.
         if self.chosen.len() > 4 * SAMPLED {
             self.sort();
         }
@@ -163,7 +174,8 @@ impl Sample {
         self.chosen.dedup_by_key(|p| bits(p));
     }
 
-    /// The box between their quantiles, axis by axis; none if there are too few.
+    /// The box between the quantiles, axis by axis; None if there are fewer than [`FEWEST`]
+    /// different positions.
     pub fn core(mut self) -> Option<Bounds> {
         self.sort();
         let sample = self.chosen;
@@ -181,7 +193,7 @@ impl Sample {
     }
 }
 
-/// Spreads the bits of the coordinates over a word (the finaliser of SplitMix64 for each).
+/// Hashes the coordinates' bits to 64 bits (the finaliser of SplitMix64 for each).
 fn hash(p: DVec3) -> u64 {
     p.to_array().into_iter().fold(0, |mixed, x| random::mixed((mixed ^ (x + 0.0).to_bits()).wrapping_add(random::STEP)))
 }
@@ -190,7 +202,7 @@ fn hash(p: DVec3) -> u64 {
 mod tests {
     use super::*;
 
-    /// Points of a ball of radius 5 at UTM coordinates.
+    /// Points on a sphere of radius 5 at UTM coordinates.
     fn ball(count: usize) -> Vec<DVec3> {
         (0..count)
             .map(|k| {
@@ -212,7 +224,7 @@ mod tests {
             assert_eq!(none, 0);
             let mut points = clean;
             points.extend([DVec3::ZERO, DVec3::splat(1e12)]);
-            // As often as a scanner writes nothing.
+            // One in ten points is the zero that a scanner writes where it saw nothing.
             points.extend(vec![DVec3::ZERO; count / 10]);
             points.push(DVec3::NAN);
             assert_eq!(of(&points), (alone, 2 + count as u64 / 10), "{count}");

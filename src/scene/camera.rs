@@ -1,11 +1,11 @@
-//! The camera: intrinsics in pixels, a rigid pose in world units, and the view chosen when nobody chose one.
+//! The camera: intrinsics in pixels and a rigid pose in world units.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{Samples, Scene, Up};
 use crate::error::{Error, Result};
 
-/// How camera space becomes pixels.
+/// The mapping from camera space to pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Projection {
     /// `x = fx X/Z + cx`: focal lengths in pixels.
@@ -14,8 +14,10 @@ pub enum Projection {
     Orthographic,
 }
 
-/// A camera. Camera space is x right, y down, z forward; pixel (i, j) has its centre at (i + 0.5, j + 0.5), origin top
-/// left; depth is camera-space z.
+/// A camera with intrinsics and pose.
+///
+/// Camera space is x right, y down, z forward. Pixel (i, j) has its centre at (i + 0.5, j + 0.5),
+/// origin top left. Depth is camera-space z.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Pinhole or orthographic.
@@ -34,38 +36,41 @@ pub struct Camera {
     pub cy: f64,
     /// Position in world coordinates.
     pub eye: DVec3,
-    /// World to camera: the rows are the directions right, down and forward.
+    /// Rotation from world to camera axes: its rows are the directions right, down and forward.
     pub rotation: DMat3,
-    /// Smallest depth that is drawn, world units, positive.
+    /// The smallest visible depth, world units, positive.
     pub near: f64,
 }
 
-/// The largest image side: bounds of splats are stored in 16 bits.
+/// The largest image width or height: bounds of splats are stored in 16 bits.
 pub const MAX_SIDE: u32 = 32_768;
 
-/// The vertical field of view when none is given, degrees.
+/// The default vertical field of view, degrees.
 pub const DEFAULT_FOV: f64 = 45.0;
 
-/// Image size and intrinsics before a pose is known.
+/// The intrinsics of a camera before its pose and image size are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
     /// Vertical field of view in degrees, principal point in the centre.
     Fov(f64),
     /// `[fx, fy, cx, cy]` in pixels.
     Intrinsics([f64; 4]),
-    /// Orthographic: world units from the image's top to its bottom.
+    /// Orthographic: the height of the image in world units.
     OrthographicHeight(f64),
-    /// Orthographic `[fx, fy, cx, cy]`: pixels per world unit and pixels.
+    /// Orthographic `[fx, fy, cx, cy]`: pixels per world unit, and pixels.
     OrthographicScale([f64; 4]),
 }
 
 impl Lens {
-    /// The projection, and focal lengths (pinhole: pixels; orthographic: pixels per world unit) and principal point, pixels, of
-    /// images of `width` x `height`.
+    /// The projection and `[fx, fy, cx, cy]` for images of `width` x `height`.
+    ///
+    /// Focal lengths are in pixels (pinhole) or pixels per world unit (orthographic), the principal
+    /// point in pixels.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for a lens whose numbers the device cannot hold, or that is none.
+    /// [`Error::Usage`] for a field of view outside 0 to 180 degrees, or numbers beyond the
+    /// device's range.
     pub fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
         let (w, h) = (f64::from(width), f64::from(height));
         let (projection, values) = match self {
@@ -102,16 +107,19 @@ impl Lens {
     }
 }
 
-/// The most pixels of an image. On the way to a file each takes up to 48 bytes of host memory, and 24 more for every map.
+/// The most pixels in an image. Each takes up to 48 bytes of host memory on the way to a file, plus
+/// 24 for every map.
 pub const MAX_PIXELS: u64 = 1 << 27;
 
-/// The largest coordinate, scale or depth of a camera, and the inverse of the smallest: the device computes in f32.
+/// The largest coordinate, scale or depth of a camera, and the inverse of the smallest, as the
+/// device computes in f32.
 const LARGEST: f64 = 1e18;
 
-/// How far from the origin a camera may stand: a narrow lens sees a whole scene of the largest coordinates.
+/// The largest distance of a camera from the origin: from there a narrow lens sees a whole scene of
+/// the largest coordinates.
 const FARTHEST: f64 = 1e28;
 
-/// Rejects image sizes that no backend can hold.
+/// Rejects image sizes that no backend supports.
 pub fn check_size(width: u32, height: u32) -> Result<()> {
     if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
         return Err(Error::Usage(format!("an image is 1 to {MAX_SIDE} pixels wide and high, {width}x{height} is not")));
@@ -122,7 +130,7 @@ pub fn check_size(width: u32, height: u32) -> Result<()> {
     Ok(())
 }
 
-/// Rejects near depths that the device cannot hold.
+/// Rejects near depths that f32 on the device cannot represent.
 pub fn check_near(near: f64) -> Result<()> {
     if (1.0 / LARGEST..=LARGEST).contains(&near) {
         return Ok(());
@@ -131,11 +139,11 @@ pub fn check_near(near: f64) -> Result<()> {
 }
 
 impl Camera {
-    /// The camera whose pixels are the `samples` of this one's.
+    /// The camera whose pixels are the `samples` of this one's pixels.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] where there are too many in a row or a column.
+    /// [`Error::Usage`] if a row or column has too many samples.
     pub fn sampled(&self, samples: Samples) -> Result<Self> {
         let Samples { across, down } = samples;
         let (width, height) = (u64::from(self.width) * u64::from(across), u64::from(self.height) * u64::from(down));
@@ -159,8 +167,14 @@ impl Camera {
         })
     }
 
-    /// A camera at `eye` that looks at `target`, both in world coordinates. Without `up` (or with one along the view
-    /// direction and `up` not given by the user) the world axis that serves is taken.
+    /// A camera at `eye` that looks at `target`, both in world coordinates.
+    ///
+    /// Without `up`, it is the axis `scene_up`, or the other axis if the view is along that one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if `eye` and `target` coincide or are too far away, if `up` is zero or
+    /// along the view, and as [`Camera::posed`].
     pub fn look_at(
         (width, height): (u32, u32),
         lens: Lens,
@@ -196,6 +210,11 @@ impl Camera {
     }
 
     /// A camera with a given world-to-camera rotation.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if `rotation` is not orthonormal with determinant +1, to 1e-4, if `eye` is
+    /// too far away, or if size, lens or near depth are out of range.
     pub fn posed((width, height): (u32, u32), lens: Lens, eye: DVec3, rotation: DMat3, near: f64) -> Result<Self> {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
@@ -203,8 +222,8 @@ impl Camera {
         if !eye.abs().cmple(DVec3::splat(FARTHEST)).all() {
             return Err(Error::Usage(format!("the camera's eye must be within {FARTHEST:e} of the origin")));
         }
-        // Poses come from text with few decimals; what is nearly a rotation is made one. NaN must fail too, so the
-        // comparisons are for the good case.
+        // Poses come from text with few decimals, so a near rotation is orthonormalised. The
+        // comparisons are written so that NaN fails too.
         let rigid = skew.iter().all(|e| e.abs() < 1e-4) && rotation.determinant() > 0.0;
         if !rigid {
             return Err(Error::Usage(
@@ -218,20 +237,22 @@ impl Camera {
         Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near })
     }
 
-    /// The depth below which nothing is drawn when none is given: a millionth of the scene.
+    /// The default near depth: a millionth of the scene's extent.
     pub fn default_near(scene: &Scene) -> f64 {
         let extent = scene.body().0.extent().length();
         let size = if extent > 0.0 { extent } else { 2.0 * f64::from(scene.largest_radius()) };
         (size * 1e-6).clamp(1.0 / LARGEST, LARGEST)
     }
 
-    /// A world point in camera space.
+    /// Converts a point from world to camera space.
     pub fn to_camera(&self, world: DVec3) -> DVec3 {
         self.rotation * (world - self.eye)
     }
 
-    /// The unnormalised world direction of the ray through the image point (x, y), pixels: camera-space z is 1. It starts
-    /// at [`ray_start`](Self::ray_start).
+    /// The world-space direction of the view ray through the image point (x, y), pixels.
+    ///
+    /// It is not normalised: its camera-space z is 1. The ray starts at
+    /// [`ray_start`](Self::ray_start).
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
         let camera = match self.projection {
             Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),
@@ -240,8 +261,10 @@ impl Camera {
         self.rotation.transpose() * camera
     }
 
-    /// The world point where the ray of the image point (x, y), pixels, has camera-space z = 0: the eye of a pinhole
-    /// camera, in an orthographic one the image point itself.
+    /// The point with camera-space z = 0 on the ray of the image point (x, y), pixels, in world
+    /// space.
+    ///
+    /// For a pinhole camera it is the eye, for an orthographic one the image point itself.
     pub fn ray_start(&self, x: f64, y: f64) -> DVec3 {
         match self.projection {
             Projection::Pinhole => self.eye,
@@ -252,12 +275,14 @@ impl Camera {
         }
     }
 
-    /// The depth that the view ray of the pixel (x, y), through its centre, gains over a unit of its length: 1 in orthographic images.
+    /// The depth gained per unit of length along the view ray through the centre of pixel (x, y): 1
+    /// for orthographic cameras.
     pub fn along_axis(&self, x: u32, y: u32) -> f64 {
         1.0 / self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).length()
     }
 
-    /// The direction along which a point is seen, world coordinates: a unit vector, that of the camera's axis in orthographic images.
+    /// The unit direction in which `point` is seen, world space; for an orthographic camera that of
+    /// its axis.
     pub fn direction_to(&self, point: DVec3) -> DVec3 {
         match self.projection {
             Projection::Pinhole => (point - self.eye).normalize_or_zero(),
@@ -265,13 +290,15 @@ impl Camera {
         }
     }
 
-    /// Pixels of the image.
+    /// The number of pixels in the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// Whether a ball around a place in camera space lies beside the image, farther than a margin of pixels: on the far side of a plane through the eye and
-    /// an edge of the image, so that this is told of one that reaches the eye's plane too.
+    /// Whether a ball lies entirely outside the image, by more than `margin` pixels.
+    ///
+    /// `at` is its centre in camera space. The test is against the planes through the eye and the
+    /// edges of the image, so it also works for a ball that reaches the plane of the eye.
     pub(crate) fn is_beside_image(&self, at: DVec3, radius: f64, margin: DVec2) -> bool {
         let (focal, principal) = (DVec2::new(self.fx, self.fy), DVec2::new(self.cx, self.cy));
         let size = DVec2::new(self.width.into(), self.height.into());
@@ -288,7 +315,7 @@ impl Camera {
     }
 }
 
-/// The vector with unit length, whatever its length; zero for zero.
+/// Normalises a vector of any length without overflow; zero stays zero.
 fn unit(v: DVec3) -> DVec3 {
     (v / v.abs().max_element()).normalize_or_zero()
 }

@@ -1,10 +1,13 @@
-//! How a disk curves out of its plane.
+//! Curved disks: the height of a surfel over its plane.
 
 use glam::DVec2;
 
-/// Heights of a curved surfel over the plane of its disk: a paraboloid that touches the plane at the disk's centre. At (u, v) of the
-/// unit disk it lies `(uu u² + 2 uv u v + vv v²) / 2` along the unit normal s x t, for `[uu, uv, vv]` in world units. A surface of the
-/// curvature k along s, bent away from its normal, has `uu = -k |s|²`. (Paper 001, section 3: "slightly curved surface".)
+/// A paraboloid over the plane of a disk, which it touches at the centre.
+///
+/// At (u, v) of the unit disk its height along the unit normal s x t is
+/// `(uu u² + 2 uv u v + vv v²) / 2`, with `[uu, uv, vv]` in world units. A surface of curvature k
+/// along s, bent away from its normal, has `uu = -k |s|²`. (Paper 001, section 3: "slightly curved
+/// surface".)
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cap(pub [f32; 3]);
 
@@ -12,26 +15,27 @@ impl Cap {
     /// A flat disk.
     pub const FLAT: Self = Self([0.0; 3]);
 
-    /// The most that a cap may rise or sink, in the longer half-axis of its disk: past half a sphere no disk stands for a surface.
+    /// The largest height or depth of a cap, as a fraction of the disk's longer half-axis: beyond a
+    /// hemisphere a disk no longer represents a surface.
     pub const HIGHEST: f64 = 1.0;
 
-    /// Whether it is flat.
+    /// Whether the disk is flat.
     pub fn is_flat(&self) -> bool {
         self.0 == [0.0; 3]
     }
 
-    /// The same, no higher than [`Cap::HIGHEST`] times `radius`; flat if it is not finite.
+    /// The cap lowered to at most [`Cap::HIGHEST`] times `radius`; flat if it is not finite.
     pub fn usable(self, radius: f64) -> Self {
         if !self.0.iter().all(|height| height.is_finite()) {
             return Self::FLAT;
         }
         let most = Self::HIGHEST * radius;
-        // No height is more than half of the sum of these, which most are far below.
+        // Half this sum bounds every height, and for most caps it is far below the limit.
         if 0.5 * self.0.iter().map(|height| f64::from(height.abs())).sum::<f64>() <= most {
             return self;
         }
         let highest = self.highest();
-        // A little less than the most, so that a cap that was lowered to it stays as it is when it is read again.
+        // The tolerance leaves a cap that was lowered to the limit unchanged when it is read again.
         let factor = if highest > most * (1.0 + 1e-6) { most / highest } else { 1.0 };
         Self(self.0.map(|height| (f64::from(height) * factor) as f32))
     }
@@ -47,16 +51,16 @@ impl Cap {
         0.5 * self.slope(u, v).dot(DVec2::new(u, v))
     }
 
-    /// What the height gains for a unit of u, and of v, world units.
+    /// The gradient of the height with respect to u and v, world units.
     pub fn slope(&self, u: f64, v: f64) -> DVec2 {
         let [uu, uv, vv] = self.0.map(f64::from);
         DVec2::new(uu * u + uv * v, uv * u + vv * v)
     }
 
-    /// The least and the largest height over the unit disk, world units, of which the plane's 0 is one or lies between.
+    /// The smallest and largest height over the unit disk, world units; their interval includes 0.
     pub fn extremes(&self) -> [f64; 2] {
         let [uu, uv, vv] = self.0.map(f64::from);
-        // Half the eigenvalues of the heights' matrix.
+        // Half the eigenvalues of the matrix [uu, uv; uv, vv].
         let (mean, spread) = (0.25 * (uu + vv), (0.25 * (uu - vv)).hypot(0.5 * uv));
         [(mean - spread).min(0.0), (mean + spread).max(0.0)]
     }

@@ -1,31 +1,37 @@
-//! Lines at which a disk ends before its rim.
+//! Clip lines, at which a disk ends before its rim.
 
 use glam::{DVec2, DVec3};
 
-/// Two lines in the plane of a disk, each as (x, y, z): of the unit disk the points (u, v) are kept with `x u + y v + z >= 0`. Its
-/// centre may be left out. (Zwicker, Raesaenen, Botsch, Dachsbacher and Pauly 2004, *Perspective Accurate Splatting*, section 5.)
+/// Two clip lines (x, y, z) of a disk: the points (u, v) of the unit disk with `x u + y v + z >= 0`
+/// for both lines are kept.
+///
+/// The disk's centre may be clipped away. (Zwicker, Raesaenen, Botsch, Dachsbacher and Pauly 2004,
+/// *Perspective Accurate Splatting*, section 5.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clip(pub [[f32; 3]; 2]);
 
 impl Clip {
-    /// Lines that leave nothing out.
+    /// Lines that clip nothing.
     pub const NONE: Self = Self([[0.0, 0.0, 1.0]; 2]);
 
-    /// The line of a disk with these half-axes that keeps what has `normal . q >= offset`, q from the disk's centre in the plane and
-    /// the unit of the half-axes. Its longest number is 1, as half-axes may be of any length.
+    /// The clip line that keeps `normal . q >= offset`, for a disk with the half-axes s and t.
+    ///
+    /// q is the vector from the disk's centre within its plane, in the units of the half-axes. The
+    /// line is scaled so that its largest coefficient has magnitude 1, as half-axes may have any
+    /// length.
     pub fn line(normal: DVec2, offset: f64, [s, t]: [DVec2; 2]) -> [f32; 3] {
         let line = [normal.dot(s), normal.dot(t), -offset];
         let longest = line.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         line.map(|x| (x / longest) as f32)
     }
 
-    /// Whether it leaves nothing out.
+    /// Whether the lines clip nothing.
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// The same with lines whose longest number is 1, so that no product of theirs overflows; a line that is none, or not finite,
-    /// leaves nothing out.
+    /// The lines scaled so that their largest coefficients have magnitude 1, so that no product
+    /// overflows. A line that is zero or not finite is replaced by one that clips nothing.
     pub fn usable(self) -> Self {
         Self(self.0.map(|line| {
             let longest = line.iter().fold(0.0f32, |longest, x| longest.max(x.abs()));
@@ -34,13 +40,15 @@ impl Clip {
         }))
     }
 
-    /// How far inside both lines (u, v) lies, in units of the lines' own lengths: negative where it is left out.
+    /// The smaller of the two line functions at (u, v), in the lines' own scales; negative where
+    /// the point is clipped away.
     pub fn inside(&self, u: f64, v: f64) -> f64 {
         let along = |line: [f32; 3]| DVec3::from(line.map(f64::from)).dot(DVec3::new(u, v, 1.0));
         along(self.0[0]).min(along(self.0[1]))
     }
 
-    /// How much of the way from the disk's centre to (u, v) is kept: at most 1, and 0 where the centre is left out.
+    /// The fraction of the segment from the disk's centre to (u, v) that is kept; 0 if the centre
+    /// is clipped away.
     pub fn reach(&self, u: f64, v: f64) -> f64 {
         let of_line = |line: [f32; 3]| {
             let [x, y, z] = line.map(f64::from);

@@ -1,4 +1,4 @@
-//! Colour: 8-bit values are sRGB, everything that is blended is linear.
+//! Colours: 8-bit values are sRGB, everything that is blended is linear.
 
 use glam::DVec3;
 
@@ -9,42 +9,45 @@ use super::texture::Textured;
 /// The colours of a scene or of one input, with straight alpha.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Colors {
-    /// Every surfel has this linear colour.
+    /// One linear colour for all surfels.
     Constant([f32; 4]),
-    /// One 8-bit sRGB colour each; alpha is linear.
+    /// An 8-bit sRGB colour for each surfel; alpha is linear.
     Srgb8(Vec<[u8; 4]>),
-    /// One linear colour each; any finite value.
+    /// A linear colour for each surfel; any finite value.
     Linear(Vec<[f32; 4]>),
-    /// A place in a texture each.
+    /// Texture coordinates for each surfel.
     Textured(Textured),
-    /// One that changes with the view each.
+    /// A view-dependent colour for each surfel.
     Harmonics(Harmonics),
 }
 
-/// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
+/// The default colour: a light grey that shading can darken and highlights cannot clip.
 pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
-/// The nearest 8-bit sRGB codes of a linear colour, alpha straight; what lies outside of [0, 1] is clamped.
+/// The nearest 8-bit sRGB codes of a linear colour with straight alpha; values outside [0, 1] are
+/// clamped.
 pub fn srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
-    // A cast leaves out what is behind the point, takes what is larger for 255 and what is less for 0.
+    // The cast truncates and saturates at 0 and 255.
     [srgb8_of(r), srgb8_of(g), srgb8_of(b), (f64::from(a) * 255.0 + 0.5) as u8]
 }
 
-/// The linear colour of 8-bit sRGB codes, alpha straight.
+/// The linear colour of 8-bit sRGB codes, straight alpha.
 pub fn decoded([r, g, b, a]: [u8; 4]) -> [f32; 4] {
     let table = &*SRGB8_TO_LINEAR;
     [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0]
 }
 
 impl Default for Colors {
-    /// All of [`DEFAULT_COLOR`].
+    /// [`DEFAULT_COLOR`] for all surfels.
     fn default() -> Self {
         Self::Constant(DEFAULT_COLOR)
     }
 }
 
 impl Colors {
-    /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk, of harmonics the one that has no direction.
+    /// The linear colour of surfel `index`, straight alpha.
+    ///
+    /// For a texture it is the mean over the disk, for harmonics the constant term.
     pub fn linear(&self, index: usize) -> [f32; 4] {
         match self {
             Self::Constant(color) => *color,
@@ -58,7 +61,8 @@ impl Colors {
         }
     }
 
-    /// The colour of surfel `index` as it is seen along a direction, a unit vector from the eye.
+    /// The linear colour of surfel `index`, straight alpha, seen along a unit `direction` from the
+    /// eye.
     pub fn seen(&self, index: usize, direction: DVec3) -> [f64; 4] {
         match self {
             Self::Harmonics(harmonics) => harmonics.seen(index, direction),
@@ -67,7 +71,7 @@ impl Colors {
     }
 }
 
-/// The weighted mean of straight colours, premultiplied as splats are blended.
+/// The weighted mean of straight colours, computed premultiplied as in blending.
 pub(crate) fn mean_color(colors: impl Iterator<Item = ([f32; 4], f64)>) -> [f32; 4] {
     let (mut sum, mut weights) = ([0.0; 4], 0.0);
     for (color, weight) in colors {

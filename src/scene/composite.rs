@@ -1,57 +1,67 @@
-//! What shows of the surfaces behind a pixel's nearest one.
+//! Transparency: how a pixel shows the surfaces behind its nearest one.
 //!
-//! # What alpha is
+//! # Meaning of alpha
 //!
-//! A surfel's alpha a_i, times [`RenderOptions::opacity`](crate::plan::RenderOptions::opacity) A, is
+//! A surfel's alpha a_i, times [`RenderOptions::opacity`](crate::plan::RenderOptions::opacity) A,
+//! means
 //!
-//! - in **layers** the opacity of the *surface* that overlapping surfels make. The fragments of a pixel are parted into surfaces, and a
-//!   surface has the weighted means of its fragments, as the nearest one always had: with weights w_i and premultiplied colours c_i
+//! - in **layers** mode: the opacity of the *surface* that overlapping surfels form. The fragments
+//!   of a pixel are grouped into surfaces, and each surface has the weighted means of its
+//!   fragments, with weights w_i and premultiplied colours c_i:
 //!
 //!   `alpha = A sum(w_i a_i) / sum(w_i)`, `colour = A sum(w_i c_i) / sum(w_i)`.
 //!
-//!   Both are divided by the summed weight, so a cloud of alpha 0.5 has the opacity 0.5 however densely it is sampled.
-//!   The summed weight itself is no part of it: it is small between the centres of disks that just meet, and surfaces would have holes there
-//!   (README, "What shows through").
-//! - **sorted** the opacity of one *fragment* at the surfel's centre, which falls off with the kernel: `alpha_i = A w_i a_i`. So a denser
-//!   cloud is more opaque.
+//!   Both are divided by the summed weight, so a cloud of alpha 0.5 has the opacity 0.5 at any
+//!   sampling density. The summed weight itself must not count as opacity: it is small between the
+//!   centres of disks that just meet, and surfaces would have holes there (README, "What shows
+//!   through").
+//! - in **sorted** mode: the opacity of one *fragment* at the surfel's centre, which falls off with
+//!   the kernel: `alpha_i = A w_i a_i`. A denser cloud is therefore more opaque.
 //!
-//! By the rules of Gaussian surfels ([`gaussian`](super::gaussian)) alphas are cut off below and above besides.
+//! For Gaussian surfels ([`gaussian`](super::gaussian)) alphas also have a lower cutoff and an
+//! upper limit.
 //!
-//! Either way, from front to back in linear light, `shown += T colour` and `T *= 1 - alpha`, from a transmittance T of 1; what is left of it
-//! shows the background.
+//! Both modes composite from front to back in linear light, `shown += T colour` and
+//! `T *= 1 - alpha`, starting with a transmittance T of 1; the background shows through the
+//! remaining T.
 //!
-//! Two ways approximate what is sorted by sums in any order ([`oit`](crate::passes::oit)), to compare with.
+//! For comparison, two modes approximate the sorted one by order-independent sums
+//! ([`oit`](crate::passes::oit)).
 
 use std::str::FromStr;
 
 use crate::error::Error;
 
-/// What is composited at a pixel.
+/// The fragments or surfaces that are composited at a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Composite {
-    /// Its nearest surface alone, whose alpha shows the background.
+    /// The nearest surface alone; its alpha shows the background.
     #[default]
     Opaque,
-    /// So many of its surfaces from front to back, [`ALL_LAYERS`] for all.
+    /// The nearest so many surfaces, front to back; [`ALL_LAYERS`] for all.
     Layers(u32),
-    /// Every fragment, in the order of depths; of one depth in that of the [`order`](crate::passes::order).
+    /// Every fragment, front to back; fragments at one depth in the order of
+    /// [`order`](crate::passes::order).
     Sorted,
-    /// The same by the rules of Gaussian surfels ([`gaussian`](super::gaussian)).
+    /// As [`Self::Sorted`], by the rules of Gaussian surfels ([`gaussian`](super::gaussian)).
     Gaussians,
-    /// About that, without an order: every fragment, by a weight that falls with its depth (McGuire and Bavoil 2013).
+    /// An approximation of [`Self::Sorted`] without sorting: every fragment counts by a weight that
+    /// falls with its depth (McGuire and Bavoil 2013).
     Weighted,
-    /// About that, without an order: every fragment, by what the moments of all say is let through before it (Münstermann et al. 2018).
+    /// An approximation of [`Self::Sorted`] without sorting: every fragment counts by the
+    /// transmittance in front of it, which is estimated from moments of all fragments (Münstermann
+    /// et al. 2018).
     Moments,
 }
 
 impl Composite {
-    /// Fragments are summed in any order, all of a pixel at once.
+    /// Whether all fragments of a pixel are summed at once, in any order.
     pub fn is_order_free(self) -> bool {
         matches!(self, Self::Weighted | Self::Moments)
     }
 }
 
-/// As many layers as there are surfaces.
+/// The layer count for all surfaces of a pixel.
 pub const ALL_LAYERS: u32 = u32::MAX;
 
 impl FromStr for Composite {
@@ -78,10 +88,10 @@ impl FromStr for Composite {
     }
 }
 
-/// What becomes of the surfaces behind the last of [`Composite::Layers`].
+/// The treatment of the surfaces behind the last of [`Composite::Layers`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tail {
-    /// They are blended by weight, as one more surface.
+    /// They are blended by weight into one more surface.
     #[default]
     Sum,
     /// They are left out.
@@ -95,12 +105,13 @@ impl FromStr for Tail {
         match text {
             "sum" => Ok(Self::Sum),
             "none" => Ok(Self::None),
-            _ => Err(Error::Usage(format!("what lies behind the last layer is a sum or none, not {text:?}"))),
+            _ => Err(Error::Usage(format!("the tail behind the last layer is sum or none, not {text:?}"))),
         }
     }
 }
 
-/// Transmittances below this show nothing more: what lies behind could change a colour by that part of itself.
+/// Compositing ends below this transmittance: anything behind changes a colour by at most this
+/// fraction of itself.
 pub const LEAST_TRANSMITTANCE: f64 = 1.0 / (1u64 << 30) as f64;
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
-//! Surfels that are the same are drawn once, and what a fragment adds is multiplied by how many they are.
+//! Copies: equal surfels are drawn once, and each fragment's contribution is multiplied by their
+//! number.
 //!
-//! A scanner that writes one point for everything that it did not see makes a million equal disks, each of which covers the same
-//! pixels. A sum of n equal integers is n times one of them, so no image of the accumulator `fixed` depends on it: sums stay the
-//! same to the bit, and the fragment count too. The f64 twin multiplies likewise, with fewer roundings.
+//! A scanner that writes one point for everything it did not see produces a million equal disks,
+//! all of which cover the same pixels. A sum of n equal integers is n times one of them, so with
+//! the accumulator `fixed` sums and fragment counts stay the same to the bit. The f64 twin
+//! multiplies too, with fewer roundings.
 
 use std::cmp::Ordering;
 
@@ -10,14 +12,15 @@ use rayon::prelude::*;
 
 use super::{Colors, Scene};
 
-/// Surfels that are looked at, to see whether there are copies.
+/// The most surfels that are sampled to find out whether there are copies.
 const SAMPLED: usize = 4096;
 
-/// The fewest copies of one surfel that are worth a search: below, drawing each costs less than having no tiles. A disk over an
-/// image of 1024x1024 takes a software adapter 4 ms.
+/// The fewest copies of one surfel that are worth a search; for fewer, drawing each costs less than
+/// doing without tiles. A disk that covers a 1024x1024 image takes a software adapter 4 ms.
 const FEWEST: usize = 1024;
 
-/// Whether one surfel of `scene` seems to have many copies; of a sample, the same each time.
+/// Whether one surfel of `scene` seems to have at least [`FEWEST`] copies, from a sample of fixed
+/// stride. Always false for textures and harmonics.
 pub(crate) fn has_copies(scene: &Scene) -> bool {
     if matches!(scene.colors, Colors::Textured(_) | Colors::Harmonics(_)) {
         return false;
@@ -31,7 +34,8 @@ pub(crate) fn has_copies(scene: &Scene) -> bool {
         .is_some_and(|most| most >= FEWEST)
 }
 
-/// For each surfel how often it is there: all of them at the first of those that are the same, none at the others.
+/// The number of copies of each surfel: the whole number at the first of equal surfels, 0 at the
+/// others.
 pub(crate) fn copies(scene: &Scene) -> Vec<u32> {
     let mut order: Vec<u32> = (0..scene.surfels.len() as u32).collect();
     let compare = |a: u32, b: u32| by_content(scene, a as usize, b as usize);
@@ -43,7 +47,7 @@ pub(crate) fn copies(scene: &Scene) -> Vec<u32> {
     copies
 }
 
-/// By all that is drawn of two surfels without harmonics or a place in a texture.
+/// Orders two surfels by all their visible attributes except harmonics and texture coordinates.
 pub(crate) fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
     let bits = |index: usize| {
         let surfel = &scene.surfels[index];
@@ -73,7 +77,7 @@ mod tests {
     use super::*;
     use crate::scene::{Surfel, Up};
 
-    /// Every surfel at one of `places` places, in turns, in one of two colours.
+    /// Cycles through `places` positions, with a second colour for every sixth surfel.
     fn scene(count: usize, places: usize) -> Scene {
         let surfels =
             (0..count).map(|k| Surfel::disk(Vec3::new((k % places) as f32, 0.0, 0.0), Vec3::Z, 0.1)).collect();

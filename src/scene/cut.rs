@@ -1,4 +1,5 @@
-//! Cuts of levels of detail: surfels and nodes that stand for all, each surfel once, or once in each of the cuts that fade into each other.
+//! Cuts through levels of detail: surfels and nodes that together stand for each surfel once, or
+//! once in each of several cuts that fade into each other.
 
 use std::ops::Range;
 
@@ -9,35 +10,37 @@ use super::fade::STEPS;
 use super::hierarchy::{Hierarchy, Node};
 use super::{Cap, Clip, Colors, Fade, Scene, Surfel};
 
-/// What is drawn of a tree.
+/// The nodes and surfels of a tree that are drawn.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cut {
-    /// Nodes, by their numbers, which ascend, and how much there is of each.
+    /// Node indices, ascending, and the fade of each node.
     pub nodes: Vec<(u32, Fade)>,
-    /// Surfels of leaves, in the order of the tree, and how much there is of each.
+    /// Ranges of surfels in leaves, in the order of the tree, and the fade of each range.
     pub surfels: Vec<(Range<u32>, Fade)>,
 }
 
-/// What becomes of a node.
+/// The treatment of a node in a cut.
 pub(crate) enum Fate {
-    /// Nothing below it is drawn.
+    /// Neither the node nor anything below it is drawn.
     Unseen,
-    /// In so many cuts, of those that fade into each other the first, its children or its surfels are drawn; in the others it stands for them.
+    /// In the first so many of the fading cuts, the node's children or surfels are drawn; in the
+    /// other cuts, the node is drawn in their place.
     Divided(u8),
 }
 
 impl Fate {
-    /// It stands for what is below it.
+    /// The node is drawn in all cuts.
     pub const DRAWN: Self = Self::Divided(0);
-    /// Its children, or its surfels.
+    /// The node's children or surfels are drawn in all cuts.
     pub const DIVIDED: Self = Self::Divided(STEPS);
 }
 
 impl Cut {
-    /// From the root down by what becomes of each node that is come to; None if it has more than `most` surfels and nodes.
+    /// Builds the cut from the root down by the `fate` of each node that is reached. None if it has
+    /// more than `most` surfels and nodes.
     pub(crate) fn of(hierarchy: &Hierarchy, most: u64, fate: impl Fn(u32) -> Fate + Sync) -> Option<Self> {
         let (mut cut, mut drawn) = (Self::default(), 0);
-        // Nodes that are come to, in how many cuts.
+        // Nodes that are reached, and in how many of the cuts.
         let mut frontier: Vec<(u32, u8)> = vec![(0, STEPS)];
         while !frontier.is_empty() {
             let fates: Vec<Fate> = frontier.par_iter().with_min_len(256).map(|&(index, _)| fate(index)).collect();
@@ -46,9 +49,11 @@ impl Cut {
                 let Node { first, count, leaf, .. } = hierarchy.nodes[index as usize];
                 let Fate::Divided(divided) = fate else { continue };
                 let from = match count {
-                    // One surfel is itself, with its lines and its cap.
+                    // A leaf of one surfel is drawn as the surfel, which may have clip lines and a
+                    // cap.
                     1 if leaf => to,
-                    // Where the surfels of a part of a tree are not there, no picture divides their leaf.
+                    // In a part of a scene the surfels of a leaf may be absent; views of the part
+                    // never divide such a leaf.
                     0 => 0,
                     _ => divided.min(to),
                 };
@@ -72,8 +77,8 @@ impl Cut {
         Some(cut)
     }
 
-    /// Nodes whose [`radius`](super::hierarchy::Node::radius) is smaller than `length`, world units, wherever they are seen from, and the surfels
-    /// of leaves that are not.
+    /// The cut independent of the view: nodes whose [`radius`](super::hierarchy::Node::radius) is
+    /// less than `length`, world units, and surfels of leaves with a larger radius.
     pub fn by_length(hierarchy: &Hierarchy, length: f64) -> Self {
         let fate = |index: u32| {
             let short = f64::from(hierarchy.nodes[index as usize].radius) < length;
@@ -82,7 +87,7 @@ impl Cut {
         Self::of(hierarchy, u64::MAX, fate).unwrap_or_default()
     }
 
-    /// How many surfels are drawn.
+    /// The number of surfels and nodes that are drawn.
     pub fn len(&self) -> usize {
         self.nodes.len() + self.surfels.iter().map(|(range, _)| range.len()).sum::<usize>()
     }
@@ -92,8 +97,10 @@ impl Cut {
         self.len() == 0
     }
 
-    /// The surfels of leaves and then the nodes, as a scene like `scene`, which they are cut from. Nodes end at no lines, and are flat unless they have
-    /// their `caps`.
+    /// The cut as a scene with the other attributes of `scene`, from which it was made: first the
+    /// surfels of leaves, then the nodes.
+    ///
+    /// Nodes have no clip lines, and are flat unless `caps` is set.
     pub fn scene(&self, scene: &Scene, hierarchy: &Hierarchy, caps: bool) -> Scene {
         let indices: Vec<u32> = self.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
         let nodes = || self.nodes.iter().map(|&(index, _)| &hierarchy.nodes[index as usize]);
@@ -124,7 +131,7 @@ impl Cut {
         match &mut cut.colors {
             Colors::Srgb8(codes) => codes.extend(nodes().map(|node| srgb8(node.color))),
             Colors::Linear(colors) => colors.extend(nodes().map(|node| node.color)),
-            // One for all, and others have no levels of detail.
+            // `Constant` has one colour for all; scenes with the others have no levels of detail.
             Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
         }
         cut

@@ -1,4 +1,4 @@
-//! How fine a cut through levels of detail is.
+//! The fineness of a cut through levels of detail.
 
 use std::f64::consts::PI;
 use std::str::FromStr;
@@ -9,27 +9,29 @@ use super::hierarchy::Node;
 use super::{Camera, Projection};
 use crate::error::Error;
 
-/// The size of a node in the image that it is drawn at instead of what is below it.
+/// The size of a node in the image below which it is drawn instead of its descendants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Detail {
-    /// Square pixels.
+    /// An area in square pixels.
     Pixels(f64),
-    /// A part of the image.
+    /// A fraction of the image's area.
     Share(f64),
-    /// As small as it can be with so many surfels and nodes drawn: the size follows from each view.
+    /// The smallest size with which at most this many surfels and nodes are drawn; it differs for
+    /// each view.
     Splats(u64),
 }
 
 impl Detail {
-    /// Everything as it is: no node is small enough.
+    /// Draws every surfel: no node is small enough to replace its descendants.
     pub const FINEST: Self = Self::Pixels(0.0);
 
-    /// Whether all is drawn as it is.
+    /// Whether this draws every surfel.
     pub fn is_finest(self) -> bool {
         matches!(self, Self::Pixels(size) | Self::Share(size) if size == 0.0)
     }
 
-    /// Square pixels of an image that has so many; those of a number of splats are looked for first ([`sized`](crate::passes::select::sized)).
+    /// The size in square pixels for an image of `image` pixels. It is 0 for [`Self::Splats`],
+    /// whose size is searched first ([`sized`](crate::passes::select::sized)).
     pub fn pixels(self, image: f64) -> f64 {
         match self {
             Self::Pixels(pixels) => pixels,
@@ -46,7 +48,7 @@ impl FromStr for Detail {
     fn from_str(text: &str) -> Result<Self, Error> {
         let wrong = || {
             Error::Usage(format!(
-                "'{text}' is no size of the smallest nodes: a number of square pixels, 16px, a part of the image, 0.01%, a number of splats, 100000splats, or 0"
+                "a level of detail is 0 (everything), a node size in square pixels (16px) or as a part of the image (0.01%), or a number of splats (100000splats), not '{text}'"
             ))
         };
         let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
@@ -84,14 +86,16 @@ impl FromStr for NodeShape {
     }
 }
 
-/// What of a node is measured.
+/// The size of a node that [`Detail`] is compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DetailMeasure {
-    /// The area of its ellipse's image, as in Pajarola 2003: seen from its edge it has none, so outlines get the coarsest nodes.
+    /// The area of the ellipse's image, as in Pajarola 2003. An ellipse seen edge-on has no area,
+    /// so silhouettes get the coarsest nodes.
     Area,
-    /// The area of the disk that the ball around it and all below it is seen as in the middle of an image: an outline is as fine as a surface that is
-    /// seen from the front, and a node that is as high as it is long, as at a ridge, is divided sooner. Where what is below lies off a node's cap the ball is
-    /// larger than what it holds ([`Node::radius`]).
+    /// The area of the image that the node's bounding sphere would have in the middle of the image.
+    /// Silhouettes are as fine as surfaces seen from the front, and nodes that are as high as long,
+    /// for example at a ridge, are divided sooner. The sphere is larger than its contents where the
+    /// surfels lie off the node's cap ([`Node::radius`]).
     #[default]
     Extent,
 }
@@ -101,18 +105,19 @@ impl FromStr for DetailMeasure {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let named = Self::ALL.into_iter().find(|(_, name, _)| *name == text).map(|(measure, ..)| measure);
-        named.ok_or_else(|| Error::Usage(format!("there is no measure {text:?} of nodes: take area or extent")))
+        named.ok_or_else(|| Error::Usage(format!("nodes are measured by area or extent, not {text:?}")))
     }
 }
 
 impl DetailMeasure {
-    /// All of them, by name and what they measure.
+    /// All measures with their names and descriptions.
     pub const ALL: [(Self, &'static str, &'static str); 2] = [
         (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
-        (Self::Extent, "extent", "that of the ball around it and all below it, larger where these lie off its cap"),
+        (Self::Extent, "extent", "the area of its bounding sphere's image, larger where surfels lie off its cap"),
     ];
 
-    /// Square pixels of a node at the centre `center`, relative to the eye, as seen there; infinite at the eye's plane.
+    /// The size of a node in square pixels, with its centre at `center` relative to the eye, in
+    /// world axes. It is infinite up to the near depth of a pinhole camera.
     pub fn of(self, node: &Node, center: DVec3, camera: &Camera) -> f64 {
         let turned = |v: DVec3| camera.rotation * v;
         let (at, focal) = (turned(center), DVec2::new(camera.fx, camera.fy));
@@ -139,16 +144,19 @@ impl DetailMeasure {
     }
 }
 
-/// Powers of two among which a size is looked for, square pixels.
+/// Exponents of the largest and smallest powers of two between which [`finest`] searches, square
+/// pixels.
 const LARGEST: f64 = 60.0;
 const SMALLEST: f64 = -30.0;
 
-/// How often the interval between two of them is halved: the size is found to a part in a million.
+/// The number of bisection steps between two powers of two, which find the size to a millionth.
 const HALVINGS: u32 = 20;
 
-/// The smallest size, square pixels, of which `fits` says that what is drawn is not too much, if it says so of all larger ones; or hardly a larger one.
+/// The smallest size, square pixels, for which `fits` is true, or one a millionth larger.
+///
+/// `fits` says whether no more is drawn than allowed. It must be true for all larger sizes too.
 pub(crate) fn finest(fits: impl Fn(f64) -> bool) -> f64 {
-    // Powers of two, from above, as of small sizes much is drawn.
+    // The search starts from large sizes, as small ones draw much more.
     let mut high = LARGEST;
     while high > SMALLEST && fits((high - 1.0).exp2()) {
         high -= 1.0;

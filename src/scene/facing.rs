@@ -5,33 +5,38 @@ use std::str::FromStr;
 use super::{Camera, Projection, Samples};
 use crate::error::{Error, Result};
 
-/// How points that face the camera are drawn (Schuetz and Wimmer 2015): each as a shape around its position in a plane parallel to the
-/// image, of its surfel's longer half-axis, held within limits in pixels. The surfel's own plane is no matter.
+/// The drawing of points that face the camera (Schuetz and Wimmer 2015).
+///
+/// Each is a shape around its position, in a plane parallel to the image. Its radius is the longer
+/// half-axis of its surfel, limited in pixels; the surfel's own plane is ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
-    /// What the splat is.
+    /// The shape of each splat.
     pub shape: PointShape,
-    /// The least and the largest diameter in the image, pixels; at least a sample's. A point of one pixel is the pixel that it lies in.
+    /// The smallest and largest diameter in the image, pixels; never less than a sample. A point of
+    /// one pixel fills the pixel in which it lies.
     pub pixels: [f64; 2],
 }
 
-/// The shapes of points that face the camera. Those with a depth come nearer by their height times the radius: where points overlap,
-/// each pixel then shows the one whose axis is nearest, about (section III).
+/// The shapes of points that face the camera.
+///
+/// A shape with a height is nearer to the camera by its height times the radius. Where points
+/// overlap, each pixel then shows approximately the one whose axis is nearest to it (section III).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PointShape {
     /// Flat, `-1 <= u, v < 1`.
     Square,
-    /// Flat, `u² + v² <= 1`, as all that follow.
+    /// Flat, `u² + v² <= 1`; the shapes below have this outline too.
     Circle,
-    /// Of height `√(1 - u² - v²)`.
+    /// Height `√(1 - u² - v²)`.
     Sphere,
-    /// Of height `1 - √(u² + v²)`.
+    /// Height `1 - √(u² + v²)`.
     Cone,
-    /// Of height `1 - u² - v²`.
+    /// Height `1 - u² - v²`.
     Paraboloid,
 }
 
-/// By name.
+/// All shapes with their names.
 pub const POINT_SHAPES: [(&str, PointShape); 5] = [
     ("square", PointShape::Square),
     ("circle", PointShape::Circle),
@@ -41,7 +46,7 @@ pub const POINT_SHAPES: [(&str, PointShape); 5] = [
 ];
 
 impl PointShape {
-    /// Height in radii at a squared distance from the axis, of at most 1, in radii.
+    /// The height in radii at a squared distance `rho2` from the axis, in squared radii, at most 1.
     pub fn height(self, rho2: f64) -> f64 {
         match self {
             Self::Square | Self::Circle => 0.0,
@@ -51,7 +56,7 @@ impl PointShape {
         }
     }
 
-    /// Whether it comes nearer than its plane.
+    /// Whether the shape has a height above its plane.
     pub fn rises(self) -> bool {
         !matches!(self, Self::Square | Self::Circle)
     }
@@ -68,35 +73,37 @@ impl FromStr for PointShape {
 }
 
 impl Facing {
-    /// The paper's limits of a point's diameter, pixels (section III.A).
+    /// The paper's limits for a point's diameter, pixels (section III.A).
     pub const LIMITS: [f64; 2] = [1.0, 50.0];
 
-    /// World length of the radius that a point is drawn with, of its own `radius` at the depth `z` of a view by `camera`, whose pixels
-    /// are the `samples`.
+    /// The radius with which a point is drawn, world units.
+    ///
+    /// `radius` is its own radius, `z` its depth, and the pixels of `camera` are the `samples` of
+    /// the image's pixels.
     pub fn radius(&self, radius: f64, z: f64, camera: &Camera, samples: Samples) -> f64 {
         let widening = match camera.projection {
             Projection::Pinhole => z,
             Projection::Orthographic => 1.0,
         };
         let [least, most] = self.pixels.map(|diameter| 0.5 * diameter * f64::from(samples.down) * widening / camera.fy);
-        // No smaller than a sample, at which it shows.
+        // At least half a sample's width, so that every point is visible.
         radius.max(least).min(most).max(0.5 * widening / camera.fx.min(camera.fy))
     }
 }
 
-/// How large points that face the camera are.
+/// The size of points that face the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointSize {
-    /// Times the radius that each has, or, in a cloud without radii, that of all.
+    /// A factor on the radius of each point, or on the common one in a cloud without radii.
     Radius(f64),
-    /// World units: the radius of all.
+    /// One radius for all points, world units.
     Absolute(f64),
-    /// The diameter of all in the image, pixels.
+    /// One diameter in the image for all points, pixels.
     Pixels(f64),
 }
 
 impl Default for PointSize {
-    /// As large as they are.
+    /// Every point in its own size.
     fn default() -> Self {
         Self::Radius(1.0)
     }

@@ -1,37 +1,41 @@
-//! How much of a surfel there is while a coarser or a finer cut of levels of detail takes over from the one that it is in.
+//! Fades between cuts through levels of detail: the share of a surfel while a coarser or finer cut
+//! replaces its own.
 
-/// Cuts that fade into each other: as many as there are thresholds of samples. That of a number n is a cut by the n-th of so many sizes, evenly
-/// far from each other, from half of that which is asked for on ([`Detail`](super::Detail)); so those of the first numbers are finest.
+/// The number of cuts that fade into each other, one for each dither threshold.
+///
+/// Cut n divides the nodes whose size in the image is at least `(1 + n / STEPS) / 2` of the
+/// requested one ([`Detail`](super::Detail)), so lower numbers are finer.
 pub const STEPS: u8 = 64;
 
-/// Which of the [`STEPS`] cuts that fade into each other a surfel is in: those whose numbers lie in `from..to`.
+/// The range `from..to` of the [`STEPS`] fading cuts that contain a surfel.
 ///
-/// Its fragments weigh as many parts of [`STEPS`] as these are. Depths have no weights: each sample of the image has a number, its
-/// [`threshold`](Self::threshold), and its nearest depth is that of the cut with this number.
+/// The weights of its fragments are multiplied by `(to - from) / STEPS`. Depths have no weights:
+/// each sample of the image belongs to the cut with the number of its
+/// [`threshold`](Self::threshold), and takes the nearest depth of that cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fade {
-    /// The first.
+    /// The first cut.
     pub(crate) from: u8,
-    /// One more than the last.
+    /// One past the last cut.
     pub(crate) to: u8,
 }
 
 impl Fade {
-    /// In all of them.
+    /// A surfel in all cuts.
     pub const WHOLE: Self = Self { from: 0, to: STEPS };
 
-    /// The part of all cuts, 0 to 1.
+    /// The fraction of the cuts that contain the surfel, 0 to 1.
     pub fn weight(self) -> f64 {
         f64::from(self.to.saturating_sub(self.from)) / f64::from(STEPS)
     }
 
-    /// Whether it is in the cut of the sample in this column and row.
+    /// Whether the surfel is in the cut of the sample at column `x` and row `y`.
     pub fn takes(self, x: u32, y: u32) -> bool {
         (self.from..self.to).contains(&Self::threshold(x, y))
     }
 
-    /// The number of the cut of a sample: each once in eight by eight of them, such that those of any aligned square are evenly far from each
-    /// other (the ordered dither of Bayer 1973).
+    /// The number of the cut of a sample (the ordered dither of Bayer 1973). Each number occurs
+    /// once in 8 x 8 samples, and the numbers in any aligned square are evenly spaced.
     pub fn threshold(x: u32, y: u32) -> u8 {
         let digit = |k: u32| {
             let (column, row) = (x >> k & 1, y >> k & 1);
@@ -40,7 +44,7 @@ impl Fade {
         (digit(0) | digit(1) | digit(2)) as u8
     }
 
-    /// In one word, as kernels have it.
+    /// Packs the range into one word for the kernels: `from | to << 8`.
     pub fn word(self) -> u32 {
         u32::from(self.from) | u32::from(self.to) << 8
     }

@@ -1,4 +1,4 @@
-//! The view chosen when nobody chose one.
+//! The default view: a camera that frames the scene.
 
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
@@ -7,31 +7,35 @@ use super::camera::check_size;
 use super::{Bounds, Camera, Lens, Projection, Scene, Surfel};
 use crate::error::{Error, Result};
 
-/// Part of the way from the image's middle to its edge that surfels' centres fill.
+/// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
 const FILL: f64 = 0.95;
 
-/// Part of the way that disks fill, where they would else be cut.
+/// The fraction of the way that disks fill, where they would be cut otherwise.
 const FILL_OF_DISKS: f64 = 0.98;
 
-/// Rounds of centring; each leaves about the square of the share of depth in the distance.
+/// Rounds of centring. Each multiplies the remaining offset by about the square of the scene's
+/// depth over its distance.
 const ROUNDS: usize = 4;
 
 impl Camera {
-    /// A camera that shows the surfels of the scene's body as large as the image holds them, and centred: from the front, a little
-    /// from the right and above (z-up scenes, which tend to be terrain, from steeper). Their centres leave a margin of 5 %, and no
-    /// disk is cut by the border: larger disks take the camera farther away.
+    /// A camera that frames the scene's body: centred, and as large as fits in the image.
     ///
-    /// An orthographic lens keeps its scale, so it may show less.
+    /// The view is from the front, a little from the right and above; z-up scenes, which tend to be
+    /// terrain, are seen from steeper. The centres leave a margin of 5 %, and the border cuts no
+    /// disk: larger disks move the camera farther away. An orthographic lens keeps its scale, so it
+    /// may show less.
     pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
         Ok(Self::framed(size, lens, scene, near, (None, Of::Disks))?.0)
     }
 
-    /// The same with `up`, a direction in world space of any length, instead of the scene's, and what the camera looks at, world
-    /// coordinates: [`Camera::look_at`] from its eye to there gives the camera again.
+    /// As [`Camera::framing`], with an optional up direction; also returns the target.
+    ///
+    /// `up` is a world-space direction of any length, by default the scene's. The target is in
+    /// world coordinates: [`Camera::look_at`] from the camera's eye to it gives the same camera.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] also for an `up` of no direction.
+    /// As [`Camera::framing`], and [`Error::Usage`] if `up` has no direction.
     pub fn framing_up(
         size: (u32, u32),
         lens: Lens,
@@ -42,7 +46,8 @@ impl Camera {
         Self::framed(size, lens, scene, near, (up, Of::Disks))
     }
 
-    /// The default view by surfels' centres alone: for studies, in which the view must not depend on the radius.
+    /// The default view by the surfels' centres alone, for studies in which the view must not
+    /// depend on the radius.
     #[cfg(feature = "bench")]
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
         Ok(Self::framed(size, lens, scene, near, (None, Of::Centers))?.0)
@@ -57,10 +62,11 @@ impl Camera {
     ) -> Result<(Self, DVec3)> {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
-        // The image's middle and half its width, as X/Z (pinhole) or X (orthographic), and so for its height.
+        // The middle, half the size, and half the size less a border pixel, as X/Z (pinhole) or X
+        // (orthographic).
         let interval = |size: u32, principal: f64, f: f64| {
             let size = f64::from(size);
-            // What ends a pixel before the border leaves the border's own pixels free.
+            // Ending a pixel before the border leaves the border's own pixels free.
             let free = (0.5 * size - 1.0).max(0.25 * size);
             [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
         };
@@ -81,31 +87,32 @@ impl Camera {
     }
 }
 
-/// What of a surfel is to be seen.
+/// The part of a surfel that has to be inside the image.
 #[derive(Clone, Copy, PartialEq)]
 enum Of {
     Centers,
     Disks,
 }
 
-/// The scene as the camera's axes see it.
+/// The scene in the axes of the camera.
 struct Framing<'a> {
     scene: &'a Scene,
     pinhole: bool,
-    /// Of the image's width and height: the middle, half, and that less a pixel.
+    /// For the image's width and height each: the middle, half the size, and half the size less a
+    /// border pixel, as X/Z (pinhole) or X (orthographic).
     image: [[f64; 3]; 2],
-    /// Right, down, forward.
+    /// The world directions right, down and forward.
     axes: [DVec3; 3],
-    /// What is framed: centres in this box.
+    /// The box of the centres that are framed, relative to the scene's origin.
     body: Bounds,
     center: DVec3,
-    /// Of the scene.
+    /// The radius of the scene, world units.
     radius: f64,
-    /// The least depth of a centre.
+    /// The smallest depth that a centre may have, world units.
     clearance: f64,
 }
 
-/// A disk in the camera's axes, relative to the scene's centre.
+/// A disk in the camera's axes, relative to the centre of the body.
 #[derive(Clone, Copy)]
 struct Disk {
     p: DVec3,
@@ -114,15 +121,15 @@ struct Disk {
 }
 
 impl Disk {
-    /// Its farthest point in a direction.
+    /// The disk's farthest point in the direction `along`.
     fn farthest(self, along: DVec3) -> DVec3 {
         let (s, t) = (self.s.dot(along), self.t.dot(along));
         let length = s.hypot(t);
         if length > 0.0 { self.p + (self.s * s + self.t * t) / length } else { self.p }
     }
 
-    /// The largest value of the coordinate along `axis` over depth, for a disk before the camera (Dinkelbach 1967: where the
-    /// largest x - k z is zero, k is the largest x / z).
+    /// The largest ratio of the coordinate along `axis` to depth, for a disk in front of the camera
+    /// (Dinkelbach 1967: if the largest x - k z is zero, then k is the largest x / z).
     fn largest_ratio(self, axis: DVec3) -> f64 {
         let rounds = if self.s == self.t { 0 } else { 3 };
         (0..rounds).fold(self.p.dot(axis) / self.p.z, |k, _| {
@@ -137,11 +144,11 @@ impl<'a> Framing<'a> {
         let forward = forward(up);
         let right = forward.cross(up).normalize();
         let (body, _) = scene.framed();
-        // A scene of one place has no extent but its surfels'.
+        // A scene whose points coincide has only the extent of its surfels.
         let half = 0.5 * body.extent().length();
         let largest = f64::from(scene.largest_radius());
         let (radius, clearance) = match half > 0.0 {
-            // Where most disks are larger than the box of their centres, they are the scene.
+            // Where disks exceed the box of their centres, the scene is as large as the disks.
             true if largest > half => {
                 let radius = half.max(median_radius(scene));
                 (radius, 0.05 * radius)
@@ -153,8 +160,9 @@ impl<'a> Framing<'a> {
         Self { scene, pinhole, image, axes, body, center: body.center(), radius, clearance }
     }
 
-    /// The largest of each of some functions over what is framed: whatever its order, the same. A disk that is much larger than
-    /// the scene, as one of a stray point may be, counts by its centre.
+    /// The maximum of each component of `f` over all framed disks, in any order.
+    ///
+    /// A disk much larger than the scene, for example that of a stray point, counts by its centre.
     fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
         let local = |v: DVec3| DVec3::from_array(self.axes.map(|axis| v.dot(axis)));
         let value = |index: usize| {
@@ -171,7 +179,8 @@ impl<'a> Framing<'a> {
         (0..self.scene.places()).into_par_iter().map(|index| value(index).unwrap_or_else(none)).reduce(none, join)
     }
 
-    /// Where what is framed ends toward the right, left, bottom and top, as X/Z or X, seen from `eye`.
+    /// The extents of the framed points toward the right, left, bottom and top, as X/Z or X, seen
+    /// from `eye`.
     fn reach(&self, eye: DVec3, of: Of) -> [f64; 4] {
         let sides = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y];
         self.largest(of, |disk| {
@@ -180,14 +189,15 @@ impl<'a> Framing<'a> {
         })
     }
 
-    /// The eye from which the image is filled to the part `fill`, in the camera's axes relative to the scene's centre.
+    /// The eye position from which the scene fills the fraction `fill` of the image, in the
+    /// camera's axes relative to the centre of the body.
     fn eye(&self, fill: f64, of: Of) -> DVec3 {
         let filled = |half: f64, free: f64| if of == Of::Disks { free.min(fill * half) } else { fill * half };
         let [[mid_x, half_x], [mid_y, half_y]] = self.image.map(|[middle, half, free]| [middle, filled(half, free)]);
         let mut eye = DVec3::new(0.0, 0.0, -2.0 * self.radius);
         if self.pinhole {
-            // The eye must keep every point between four planes, X - x <= (mid + half) (Z - z) and so on: the foremost
-            // such eye between the pair of planes that leaves it less room.
+            // The eye must keep every point between four planes, X - x <= (mid + half) (Z - z) and
+            // so on. This is the foremost eye for the pair of planes that is more restrictive.
             let planes = [
                 DVec3::new(1.0, 0.0, -(mid_x + half_x)),
                 DVec3::new(-1.0, 0.0, mid_x - half_x),
@@ -201,7 +211,8 @@ impl<'a> Framing<'a> {
             let z = -((left + right) / (2.0 * half_x)).max((above + below) / (2.0 * half_y)).max(behind);
             eye = DVec3::new(0.5 * (left - right) + mid_x * z, 0.5 * (above - below) + mid_y * z, z);
         }
-        // Disks that come near the eye in front of others would make the rounds swing; between the planes they are as it is.
+        // Disks are not centred: one near the eye in front of others would make the rounds
+        // oscillate. The planes alone keep them inside the image.
         let rounds = if of == Of::Disks { 0 } else { ROUNDS };
         for _ in 0..rounds {
             let reach = self.reach(eye, of);
@@ -223,14 +234,17 @@ impl<'a> Framing<'a> {
     }
 }
 
-/// The middle one of the radii: no order of the surfels shows.
+/// The median of the surfels' radii, independent of their order.
 fn median_radius(scene: &Scene) -> f64 {
     let mut radii: Vec<f32> = scene.surfels.par_iter().map(Surfel::radius).collect();
     let middle = radii.len() / 2;
     if radii.is_empty() { 0.0 } else { f64::from(*radii.select_nth_unstable_by(middle, f32::total_cmp).1) }
 }
 
-/// The default direction of view with a unit vector as up: that of y or z, whichever is nearer to its line, turned as far as up is.
+/// The default view direction for the unit vector `up`.
+///
+/// It is the direction for a y or z axis, whichever is nearer to the line of `up`, rotated as that
+/// axis is rotated onto `up`.
 fn forward(up: DVec3) -> DVec3 {
     let (axis, forward) = if up.z.abs() > up.y.abs() {
         (DVec3::Z, DVec3::new(-0.15, 1.0, -1.2))
@@ -328,7 +342,7 @@ mod tests {
         let at = |y: f32, normal| Surfel::disk(glam::Vec3::new(0.0, y, y), normal, 2.6e9);
         let surfels = vec![at(0.0, glam::Vec3::new(0.3, -0.7, 0.2)), at(-2.1e9, glam::Vec3::new(-0.1, 0.2, 0.9))];
         let colors = Colors::Constant([1.0; 4]);
-        // Trailing parts that put both past the box of what f32 has of their centres.
+        // Low parts that move both centres outside the box of their f32 centres.
         let low = vec![[-1e-9, 1e-9, -1e-9], [1e-9, -1e-9, 1e-9]];
         let scene = Scene { origin: DVec3::ZERO, surfels, low, colors, oriented: true, up: Up::Z, ..Scene::default() };
         let camera = Camera::framing((64, 48), Lens::Fov(45.0), &scene, 1.0).unwrap();

@@ -1,38 +1,45 @@
-//! Surfels that are Gaussians, and the rules by which the method draws them that they come from.
+//! Gaussian surfels, and the rules by which their method of origin draws them.
 //!
-//! 2D Gaussian splatting (Huang et al., SIGGRAPH 2024) has surfels with two standard deviations, an opacity o and a colour that changes with
-//! the view ([`Harmonics`](super::Harmonics)). Along a pixel's ray, with (u, v) the place on the surfel in standard deviations,
+//! Surfels of 2D Gaussian splatting (Huang et al., SIGGRAPH 2024) have two standard deviations, an
+//! opacity o and a view-dependent colour ([`Harmonics`](super::Harmonics)). Along a pixel's ray,
+//! with (u, v) the position on the surfel in standard deviations,
 //!
 //! `alpha = min(0.99, o exp(-rho^2 / 2))`, `rho^2 = min(u^2 + v^2, 2 d^2)`
 //!
-//! with d the distance of the pixel's centre from the surfel's image, pixels (section 4.2 of the paper, Eq. 11, and its code). Fragments
-//! with an alpha below 1/255 are left out, and all from the one on that would let less than 1e-4 through. Colours are codes of sRGB as
-//! displays take them, and are composited as they are: files are trained to give pictures in this way.
+//! with d the distance of the pixel's centre from the image of the surfel's centre, pixels (section
+//! 4.2 of the paper, Eq. 11, and its code). Fragments with an alpha below 1/255 are left out, and
+//! so are all fragments from the one on that would lower the transmittance below 1e-4. Colours are
+//! sRGB codes and are composited as they are, because files are trained to give pictures in this
+//! way.
 //!
-//! epsplat draws that by three of its options, which a scene of Gaussians takes unless a caller says otherwise: the [`KERNEL`] over
-//! disks of [`EXTENT`] standard deviations, [`LowPass::Gaussians`](super::LowPass::Gaussians) and
-//! [`Composite::Gaussians`](super::Composite::Gaussians). Two rules of the method's code are not kept, as they are of its tiles and not of
-//! its formulas: it sorts by the depth of centres, where here each fragment has its own, and it cuts a surfel at the box of three standard
-//! deviations, rounded to tiles, where here it ends at an alpha of 1/255.
+//! epsplat expresses this by three of its options, which a scene of Gaussians uses by default: the
+//! [`KERNEL`] over disks of [`EXTENT`] standard deviations,
+//! [`LowPass::Gaussians`](super::LowPass::Gaussians) and
+//! [`Composite::Gaussians`](super::Composite::Gaussians). Two rules of the original code are not
+//! followed, as they come from its tiles and not from its formulas: it sorts surfels by the depth
+//! of their centres, where here each fragment has its own depth, and it cuts a surfel at a box of
+//! three standard deviations, rounded to tiles, where here a surfel ends at an alpha of 1/255.
 
 use super::Kernel;
 
-/// The half-axes of a Gaussian's disk, standard deviations: at its rim one of opacity 1 has the alpha [`LEAST_ALPHA`], sqrt(2 ln 255).
+/// The half-axes of a Gaussian's disk, in standard deviations: sqrt(2 ln 255), so that a Gaussian
+/// of opacity 1 has the alpha [`LEAST_ALPHA`] at the rim.
 pub const EXTENT: f64 = 3.329_042_969_130_445_5;
 
-/// The falloff over that disk.
+/// The kernel over that disk.
 pub const KERNEL: Kernel = Kernel::Gaussian { sigma: 1.0 / EXTENT };
 
-/// The low-pass is a Gaussian of this standard deviation, pixels: `exp(-d^2)`.
+/// Standard deviation of the low-pass Gaussian `exp(-d^2)`, pixels.
 pub const LOW_PASS_SIGMA: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Fragments with less are left out.
+/// Fragments with a lower alpha are left out.
 pub const LEAST_ALPHA: f64 = 1.0 / 255.0;
 
-/// No fragment has more.
+/// The largest alpha of a fragment.
 pub const MOST_ALPHA: f64 = 0.99;
 
-/// The fragment that would let less through, and all behind it, are left out.
+/// The first fragment that would lower the transmittance below this is left out, with all behind
+/// it.
 pub const LEAST_SHOWN: f64 = 1e-4;
 
 #[cfg(test)]

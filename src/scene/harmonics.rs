@@ -1,25 +1,26 @@
-//! Colours that change with the direction they are seen from: real spherical harmonics, as files of Gaussian surfels have them.
+//! View-dependent colours: real spherical harmonics, as in files of Gaussian surfels.
 //!
 //! A surfel seen along the unit direction d, from the eye to its centre, has the straight colour
 //!
 //! `c(d) = max(0, c_0 + sum over l of 1..=degree, |m| <= l of k_lm Y_lm(d))`
 //!
-//! with a vector k_lm of red, green and blue for each Y_lm, in the signs and the order of the 3DGS code (Kerbl et al. 2023): m from -l to
-//! l, and the factor `(-1)^m` of Condon and Shortley. A degree has no constants but those that make the Y_lm orthonormal.
+//! with a vector k_lm of red, green and blue for each Y_lm. Signs and order are those of the 3DGS
+//! code (Kerbl et al. 2023): m from -l to l, with the Condon-Shortley factor `(-1)^m`. The Y_lm are
+//! orthonormal.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// The highest degree that files have.
+/// The highest degree in files.
 pub const MOST_DEGREE: u32 = 3;
 
-/// How many Y_lm there are of degrees 1 to `degree`.
+/// The number of Y_lm of degrees 1 to `degree`.
 pub const fn terms_of(degree: u32) -> usize {
     ((degree + 1) * (degree + 1) - 1) as usize
 }
 
-/// The Y_lm of degrees 1 to 3 in a direction, a unit vector. Twin: `wgsl/color_harmonics.wgsl`.
+/// The Y_lm of degrees 1 to 3 in a unit direction. The twin of `wgsl/color_harmonics.wgsl`.
 pub fn basis(DVec3 { x, y, z }: DVec3) -> [f64; terms_of(MOST_DEGREE)] {
     let (xx, yy, zz) = (x * x, y * y, z * z);
     let root = |square: f64| (square / PI).sqrt();
@@ -45,40 +46,41 @@ pub fn basis(DVec3 { x, y, z }: DVec3) -> [f64; terms_of(MOST_DEGREE)] {
     ]
 }
 
-/// The colours of surfels that have harmonics.
+/// The harmonic colours of all surfels of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonics {
-    /// c_0 of each, and straight alpha.
+    /// c_0 of each surfel, and straight alpha.
     colors: Vec<[f32; 4]>,
     degree: u32,
-    /// k_lm of each, [`terms_of`] the degree, red, green and blue beside each other.
+    /// k_lm of each surfel: [`terms_of`] the degree times red, green and blue.
     terms: Vec<f32>,
 }
 
 impl Harmonics {
-    /// Harmonics of degree 1 to [`MOST_DEGREE`], if there are as many numbers as the colours' surfels have.
+    /// Harmonics of degree 1 to [`MOST_DEGREE`]; None if the number of `terms` does not match the
+    /// number of colours and the degree.
     pub fn new(colors: Vec<[f32; 4]>, degree: u32, terms: Vec<f32>) -> Option<Self> {
         let fits = (1..=MOST_DEGREE).contains(&degree) && terms.len() == colors.len() * 3 * terms_of(degree);
         fits.then_some(Self { colors, degree, terms })
     }
 
-    /// Of the highest of them.
+    /// The highest degree.
     pub fn degree(&self) -> u32 {
         self.degree
     }
 
-    /// c_0 of each, and straight alpha.
+    /// c_0 of each surfel, and straight alpha.
     pub fn colors(&self) -> &[[f32; 4]] {
         &self.colors
     }
 
-    /// k_lm of surfel `index`, red, green and blue beside each other.
+    /// k_lm of surfel `index`: red, green and blue of one term after the other.
     pub fn terms(&self, index: usize) -> &[f32] {
         let each = 3 * terms_of(self.degree);
         &self.terms[index * each..(index + 1) * each]
     }
 
-    /// The straight colour of surfel `index` seen along `direction`, a unit vector from the eye.
+    /// The straight colour of surfel `index` seen along a unit `direction` from the eye.
     pub fn seen(&self, index: usize, direction: DVec3) -> [f64; 4] {
         let [r, g, b, alpha] = self.colors[index].map(f64::from);
         let mut color = [r, g, b];
@@ -89,8 +91,10 @@ impl Harmonics {
         [r, g, b, alpha]
     }
 
-    /// The straight colour that surfel `index` exceeds from no side: by Cauchy and Schwarz and `sum over m of Y_lm(d)^2 = (2 l + 1) / 4 pi`
-    /// (Unsold's theorem), a degree adds at most `|k_l| sqrt((2 l + 1) / 4 pi)`. Rounded up.
+    /// An upper bound of the straight colours of surfel `index` over all directions.
+    ///
+    /// By the Cauchy-Schwarz inequality and `sum over m of Y_lm(d)^2 = (2 l + 1) / 4 pi` (Unsold's
+    /// theorem), degree l adds at most `|k_l| sqrt((2 l + 1) / 4 pi)`. The bound is rounded up.
     pub fn most(&self, index: usize) -> [f32; 4] {
         let [r, g, b, alpha] = self.colors[index];
         let mut most = [r, g, b].map(f64::from);
@@ -102,12 +106,12 @@ impl Harmonics {
                 *sum += highest * of_degree.iter().map(|term| f64::from(term[k]).powi(2)).sum::<f64>().sqrt();
             }
         }
-        // What f32 may make of the sum in any order.
+        // Covers the rounding of an f32 sum in any order.
         let [r, g, b] = most.map(|c| (c.max(0.0) * (1.0 + 1e-5)) as f32);
         [r, g, b, alpha]
     }
 
-    /// The surfels at `indices`.
+    /// The harmonics of the surfels at `indices`.
     pub fn taken(&self, indices: &[usize]) -> Self {
         Self {
             colors: indices.iter().map(|&index| self.colors[index]).collect(),
@@ -116,7 +120,7 @@ impl Harmonics {
         }
     }
 
-    /// These, and what they consist of.
+    /// Returns the colours, the degree and the terms.
     pub fn into_parts(self) -> (Vec<[f32; 4]>, u32, Vec<f32>) {
         (self.colors, self.degree, self.terms)
     }
@@ -127,7 +131,8 @@ impl Harmonics {
 mod tests {
     use super::*;
 
-    /// Directions that cover the sphere evenly: their mean is the integral over it, of polynomials to 1e-3.
+    /// Directions that cover the sphere evenly: a mean over them is the integral, for polynomials
+    /// to 1e-3.
     fn directions(count: u32) -> impl Iterator<Item = DVec3> {
         (0..count).map(move |k| {
             let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
@@ -157,7 +162,7 @@ mod tests {
         }
     }
 
-    /// The factors that the 3DGS code has as numbers.
+    /// Compares with the factors that the 3DGS code has as numbers.
     #[test]
     fn the_signs_are_those_of_files() {
         let axis = |x: f64, y: f64, z: f64| basis(DVec3::new(x, y, z).normalize());

@@ -1,69 +1,80 @@
-//! Levels of detail: a tree of surfels, each of which stands for all below it.
+//! Levels of detail: a tree whose nodes are surfels, each of which stands for all surfels below it.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Cap, Surfel};
 
-/// The most surfels of a leaf that do not all lie at one position (Pajarola 2003, section 3.2).
+/// The most surfels in a leaf, unless they all coincide (Pajarola 2003, section 3.2).
 pub const FAN_OUT: usize = 8;
 
-/// The deepest level of a tree, the root's being 0: a node there is a leaf, however many surfels it has.
+/// The deepest level of a tree; the root's is 0. A node there is a leaf, however many surfels it
+/// has.
 pub const DEEPEST: usize = 63;
 
 /// A node of a [`Hierarchy`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// The ellipse that stands for its surfels: it bounds their disks, seen along its normal.
+    /// The ellipse that stands for the node's surfels: seen along its normal, it bounds their
+    /// disks.
     pub surfel: Surfel,
-    /// How it curves as they do.
+    /// How the ellipse curves to follow its surfels.
     pub cap: Cap,
-    /// Their mean colour, linear, straight alpha.
+    /// The mean colour of the surfels: linear, straight alpha.
     pub color: [f32; 4],
-    /// A sphere of this radius around the centre holds them and the node itself, world units. It is larger than that where they do not lie on the node's
-    /// cap, as cuts measure by it.
+    /// Radius of a sphere around the centre that holds the surfels and the node's own ellipse,
+    /// world units. It is larger than necessary where the surfels lie off the node's cap, because
+    /// cuts measure nodes by it.
     pub radius: f32,
-    /// The smallest cosine of the angle between a normal of theirs and its own; -1 where normals have no side.
+    /// The smallest cosine of the angle between the normals of the surfels and of the node; -1
+    /// where normals have no side.
     pub cone: f32,
-    /// Its first child, or in a leaf the first of its surfels in the scene.
+    /// Index of the first child, or in a leaf of the first surfel in the scene.
     pub first: u32,
-    /// How many of these it has.
+    /// The number of children, or in a leaf of surfels.
     pub count: u32,
-    /// It has surfels and no children.
+    /// Whether the node has surfels instead of children.
     pub leaf: bool,
 }
 
-/// A node, and what its f32 centre leaves out, world units.
+/// A node, and the part of its centre beyond f32, world units.
 pub(crate) type NodeAndLow = (Node, [f32; 3]);
 
-/// A point-octree over the surfels of a scene: each node's are divided at the mean of their centres (Pajarola 2003, section 3.2). The scene has
-/// them in the order of the tree: those below a node follow each other. It depends on the set of surfels alone.
+/// A point-octree over the surfels of a scene: the surfels of each node are divided at the mean of
+/// their centres (Pajarola 2003, section 3.2).
+///
+/// The scene has its surfels in the order of the tree, so those below a node are contiguous. The
+/// tree depends on the set of surfels alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hierarchy {
-    /// Level by level from the root on; the children of a node follow each other.
+    /// The nodes, level by level from the root; the children of a node are contiguous.
     pub nodes: Vec<Node>,
-    /// What the f32 centres of nodes leave out, world units: one for each node, or none at all where surfels' leave out nothing that shows.
+    /// The part of each node's centre beyond f32, world units; empty if it is invisibly small for
+    /// all surfels ([`Scene::low`](super::Scene::low)).
     pub low: Vec<[f32; 3]>,
 }
 
-/// What is wrong with a tree.
+/// The reason why nodes and surfels do not form a valid tree; the numbers are node indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A node's children are not those that follow.
+    /// The children of this node do not follow those of the node before it.
     Children(usize),
-    /// A leaf's surfels are not those that follow, in the order in which leaves are come to from the root.
+    /// The surfels of this leaf do not follow those of the leaf before it, in depth-first order.
     Elements(usize),
-    /// A node has none of what it should have, or more than it can have.
+    /// This node has no children or surfels, or more than [`FAN_OUT`] children.
     Count(usize),
     /// There are more levels than [`DEEPEST`] allows.
     Depth,
-    /// Some nodes belong to no other, or some surfels to no leaf.
+    /// Some nodes have no parent, or some surfels are in no leaf.
     Loose,
 }
 
 impl Hierarchy {
-    /// Whether nodes and `elements` surfels make one tree: level by level each node's children are the next ones, and from left to right each
-    /// leaf's surfels. So no node is below itself, and none is below two.
+    /// Checks that `nodes` and `elements` surfels form one tree.
+    ///
+    /// In level order, the children of each node must follow those of the node before it; in
+    /// depth-first order, the surfels of each leaf must follow those of the leaf before it. So no
+    /// node is below itself, and none has two parents.
     ///
     /// # Errors
     ///
@@ -94,7 +105,7 @@ impl Hierarchy {
         Self::check_elements(nodes, elements)
     }
 
-    /// The leaves from left to right have all surfels in their order.
+    /// Checks that the leaves, in depth-first order, hold all surfels in order.
     fn check_elements(nodes: &[Node], elements: usize) -> Result<(), Fault> {
         let (mut reached, mut open) = (0, vec![0]);
         while let Some(index) = open.pop() {
@@ -105,14 +116,15 @@ impl Hierarchy {
                 }
                 reached += node.count as usize;
             } else {
-                // Children have larger numbers, so this ends.
+                // Children have larger indices than their parent, so this loop ends.
                 open.extend((node.first as usize..(node.first + node.count) as usize).rev());
             }
         }
         if reached == elements { Ok(()) } else { Err(Fault::Loose) }
     }
 
-    /// Gives each leaf of one surfel that surfel's ellipse: it is drawn for it, and other programs may have written another one.
+    /// Gives each leaf of one surfel that surfel's ellipse. The node is drawn in its place, and a
+    /// file of another program may have a different ellipse there.
     pub(crate) fn settle(&mut self, surfels: &[Surfel], low: &[[f32; 3]]) {
         let settled = |node: &mut Node| -> Option<[f32; 3]> {
             let place = (node.leaf && node.count == 1).then_some(node.first as usize)?;
@@ -126,12 +138,12 @@ impl Hierarchy {
         nodes.zip(&mut self.low).for_each(|(node, low)| *low = settled(node).unwrap_or(*low));
     }
 
-    /// What the f32 centre of a node leaves out, world units.
+    /// The part of a node's centre beyond f32, world units.
     pub fn low(&self, index: u32) -> DVec3 {
         self.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)))
     }
 
-    /// How many levels there are.
+    /// The number of levels.
     pub fn levels(&self) -> usize {
         let (mut levels, mut end, mut next, mut index) = (0, 1, 1, 0);
         while index < self.nodes.len() {
@@ -162,7 +174,8 @@ mod tests {
         let settled = Node { surfel: at(3.0), ..nodes[2] };
         assert_eq!(tree.nodes, [nodes[0], nodes[1], settled, nodes[3]]);
         assert_eq!(tree.low, [[7.0; 3], [7.0; 3], [0.3; 3], [7.0; 3]]);
-        // Where surfels leave out nothing nodes do not either, and what has no surfels has none.
+        // Without low parts of surfels, nodes get zero; a leaf whose surfels are absent stays as it
+        // is.
         let mut tree = Hierarchy { nodes: nodes.clone(), low: vec![[7.0; 3]; 4] };
         tree.settle(&[at(1.0)], &[]);
         assert_eq!(tree.nodes, nodes);
@@ -183,7 +196,7 @@ mod tests {
             other[index] = to;
             Hierarchy::check(&other, 7)
         };
-        // Cycles, shared children, gaps, empty and overfull nodes.
+        // Cycles, shared children, gaps, empty nodes and nodes with too many children.
         assert_eq!(changed(2, inner(0, 2)), Err(Fault::Children(2)));
         assert_eq!(changed(2, inner(1, 2)), Err(Fault::Children(2)));
         assert_eq!(changed(2, inner(u32::MAX, 2)), Err(Fault::Children(2)));

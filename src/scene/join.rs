@@ -1,21 +1,24 @@
-//! How what a pixel's splats show and what its triangles show become one.
+//! How a pixel joins the surfaces of splats and of triangles.
 
 use std::str::FromStr;
 
 use crate::error::Error;
 
-/// What shows where splats and triangles meet. Each is a surface by itself before: no fragment of a splat is told from others by a
-/// triangle.
+/// The rule for pixels where splats and triangles meet. Both are resolved separately first: a
+/// triangle hides no fragment of a splat before the splats are blended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Join {
-    /// The nearer of the two, the splats by the depth that they blend to (Tien 2008, section 5.3). A splat that sticks out of its surface
-    /// moves that depth by its weight's part only, so the two meet where their surfaces do.
+    /// The nearer of the two, with the blended depth of the splats (Tien 2008, section 5.3). A
+    /// splat that sticks out of its surface shifts this depth only by its share of the weight, so
+    /// splats and triangles meet where their surfaces do.
     #[default]
     Corrected,
-    /// The nearer of the two, the splats by their nearest fragment, as a depth buffer that both write to has it.
+    /// The nearer of the two, with the depth of the splats' nearest fragment, as if both wrote to
+    /// one depth buffer.
     Nearest,
-    /// Both, where they lie within epsilon of each other, that of the largest surfel and along the axis, the nearer with the greater part: `1/2 + (z_t - z_s) / (2 epsilon)` of the
-    /// splats (after Guennebaud, Barthe and Paulin 2006).
+    /// Both where their depths differ by at most epsilon (that of the largest surfel, along the
+    /// camera's axis): the splats have the share `1/2 + (z_t - z_s) / (2 epsilon)` (after
+    /// Guennebaud, Barthe and Paulin 2006).
     Blended,
 }
 

@@ -1,9 +1,13 @@
-//! Blending kernels: the weight of a fragment by its place in its surfel's disk (paper 000, section 4.2).
+//! Blending kernels: the weight of a fragment by its position in its surfel's disk (paper 000,
+//! section 4.2).
 //!
-//! rho is the distance from the disk's centre in radii: 1 at the rim, where every kernel is cut off. The papers measure otherwise:
+//! rho is the distance from the disk's centre in radii: 1 at the rim, where every kernel is cut
+//! off. The papers use other units:
 //!
-//! - Paper 000 has kernels over r < b = 1.5. `psi_E` is the same in both, as b cancels; its Gaussian of sigma is that of sigma / 1.5 here.
-//! - Paper 001 has `exp(-r^2 / h^2)` with h the *radial falloff factor*, in radii: the Gaussian of sigma = h / sqrt(2).
+//! - Paper 000 has kernels over r < b = 1.5. `psi_E` is the same in both, as b cancels; its
+//!   Gaussian of sigma is that of sigma / 1.5 here.
+//! - Paper 001 has `exp(-r^2 / h^2)` with h the *radial falloff factor*, in radii: the Gaussian of
+//!   sigma = h / sqrt(2).
 
 use std::f64::consts::LN_2;
 use std::str::FromStr;
@@ -24,19 +28,20 @@ pub enum Kernel {
         a: f64,
         /// Steepness: higher values have a wider plateau.
         n: f64,
-        /// `(psi_E - exp(-a)) / (1 - exp(-a))` instead, which ends at 0: no step at the rim.
+        /// Subtracts the step at the rim: `(psi_E - exp(-a)) / (1 - exp(-a))` ends at 0.
         smooth: bool,
     },
-    /// `(1 - rho)^power`: the hat function for 1; Potree's weight of points that face the camera for 1.5.
+    /// `(1 - rho)^power`: 1 gives the hat function, 1.5 Potree's weight of points that face the
+    /// camera.
     Cone {
-        /// The power.
+        /// The exponent.
         power: f64,
     },
     /// 1.
     Constant,
 }
 
-/// A kernel without its numbers.
+/// The family of a kernel, without its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum KernelShape {
@@ -46,20 +51,23 @@ pub enum KernelShape {
     Constant,
 }
 
-/// The least weight of any fragment: a whole unit of every accumulator, so that "depth written implies weight > 0" is true. Of the bits
-/// that sums keep of small weights ([`wide_bits`](crate::plan::wide_bits)) it leaves at least 16 to the attributes of a pixel that
-/// such fragments alone reach, 20 in scenes of a million surfels and 24 in those of 60,000.
+/// The least weight of any fragment: at least one unit of every accumulator, so that "depth written
+/// implies weight > 0" holds.
+///
+/// A pixel reached only by such fragments keeps at least 16 bits of its attributes, as sums keep
+/// extra bits for small weights ([`wide_bits`](crate::plan::wide_bits)): 20 in scenes of a million
+/// surfels, 24 in those of 60,000.
 pub const LEAST_WEIGHT: f64 = 1.0 / 16_777_216.0;
 
-/// The least weight, before a low-pass, of a kernel that comes below it only at the rim, if at all: large enough that a pixel which the
-/// rims of disks alone reach keeps 14 bits of its attributes in sums of 24.
+/// The least weight, before a low-pass, of kernels that fall below it only at the rim or not at
+/// all. A pixel reached only by rims of disks then keeps 14 bits of its attributes in 24-bit sums.
 pub const LEAST_AT_RIM: f64 = 1.0 / 1024.0;
 
-/// How far inside the rim kernels that end at 0 are looked at by [`Kernel::floor`], in radii.
+/// The distance from the rim, in radii, at which [`Kernel::floor`] evaluates kernels that end at 0.
 const AT_RIM: f64 = 0.01;
 
 impl Kernel {
-    /// The weight at squared radius `rho2`, at least [`floor`](Self::floor).
+    /// The weight at the squared radius `rho2`, at least [`floor`](Self::floor).
     pub fn weight(self, rho2: f64) -> f64 {
         let weight = match self {
             Self::Gaussian { sigma } => (-0.5 * rho2 / (sigma * sigma)).exp(),
@@ -73,8 +81,10 @@ impl Kernel {
         weight.max(self.floor())
     }
 
-    /// The least weight of the kernel's fragments before a low-pass: [`LEAST_AT_RIM`], but [`LEAST_WEIGHT`] for a kernel that falls below that
-    /// well inside its disk and would be flattened there.
+    /// The least weight of the kernel's fragments before a low-pass.
+    ///
+    /// It is [`LEAST_AT_RIM`], or [`LEAST_WEIGHT`] for a kernel that falls below [`LEAST_AT_RIM`]
+    /// well inside the disk and would be flattened there.
     pub fn floor(self) -> f64 {
         let near_rim = match self {
             Self::Gaussian { sigma } => (-0.5 / (sigma * sigma)).exp(),
@@ -85,7 +95,7 @@ impl Kernel {
         if near_rim < LEAST_AT_RIM { LEAST_WEIGHT } else { LEAST_AT_RIM }
     }
 
-    /// Which it is.
+    /// The kernel's family.
     pub fn shape(self) -> KernelShape {
         match self {
             Self::Gaussian { .. } => KernelShape::Gaussian,
@@ -95,14 +105,15 @@ impl Kernel {
         }
     }
 
-    /// `psi_E` by the two numbers that paper 000 asks of a kernel (section 4.2, criteria 4 and 5): `psi(mid) = 1/2` and
-    /// `psi'(mid) = slope`, so that `n = -2 slope mid / ln 2` and `a = ln 2 mid^-n`.
+    /// `psi_E` from the two numbers by which paper 000 specifies a kernel (section 4.2, criteria 4
+    /// and 5): `psi(mid) = 1/2` and `psi'(mid) = slope`, so `n = -2 slope mid / ln 2` and
+    /// `a = ln 2 mid^-n`.
     fn plateau(mid: f64, slope: f64) -> Self {
         let n = -2.0 * slope * mid / LN_2;
         Self::Ellipse { a: LN_2 * mid.powf(-n), n, smooth: false }
     }
 
-    /// Whether its numbers are among those that are accepted.
+    /// Whether the parameters are within the accepted ranges.
     fn is_usable(self) -> bool {
         match self {
             Self::Gaussian { sigma } => (0.05..=10.0).contains(&sigma),
@@ -189,8 +200,8 @@ mod tests {
         assert!((kernel.weight(1.0) - (-6.0f64).exp()).abs() < 1e-15);
     }
 
-    /// The kernels of paper 000's figures 9 and 10 are what their formulas say wherever those are no less than 2^-24, and the
-    /// floor of kernels that end higher would have changed five of them.
+    /// The kernels of paper 000's figures 9 and 10 follow their formulas wherever those are at
+    /// least 2^-24. The higher floor [`LEAST_AT_RIM`] would have changed five of them.
     #[test]
     fn the_papers_figures_are_drawn_as_they_are() {
         let gaussian = |paper: f64| (format!("gaussian:{}", paper / 1.5), -0.5 / (paper * paper), 2.0);

@@ -9,12 +9,13 @@ use crate::error::Error;
 /// A white light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// Shines from the eye along each pixel's ray, on whichever side of the surface it meets: `intensity * |n . toward|`.
+    /// Shines from the eye along each pixel's ray and lights both sides of a surface:
+    /// `intensity * |n . toward|`.
     Headlight {
         /// Factor on the surface's colour at normal incidence.
         intensity: f32,
     },
-    /// Infinitely far away; lights the side that the normal is on: `intensity * max(0, n . toward)`.
+    /// Infinitely far away; lights the side of the normal: `intensity * max(0, n . toward)`.
     Directional {
         /// Unit vector toward the light, world space.
         toward: Vec3,
@@ -23,7 +24,7 @@ pub enum Light {
     },
 }
 
-/// Lights one render can have: they travel in a uniform.
+/// The most lights in one render, as they are stored in a uniform.
 pub const MAX_LIGHTS: usize = 8;
 
 impl Light {
@@ -38,7 +39,7 @@ impl Light {
 impl FromStr for Light {
     type Err = Error;
 
-    /// `headlight[:INTENSITY]` or `x,y,z[:INTENSITY]`, the direction toward the light.
+    /// Parses `headlight[:INTENSITY]` or `x,y,z[:INTENSITY]`, the direction toward the light.
     fn from_str(text: &str) -> Result<Self, Error> {
         let bad = || Error::Usage(format!("a light is headlight[:INTENSITY] or x,y,z[:INTENSITY], not {text:?}"));
         let (kind, intensity) = match text.split_once(':') {
@@ -54,7 +55,7 @@ impl FromStr for Light {
         let mut parts = kind.split(',').map(|part| part.trim().parse::<f32>());
         let mut next = || parts.next().ok_or_else(bad)?.map_err(|_| bad());
         let toward = Vec3::new(next()?, next()?, next()?);
-        // The largest component first, so that no square overflows.
+        // Dividing by the largest component first prevents squares from overflowing.
         let toward = (toward / toward.abs().max_element()).normalize_or_zero();
         if parts.next().is_some() || toward == Vec3::ZERO {
             return Err(bad());

@@ -1,5 +1,7 @@
-//! What an image may hold beside its colour. A map is a row of [`MAPS`]: from it follow the words of a pixel on the device, the layer
-//! of an EXR, and the names that command line and studies know.
+//! The maps that an image may have beside its colour.
+//!
+//! Each map is a row of [`MAPS`], which determines its words per pixel on the device, its layer in
+//! an EXR, and its name on the command line and in studies.
 
 use std::str::FromStr;
 
@@ -8,73 +10,85 @@ use crate::error::Error;
 /// A map beside the colour. Every one is normalised by the weight sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Map {
-    /// Camera-space z, world units; +inf where nothing is. Where it tells surfaces apart, beside triangles or of inputs that are kept apart,
-    /// a fragment counts by the square of its weight, as it lies nearer to its surface the more it weighs.
+    /// Camera-space z, world units; +inf where nothing is visible. With triangles, or inputs that
+    /// are rendered as separate surfaces, the depth decides between surfaces. Fragments then count
+    /// by their squared weights, because a fragment of larger weight lies nearer to its surface.
     Depth,
-    /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
-    /// turned toward the viewer; given ones stay as they are, and those of the pixel's side alone are blended ([`Sides`](crate::plan::Sides)).
+    /// Unit normal in world space; 0 where nothing is visible. Estimated normals have no side of
+    /// their own and are turned toward the viewer. Given normals stay as they are, and only those
+    /// on the pixel's side are blended ([`Sides`](crate::plan::Sides)).
     Normal,
-    /// The sum of weights; 0 where nothing is.
+    /// The sum of weights; 0 where nothing is visible.
     Weight,
-    /// Accepted fragments.
+    /// The number of accepted fragments.
     Count,
-    /// Reference only: the smallest relative distance of any fragment of the pixel to a yes-or-no decision (disk rim,
-    /// epsilon, near depth). Where it is tiny, f32 may rightly decide otherwise.
+    /// The smallest relative distance of any of the pixel's fragments to a yes-or-no decision (disk
+    /// rim, epsilon, near depth). Only the reference backend makes this map. Where it is tiny, f32
+    /// may legitimately decide otherwise.
     Decision,
-    /// The number of the input and of the point in it (both from 0, [`Scene::provenance`](super::Scene::provenance)) that the visible
-    /// surfel with the greatest weight is; of equal weights, by what the surfels are ([`index`](mod@crate::passes::index)).
-    /// [`NOTHING`](crate::passes::index::NOTHING) where nothing is.
+    /// The number of the input and of the point in it (both from 0,
+    /// [`Scene::provenance`](super::Scene::provenance)) of the visible surfel with the greatest
+    /// weight. Ties are broken by the surfels' contents ([`index`](mod@crate::passes::index)).
+    /// [`NOTHING`](crate::passes::index::NOTHING) where nothing is visible.
     Index,
-    /// What the surfaces of a pixel let through to the background, 1 where nothing is, 0 behind what is opaque
-    /// ([`Composite`](super::Composite)).
+    /// The transmittance of all surfaces to the background ([`Composite`](super::Composite)): 1
+    /// where nothing is visible, 0 behind opaque surfaces.
     Transmittance,
-    /// How many surfaces are composited at a pixel, of [`Composite::Sorted`](super::Composite::Sorted) fragments; 0 where nothing is.
+    /// The number of surfaces composited at the pixel, or of fragments for
+    /// [`Composite::Sorted`](super::Composite::Sorted); 0 where nothing is visible.
     Layers,
-    /// How much what lies behind the last of [`Composite::Layers`](super::Composite::Layers) shows: its alpha times what the layers let
-    /// through to it; 0 where nothing does.
+    /// The visibility of the surfaces behind the last of
+    /// [`Composite::Layers`](super::Composite::Layers): their alpha times the transmittance of the
+    /// layers; 0 where there are none.
     Tail,
-    /// The TexZ map of Tien 2008 (section 5.2): the mean texture coordinates (u, v), origin bottom left, and the mean camera-space z, world
-    /// units, of the fragments of a painted pixel; 0, 0 and +inf where nothing is. Coordinates are of surfels: 0 where a triangle shows.
+    /// The TexZ map of Tien 2008 (section 5.2): the mean texture coordinates (u, v), origin bottom
+    /// left, and the mean camera-space z, world units, of a textured pixel's fragments. 0, 0 and
+    /// +inf where nothing is visible. Only surfels have coordinates here: they are 0 where a
+    /// triangle is visible.
     TexZ,
-    /// Depth, camera-space z in world units, and alpha of the nearest [`SURFACES`] surfaces that are composited at a pixel, of
-    /// [`Composite::Sorted`](super::Composite::Sorted) fragments; of a tail the nearest depth. +inf and 0 where there are no more.
+    /// Depth (camera-space z, world units) and alpha of the nearest [`SURFACES`] surfaces
+    /// composited at the pixel, or of fragments for
+    /// [`Composite::Sorted`](super::Composite::Sorted). A tail has its nearest depth. +inf and 0
+    /// where there are no more.
     Surfaces,
 }
 
-/// Surfaces of a pixel of which [`Map::Surfaces`] tells.
+/// The number of surfaces in [`Map::Surfaces`].
 pub const SURFACES: usize = 8;
 
-/// Their channels; in an EXR each surface is a layer.
+/// The channels of [`Map::Surfaces`]; in an EXR each surface is a layer.
 const SURFACE_CHANNELS: [&str; 2 * SURFACES] =
     ["1.Z", "1.A", "2.Z", "2.A", "3.Z", "3.A", "4.Z", "4.A", "5.Z", "5.A", "6.Z", "6.A", "7.Z", "7.A", "8.Z", "8.A"];
 
-/// How one map is named and kept.
+/// The names and storage of one map.
 #[derive(Debug)]
 pub struct MapRow {
-    /// Which.
+    /// The map.
     pub map: Map,
-    /// Its name in options and studies, and of its layer in an EXR.
+    /// The map's name in options and studies, and its layer in an EXR.
     pub name: &'static str,
-    /// Its channels in an EXR, each a value of a pixel.
+    /// The channels in an EXR, one for each value of a pixel.
     pub channels: &'static [&'static str],
-    /// What asks for it in reports ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
+    /// The name of the need for this map in reports
+    /// ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
     pub need: &'static str,
-    /// The overridable constant of WGSL that says which word of a pixel's image is its first. None of a map that the reference alone makes.
+    /// The WGSL override constant with the index of the map's first word in a pixel of the image.
+    /// None if only the reference backend makes the map.
     pub image_word: Option<&'static str>,
-    /// The rasteriser makes it too.
+    /// Whether the rasteriser makes the map too.
     pub raster: bool,
-    /// It tells of all surfaces of a pixel and not of the nearest one.
+    /// Whether the map describes all surfaces of a pixel instead of the nearest one.
     pub composited: bool,
-    /// Its values are whole numbers, kept in the bits of an f32.
+    /// Whether the values are integers, stored in the bits of an f32.
     pub numbers: bool,
-    /// Two images are compared in it.
+    /// Whether comparisons of two images include this map.
     pub compared: bool,
-    /// Its values where nothing is, if they are not all 0: as many as [`channels`](Self::channels),
-    /// or their first ones over and over. Of numbers those that a device writes.
+    /// The values where nothing is visible, if not all 0: as many as [`channels`](Self::channels),
+    /// or a shorter list that repeats. For integers it has the values that a device writes.
     pub nothing: &'static [f32],
 }
 
-/// The maps, in the order of [`Map`].
+/// All maps, in the order of [`Map`].
 pub const MAPS: [MapRow; 11] = [
     MapRow { nothing: &[f32::INFINITY], ..row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")) },
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
@@ -140,12 +154,12 @@ const fn row(
 }
 
 impl Map {
-    /// Its row.
+    /// The map's row in [`MAPS`].
     pub fn row(self) -> &'static MapRow {
         &MAPS[self as usize]
     }
 
-    /// Values of a pixel.
+    /// The number of values per pixel.
     pub fn width(self) -> usize {
         self.row().channels.len()
     }
@@ -168,10 +182,10 @@ impl FromStr for Map {
 pub struct Maps(u32);
 
 impl Maps {
-    /// No map.
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// All that every device makes, by compute and by its rasteriser.
+    /// The maps that every device makes, both by compute and by its rasteriser.
     pub const ON_DEVICE: Self = {
         let (mut set, mut row) = (0, 0);
         while row < MAPS.len() {
@@ -183,10 +197,10 @@ impl Maps {
         Self(set)
     };
 
-    /// Those that tell of all surfaces of a pixel.
+    /// The maps that describe all surfaces of a pixel.
     pub const COMPOSITED: Self = Self::of(&[Map::Transmittance, Map::Layers, Map::Tail, Map::Surfaces]);
 
-    /// Those of `maps`.
+    /// The set of `maps`.
     pub const fn of(maps: &[Map]) -> Self {
         let (mut set, mut k) = (0, 0);
         while k < maps.len() {
@@ -196,47 +210,47 @@ impl Maps {
         Self(set)
     }
 
-    /// Whether `map` is one of them.
+    /// Whether the set contains `map`.
     pub const fn has(self, map: Map) -> bool {
         self.0 >> map as u32 & 1 == 1
     }
 
-    /// These and those.
+    /// The union with `others`.
     pub const fn and(self, others: &[Map]) -> Self {
         Self(self.0 | Self::of(others).0)
     }
 
-    /// These and all of `others`.
+    /// The union with `others`.
     pub const fn and_all(self, others: Self) -> Self {
         Self(self.0 | others.0)
     }
 
-    /// These but `others`.
+    /// The set without `others`.
     pub const fn but(self, others: &[Map]) -> Self {
         Self(self.0 & !Self::of(others).0)
     }
 
-    /// Those of these that are among `others`.
+    /// The intersection with `others`.
     pub const fn among(self, others: Self) -> Self {
         Self(self.0 & others.0)
     }
 
-    /// Those of these that are not among `others`.
+    /// The set without `others`.
     pub const fn beside(self, others: Self) -> Self {
         Self(self.0 & !others.0)
     }
 
-    /// Each of them, in the order of [`MAPS`].
+    /// The maps in the set, in the order of [`MAPS`].
     pub fn iter(self) -> impl Iterator<Item = Map> {
         MAPS.iter().map(|row| row.map).filter(move |map| self.has(*map))
     }
 
-    /// How many.
+    /// The number of maps in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// There is none.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }

@@ -1,4 +1,5 @@
-//! An image at all scales, so that what is seen from afar is averaged instead of picked from (Williams 1983).
+//! Mipmaps: an image at all scales, so that distant surfaces show averages instead of single texels
+//! (Williams 1983).
 
 use std::sync::Arc;
 
@@ -14,7 +15,8 @@ pub struct Mipmap {
 }
 
 impl Mipmap {
-    /// The halvings of an image: each texel is the mean, in linear light and by alpha, of what it covers of the level before.
+    /// Computes all halvings of `texture`: each texel is the mean, in linear light weighted by
+    /// alpha, of the texels that it covers in the level before.
     pub fn new(texture: Arc<Texture>) -> Self {
         let mut levels = vec![texture];
         while let Some(half) = levels.last().and_then(|last| half(last)) {
@@ -23,14 +25,17 @@ impl Mipmap {
         Self { levels }
     }
 
-    /// From the whole image on, each half as wide and high.
+    /// The levels, from the full image; each is half as wide and high as the one before.
     pub fn levels(&self) -> &[Arc<Texture>] {
         &self.levels
     }
 
-    /// The colour at texture coordinates, linear RGB premultiplied by alpha, and alpha, as a pixel sees it that covers so many texels of the
-    /// whole image: between the two levels whose texels are the next smaller and larger ones. The twin of `seen_texture` in
-    /// `wgsl/textures.wgsl`.
+    /// The filtered colour at texture coordinates `place`: linear RGB premultiplied by alpha, and
+    /// alpha.
+    ///
+    /// `texels` is the area that a pixel covers, in texels of the full image. The result is
+    /// interpolated between the levels with the next smaller and larger texels. The twin of
+    /// `seen_texture` in `wgsl/textures.wgsl`.
     pub fn seen_at(&self, place: [f64; 2], texels: f64) -> [f64; 4] {
         let level = (0.5 * texels.max(1.0).log2()).min((self.levels.len() - 1) as f64);
         let (low, share) = (level.floor() as usize, level - level.floor());
@@ -45,7 +50,7 @@ impl Mipmap {
     }
 }
 
-/// The image at half its width and height; none of one texel.
+/// The image at half its width and height; None for a single texel.
 pub(crate) fn half(of: &Texture) -> Option<Texture> {
     let [width, height] = of.size();
     if (width, height) == (1, 1) {
@@ -53,7 +58,7 @@ pub(crate) fn half(of: &Texture) -> Option<Texture> {
     }
     let halved = |side: u32| (side / 2).max(1);
     let (columns, rows) = (halved(width), halved(height));
-    // The texels of a line that one of a shorter line covers, and the parts of them.
+    // The texels of the longer line that texel k of the shorter one covers, with their shares.
     let covered = |k: u32, long: u32, short: u32| {
         let scale = f64::from(long) / f64::from(short);
         let (start, end) = (f64::from(k) * scale, f64::from(k + 1) * scale);
@@ -91,13 +96,13 @@ mod tests {
         let mipmap = Mipmap::new(Arc::new(Texture::new(12, 5, texels.collect()).unwrap()));
         let sizes: Vec<_> = mipmap.levels().iter().map(|level| level.size()).collect();
         assert_eq!(sizes, [[12, 5], [6, 2], [3, 1], [1, 1]]);
-        // Half the light, which is no half of the codes.
+        // Half the light, which is not half the codes.
         for texels in [16.0, 64.0, 1e9] {
             let [r, g, b, a] = mipmap.seen_at([0.3, 0.4], texels);
             assert!((r - 0.5).abs() < 0.02 && (b - 0.5).abs() < 0.02 && (a - 1.0).abs() < 1e-12, "{r} {g} {b} {a}");
         }
         assert_eq!(mipmap.seen_at([0.5 / 12.0, 1.0 - 0.5 / 5.0], 0.1), [1.0; 4]);
-        // A clear texel has no colour to mix in.
+        // A transparent texel adds no colour.
         let clear = Texture::new(2, 1, vec![[255, 0, 0, 255], [0, 255, 0, 0]]).unwrap();
         let [r, g, _, a] = Mipmap::new(Arc::new(clear)).seen_at([0.0; 2], 4.0);
         assert!((a - 0.5).abs() < 0.01 && (r - a).abs() < 0.01 && g == 0.0, "{r} {g} {a}");

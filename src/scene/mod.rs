@@ -1,4 +1,5 @@
-//! What is rendered: surfels, camera, lights, options. Knows no GPU and no file.
+//! The data that is rendered: surfels, triangles, camera, lights and options. No module here knows
+//! a GPU or a file.
 
 mod apart;
 mod atlas;

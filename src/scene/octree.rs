@@ -1,7 +1,7 @@
-//! Octrees of points of which each level halves the spacing, as COPC files have them: which nodes a picture takes.
+//! Point octrees whose levels halve the spacing, as in COPC files: which nodes a picture needs.
 //!
-//! A node's points add to those of the nodes above it, so a place is sampled as densely as its finest node that is read says. What is taken depends on
-//! octree and camera alone.
+//! The points of a node add to those of the nodes above it, so the finest node read at a place
+//! determines how densely it is sampled. The selection depends on octree and camera alone.
 
 use std::f64::consts::PI;
 
@@ -10,51 +10,53 @@ use glam::{DVec2, DVec3};
 use super::detail::finest;
 use super::{Bounds, Camera, Detail, Projection};
 
-/// The nodes of an octree, whose root is a cube.
+/// The nodes of an octree whose root is a cube.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointOctree {
     /// The cube's centre, world coordinates.
     pub center: DVec3,
     /// Half the cube's edge, world units.
     pub half: f64,
-    /// The distance of neighbouring points of the root, world units; each level halves it.
+    /// The spacing of neighbouring points in the root, world units; each level halves it.
     pub spacing: f64,
-    /// In order of their keys.
+    /// The nodes, sorted by [`OctreeNode::key`].
     pub nodes: Vec<OctreeNode>,
-    /// The box of all points, world coordinates; that of nothing where nobody knows it.
+    /// The bounding box of all points, world coordinates; empty if unknown.
     pub bounds: Bounds,
 }
 
-/// A node, which may have no points but those of the nodes below it.
+/// A node. It may have no points of its own, only children with points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OctreeNode {
-    /// The root's is 0, and the cube's edge is divided by 2 to this power.
+    /// The level, 0 for the root: the edge of the node's cube is that of the root divided by
+    /// `2^level`.
     pub level: u32,
-    /// Which cube of its level it is, along x, y and z.
+    /// The index of the node's cube in its level, along x, y and z.
     pub place: [u32; 3],
-    /// Points of its own.
+    /// The number of the node's own points.
     pub points: u64,
 }
 
-/// Levels of a tree whose places are whole numbers of 32 bits.
+/// The most levels for which a cube's index along an axis fits in 32 bits.
 pub const MOST_LEVELS: u32 = 32;
 
-/// Points that tell where a scene is, before a camera is.
+/// The number of points that suffice to find the extent of a scene before a camera is known.
 const OVERVIEW: u64 = 50_000;
 
-/// How far from a picture points still change it, in spacings: as neighbours of what is seen, from which its shape is estimated.
+/// Points outside the view matter up to this distance, in spacings: they are neighbours of visible
+/// points, whose shape is estimated from them.
 const NEIGHBOURHOOD: f64 = 3.0;
 
-/// How far beside an octree a place may be that is of it, in halves of its edge.
+/// Tolerance for places just outside an octree, which are rounded, in units of half its edge.
 const PLACES_ROUNDED: f64 = 1e-6;
 
 impl OctreeNode {
-    /// What its order among the nodes follows from.
+    /// The sort key of the nodes: level, then cube.
     pub fn key(&self) -> (u32, [u32; 3]) {
         (self.level, self.place)
     }
 
-    /// As COPC names it: `level-x-y-z`.
+    /// The name in COPC: `level-x-y-z`.
     pub fn name(&self) -> String {
         let Self { level, place: [x, y, z], .. } = self;
         format!("{level}-{x}-{y}-{z}")
@@ -62,12 +64,12 @@ impl OctreeNode {
 }
 
 impl PointOctree {
-    /// The index of a node, if it is there.
+    /// The index of the node at `place` in `level`, if it exists.
     pub fn find(&self, level: u32, place: [u32; 3]) -> Option<usize> {
         self.nodes.binary_search_by_key(&(level, place), OctreeNode::key).ok()
     }
 
-    /// Those of the eight nodes below one that are there.
+    /// The indices of the children of `node` that exist.
     fn children(&self, node: &OctreeNode) -> impl Iterator<Item = usize> {
         let place = node.place;
         (0..8).filter_map(move |corner| {
@@ -76,17 +78,18 @@ impl PointOctree {
         })
     }
 
-    /// Points of so many nodes, by their indices.
+    /// The number of points in the nodes with these indices.
     pub fn points(&self, nodes: &[usize]) -> u64 {
         nodes.iter().map(|&node| self.nodes[node].points).sum()
     }
 
-    /// Levels from the root to the finest node.
+    /// The number of levels, from the root to the finest node.
     pub fn levels(&self) -> u32 {
         self.nodes.last().map_or(0, |node| node.level + 1)
     }
 
-    /// The nodes of the coarsest levels that have 50,000 points or more together, or all: an overview, whatever the view.
+    /// An overview for any view: the nodes of the coarsest levels that together have at least
+    /// 50,000 points, or all nodes.
     pub fn overview(&self) -> Vec<usize> {
         let of_level = |level: u32| self.nodes.iter().filter(move |node| node.level == level);
         let mut points = 0;
@@ -99,8 +102,10 @@ impl PointOctree {
         (0..self.nodes.len()).filter(|&node| self.nodes[node].level < levels).collect()
     }
 
-    /// The nodes that a picture takes, in order: those in view, and what is below one of whose spacing a disk is seen as large as `size`, square
-    /// pixels, or larger.
+    /// The sorted indices of the nodes that a picture needs.
+    ///
+    /// They are the nodes in view for which every ancestor is coarse enough to be refined: a disk
+    /// with the ancestor's spacing as its radius has an image of at least `size` square pixels.
     fn taken(&self, camera: &Camera, size: f64) -> Vec<usize> {
         let mut open: Vec<usize> = self.find(0, [0; 3]).into_iter().collect();
         let mut taken = Vec::new();
@@ -112,7 +117,7 @@ impl PointOctree {
             let at = camera.rotation * (self.center + place * self.half - camera.eye);
             let radius = 3f64.sqrt() * self.half * shrunk;
             let reach = radius + NEIGHBOURHOOD * spacing;
-            // Of the cube, not of the ball around it.
+            // The depth extent is that of the cube, not of its bounding sphere.
             let deep = self.half * shrunk * camera.rotation.row(2).abs().element_sum();
             if at.z + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE) {
                 continue;
@@ -120,7 +125,7 @@ impl PointOctree {
             taken.push(index);
             let pixels = camera.fx.max(camera.fy)
                 / match camera.projection {
-                    // At the camera's plane nothing is small.
+                    // Nothing is small at the camera's plane.
                     Projection::Pinhole => (at.z - deep).max(0.0),
                     Projection::Orthographic => 1.0,
                 };
@@ -133,8 +138,11 @@ impl PointOctree {
     }
 }
 
-/// The nodes of each of `octrees` that a picture with this detail takes. For a number of splats that is the finest size with which no more points are
-/// read, but for roots, and for what reaches the camera's plane.
+/// The nodes of each octree that a picture with this `detail` needs.
+///
+/// For [`Detail::Splats`], it searches the finest size with which at most that many points are
+/// read. The roots, and nodes that reach the camera's plane, are read in any case and may exceed
+/// it.
 pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Vec<usize>> {
     let of_size = |size: f64| octrees.iter().map(|octree| octree.taken(camera, size)).collect::<Vec<_>>();
     let Detail::Splats(most) = detail else { return of_size(detail.pixels(camera.pixels() as f64)) };
@@ -144,17 +152,18 @@ pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Ve
     }))
 }
 
-/// What was taken of an octree, beside all of it.
+/// The nodes taken from an octree, compared with all of its nodes.
 pub struct Thinned<'a> {
     octree: &'a PointOctree,
-    /// In order.
+    /// Sorted indices of the taken nodes.
     taken: &'a [usize],
-    /// Points of each node and of all below it.
+    /// The number of points of each node and all nodes below it.
     points: Vec<u64>,
 }
 
 impl<'a> Thinned<'a> {
-    /// Of an octree these nodes, in order, each with the one above it.
+    /// Compares the `taken` nodes, sorted, with all of `octree`. With each node its parent must be
+    /// among them.
     pub fn new(octree: &'a PointOctree, taken: &'a [usize]) -> Self {
         let mut points: Vec<u64> = octree.nodes.iter().map(|node| node.points).collect();
         for (index, node) in octree.nodes.iter().enumerate().rev() {
@@ -167,12 +176,14 @@ impl<'a> Thinned<'a> {
         Self { octree, taken, points }
     }
 
-    /// About how large the disks of all points would be at a place of a surface, world coordinates, in the unit of those of what was taken: disks are
-    /// as large as points are far from each other. 1 where everything was taken, and None beside the octree.
+    /// The estimated size of disks if all points were taken, relative to disks of the taken points.
+    ///
+    /// Disks are as large as the spacing of the points around `place`, world coordinates on the
+    /// surface. The result is 1 where everything was taken, and None outside the octree.
     pub fn part_of_size(&self, place: DVec3) -> Option<f64> {
         let octree = self.octree;
         let within = (place - octree.center) / octree.half;
-        // Places are rounded, and those at the faces too.
+        // Places are rounded, and so are the faces of the octree.
         if within.abs().max_element() > 1.0 + PLACES_ROUNDED {
             return None;
         }
@@ -181,7 +192,8 @@ impl<'a> Thinned<'a> {
             let cube = ((within + 1.0) * 0.5 * side).floor().clamp(DVec3::ZERO, DVec3::splat(side - 1.0));
             octree.find(level, cube.to_array().map(|place| place as u32))
         };
-        // Points of the last node that was taken, with those of the nodes above it in its cube: of a surface a quarter of a cube's, each time.
+        // Points in the cube of the finest taken node: its own, and of those of its ancestors a
+        // quarter per level, as points on a surface divide among four of the eight child cubes.
         let (mut taken, mut all) = (1.0, 1.0);
         let mut above = 0.0;
         for node in (0..octree.levels()).map_while(at_level) {
@@ -202,7 +214,7 @@ mod tests {
     use super::*;
     use crate::scene::{Lens, Up};
 
-    /// A cube of side 2 around the origin, all of whose nodes have `points`.
+    /// A cube of side 2 around the origin with complete levels, every node with `points` points.
     fn full(levels: u32, points: u64) -> PointOctree {
         let mut nodes = Vec::new();
         for level in 0..levels {
@@ -222,7 +234,8 @@ mod tests {
         let octree = full(5, 10);
         let lens = Lens::OrthographicHeight(3.0);
         let camera = camera(DVec3::new(0.0, 0.0, 5.0), lens);
-        // 85.3 pixels a world unit: a disk of the root's spacing has 1,428 square pixels, those of levels a quarter each.
+        // At 85.3 pixels per world unit, a disk of the root's spacing covers 1,428 square pixels,
+        // and a quarter of that for each further level.
         for (size, levels) in [(1e9, 1), (1500.0, 1), (1400.0, 2), (350.0, 3), (80.0, 4), (20.0, 5), (0.0, 5)] {
             let [nodes] = taken(std::slice::from_ref(&octree), &camera, Detail::Pixels(size)).try_into().unwrap();
             assert!(
@@ -230,7 +243,7 @@ mod tests {
                 "{size}"
             );
         }
-        // From near, what is near is finer, and what is beside the picture is left out.
+        // From nearby, near nodes are finer, and nodes outside the view are left out.
         let close = self::camera(DVec3::new(0.0, 0.0, 1.5), Lens::Fov(30.0));
         let nodes = octree.taken(&close, 1400.0);
         let finest = |front: bool| {
@@ -240,7 +253,7 @@ mod tests {
         assert!(finest(true) > finest(false), "{:?} {:?}", finest(true), finest(false));
         let outside = octree.find(4, [0, 0, 15]).unwrap();
         assert!(!octree.taken(&close, 0.0).contains(&outside) && octree.taken(&camera, 0.0).contains(&outside));
-        // What lies behind.
+        // Everything lies behind this camera.
         let away = self::camera(DVec3::new(0.0, 0.0, 9.0), lens);
         let turned = Camera { rotation: glam::DMat3::from_rotation_y(PI) * away.rotation, ..away };
         assert!(octree.taken(&turned, 0.0).is_empty());
@@ -254,7 +267,7 @@ mod tests {
         for most in [200, 1_000, 10_000, 30_000, all, 1 << 40] {
             let nodes = taken(&octrees, &camera, Detail::Splats(most));
             let points: u64 = octrees.iter().zip(&nodes).map(|(octree, nodes)| octree.points(nodes)).sum();
-            // Nodes of a hundred points come one at a time, as their depths differ.
+            // Depths differ, so nodes of a hundred points are added one at a time.
             assert!(points <= most && points + 1_000 >= most.min(all), "{most}: {points}");
         }
     }
@@ -262,7 +275,7 @@ mod tests {
     #[test]
     fn what_was_taken_has_larger_disks_than_all_where_there_is_more() {
         let mut octree = full(3, 100);
-        // Of one corner's finest level nothing is there.
+        // Remove the finest level of one corner.
         octree.nodes.retain(|node| node.level < 2 || node.place.iter().any(|place| *place > 1));
         let [corner, other] = [DVec3::splat(-0.9), DVec3::splat(0.9)];
         let all: Vec<usize> = (0..octree.nodes.len()).collect();
@@ -281,7 +294,7 @@ mod tests {
     #[test]
     fn an_overview_has_enough_points_and_whole_levels() {
         let octree = full(4, 1_000);
-        // 1, 8 and 64 nodes.
+        // Levels of 1, 8 and 64 nodes.
         assert_eq!(octree.overview().len(), 73);
         assert_eq!(full(4, 1).overview().len(), full(4, 1).nodes.len());
     }

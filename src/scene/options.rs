@@ -1,36 +1,41 @@
-//! What a picture is: which fragments are one surface, how they are blended, lit and filtered.
+//! Options of the picture: depth tolerance, blending, culling, sampling, low-pass and shading.
 
 use std::str::FromStr;
 
 use crate::error::Error;
 
-/// The depth tolerance: a fragment counts as the visible surface if `z <= nearest + epsilon` (paper 000, section 5.3).
+/// The depth tolerance: a fragment belongs to the visible surface if `z <= nearest + epsilon`
+/// (paper 000, section 5.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Epsilon {
     /// A fraction of the nearest depth at the pixel.
     Relative(f64),
     /// World units, along the camera's axis.
     Absolute(f64),
-    /// World units along the pixel's view ray, as paper 000 moves its splats "along the perspective projector" (section 5.3).
+    /// World units along the pixel's view ray: paper 000 moves its splats "along the perspective
+    /// projector" (section 5.3).
     Ray(f64),
-    /// A multiple of the fragment's own surfel's shorter half-axis.
+    /// A multiple of the shorter half-axis of the fragment's surfel.
     Radius(f64),
-    /// The lesser of a multiple of that half-axis and a fraction of the nearest depth: disks that are coarse for their scene do not
-    /// reach through it.
+    /// The smaller of a multiple of that half-axis and a fraction of the nearest depth: disks that
+    /// are coarse for their scene do not reach through it.
     Bounded {
-        /// The multiple.
+        /// The multiple of the half-axis.
         radius: f64,
-        /// The fraction.
+        /// The fraction of the nearest depth.
         relative: f64,
     },
 }
 
-/// The smallest relative tolerance in force: visibility and attribute pass must agree that the nearest fragment is
-/// visible even if their compilers contract its depth differently (four units in the last place of f32).
+/// The smallest relative tolerance in effect, four units in the last place of f32. Visibility and
+/// attribute pass must agree that the nearest fragment is visible, even if their compilers contract
+/// its depth differently.
 pub const LEAST_EPSILON: f64 = 4.0 / 16_777_216.0;
 
 impl Epsilon {
-    /// The parts (relative, absolute, of the radius): the farthest accepted depth of a surfel of radius r is at most
+    /// The coefficients (relative, absolute, of_radius) of the tolerance.
+    ///
+    /// The farthest accepted depth for a surfel of radius r is at most
     /// `nearest * (1 + relative) + absolute + of_radius * r`.
     pub fn parts(self) -> (f64, f64, f64) {
         match self {
@@ -40,7 +45,7 @@ impl Epsilon {
         }
     }
 
-    /// The fraction of the nearest depth that what depends on the radius does not exceed.
+    /// The upper limit of the part that depends on the radius, as a fraction of the nearest depth.
     pub fn most(self) -> f64 {
         match self {
             Self::Bounded { relative, .. } => relative,
@@ -48,8 +53,10 @@ impl Epsilon {
         }
     }
 
-    /// The farthest depth that is accepted of a surfel whose shorter half-axis is `radius`, where the `nearest` is known, at a pixel whose
-    /// ray gains the depth `along` a unit of its length ([`Camera::along_axis`](super::Camera::along_axis)); world units.
+    /// The farthest accepted depth, world units, for a surfel with the shorter half-axis `radius`.
+    ///
+    /// `along` is the depth that the pixel's ray gains per unit of length
+    /// ([`Camera::along_axis`](super::Camera::along_axis)).
     pub fn farthest(self, nearest: f64, radius: f64, along: f64) -> f64 {
         let (relative, absolute, of_radius) = self.parts();
         let absolute = if matches!(self, Self::Ray(_)) { absolute * along } else { absolute };
@@ -57,7 +64,7 @@ impl Epsilon {
     }
 }
 
-/// The parts of `KIND:AMOUNT`, an amount that is finite and not negative.
+/// Splits `KIND:AMOUNT`; None if the amount is negative or not finite.
 pub(crate) fn kind_and_amount(text: &str) -> Option<(&str, f64)> {
     let (kind, amount) = text.split_once(':')?;
     let amount: f64 = amount.parse().ok()?;
@@ -70,7 +77,7 @@ impl FromStr for Epsilon {
     fn from_str(text: &str) -> Result<Self, Error> {
         let bad = || {
             Error::Usage(format!(
-                "an epsilon is rel:E (fraction of depth), abs:E (world units along the camera's axis), ray:E (along the ray), radius:K (times the surfel's) or the lesser of two, \
+                "an epsilon is rel:E (fraction of depth), abs:E (world units along the camera's axis), ray:E (along the ray), radius:K (times the surfel's shorter half-axis) or the lesser of two, \
                  radius:K,rel:E, not {text:?}"
             ))
         };
@@ -90,13 +97,14 @@ impl FromStr for Epsilon {
     }
 }
 
-/// What a pixel shows of its fragments.
+/// The blending of a pixel's fragments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blend {
-    /// The weighted mean of those within epsilon of the nearest depth (paper 000, Eq. 7).
+    /// The weighted mean of the fragments within epsilon of the nearest depth (paper 000, Eq. 7).
     #[default]
     Weighted,
-    /// The colour of the nearest one alone, as with a depth test; of several at one depth that of the greatest colour.
+    /// The colour of the nearest fragment alone, as with a depth test; of several at one depth, the
+    /// greatest colour.
     Nearest,
 }
 
@@ -112,16 +120,16 @@ impl FromStr for Blend {
     }
 }
 
-/// Which surfels are left out by the side that they show.
+/// The surfels that are left out because of the side that they show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cull {
-    /// Those that face away, where nobody can see one: the scene is closed ([`Scene::closed`](super::Scene::closed)) and the eye
-    /// outside its box.
+    /// Leaves out surfels that face away if none of them can be visible: the scene is closed
+    /// ([`Scene::closed`](super::Scene::closed)) and the eye is outside its box.
     #[default]
     Auto,
-    /// None.
+    /// Draws all surfels.
     None,
-    /// Those that face away.
+    /// Leaves out all surfels that face away.
     Back,
 }
 
@@ -138,23 +146,23 @@ impl FromStr for Cull {
     }
 }
 
-/// How many samples of coverage, depth and blending a pixel has: on a grid of 1x1, 2x2, 2x4 or 4x4.
+/// Samples per pixel for coverage, depth and blending: a grid of 1x1, 2x2, 2x4 or 4x4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Samples {
-    /// Samples of a pixel, across.
+    /// Columns of samples in a pixel.
     pub across: u32,
-    /// And down.
+    /// Rows of samples in a pixel.
     pub down: u32,
 }
 
 impl Samples {
-    /// One, at the pixel's centre.
+    /// One sample, at the pixel's centre.
     pub const ONE: Self = Self { across: 1, down: 1 };
 
     /// Four, on a grid of 2 x 2.
     pub const FOUR: Self = Self { across: 2, down: 2 };
 
-    /// How many they are.
+    /// The number of samples in a pixel.
     pub fn count(self) -> u32 {
         self.across * self.down
     }
@@ -181,19 +189,21 @@ impl FromStr for Samples {
     }
 }
 
-/// What is done about splats that are near a pixel in size or below.
+/// The low-pass filter for splats near or below the size of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LowPass {
-    /// Nothing: a pixel's centre lies in the disk or not.
+    /// No filter: a disk covers a pixel if it contains the pixel's centre.
     #[default]
     None,
-    /// The larger of the object-space kernel and a round one of 0.71 pixels (Botsch et al. 2005): no splat falls between
-    /// the pixels' centres.
+    /// The larger of the object-space kernel and a round one of 0.71 pixels (Botsch et al. 2005),
+    /// so no splat falls between the pixels' centres.
     Max,
-    /// The kernel convolved with the pixel (EWA, Zwicker et al. 2001): no aliasing either.
+    /// The kernel convolved with the pixel (EWA, Zwicker et al. 2001), which also avoids aliasing.
     Ewa,
-    /// That of [`Max`](Self::Max), with the round kernel of Gaussian surfels ([`gaussian`](super::gaussian)): `exp(-d^2)`, d in pixels, or in samples where a pixel has several.
+    /// As [`Max`](Self::Max), with the round kernel of Gaussian surfels
+    /// ([`gaussian`](super::gaussian)): `exp(-d^2)`, d in pixels, or in samples if a pixel has
+    /// several.
     Gaussians,
 }
 
@@ -211,17 +221,18 @@ impl FromStr for LowPass {
     }
 }
 
-/// How a resolved pixel gets its colour.
+/// The shading of a resolved pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
-    /// The blended colour as it is.
+    /// The blended colour, without lights.
     Unlit,
-    /// The blended colour times the lights' irradiance at the blended normal.
+    /// The blended colour times the irradiance of the lights at the blended normal.
     Lambert,
-    /// Lambert's light and white highlights (Phong 1975), [`HIGHLIGHT`] times a light's irradiance times `max(0, r . v)^shininess`,
-    /// where r is the light's direction mirrored at the normal and v the direction toward the eye. Phong's own term stops short where a
-    /// light sets behind the surface; with the irradiance as a factor (Lewis 1994) it ends there at 0.
+    /// Lambert shading plus white highlights (Phong 1975): [`HIGHLIGHT`] times a light's irradiance
+    /// times `max(0, r . v)^shininess`, where r is the light's direction mirrored at the normal and
+    /// v the direction to the eye. Phong's own term ends abruptly where a light sets behind the
+    /// surface; with the irradiance as a factor (Lewis 1994) it falls to 0 there.
     Phong,
 }
 
@@ -250,22 +261,24 @@ impl FromStr for ShadingAt {
     }
 }
 
-/// What is lit.
+/// The place where shading is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShadingAt {
-    /// Each pixel, at its blended normal.
+    /// At each pixel, with its blended normal.
     #[default]
     Pixel,
-    /// Each splat, at its centre: lit colours are blended (paper 000, section 5.3).
+    /// At each splat's centre; the lit colours are blended (paper 000, section 5.3).
     Splat,
 }
 
-/// What a highlight of [`Shading::Phong`] adds, of a light's irradiance, where the light is mirrored into the eye.
-/// With one light of 1 it does not clip the colour of surfels that have none (`DEFAULT_COLOR`).
+/// The strength of a [`Shading::Phong`] highlight, as a fraction of the light's irradiance, where
+/// the mirrored light points at the eye. With one light of intensity 1, it does not clip the
+/// default colour (`DEFAULT_COLOR`).
 pub const HIGHLIGHT: f64 = 0.3;
 
-/// Exponents that [`RenderOptions::shininess`](crate::plan::RenderOptions::shininess) may have: with more, the cosine's rounding in f32 would show.
+/// The allowed range of [`RenderOptions::shininess`](crate::plan::RenderOptions::shininess): above
+/// it, the rounding of the cosine in f32 would be visible.
 pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Polygons in the place of disks.
+//! Polygons instead of disks.
 
 use std::f64::consts::PI;
 use std::str::FromStr;
@@ -7,37 +7,41 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
-/// A regular polygon in each unit disk, with one corner at the end of the first half-axis: what is drawn of a splat. Kernel and size
-/// are the disk's. (Paper 001, section 3, figure 2, where a splat is "a simple polygon".)
+/// A regular polygon inscribed in each unit disk, with a corner at the end of the first half-axis.
+///
+/// Splats are drawn with this outline; kernel and size are the disk's. (Paper 001, section 3,
+/// figure 2, where a splat is "a simple polygon".)
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(try_from = "u32")]
 pub struct Outline(u32);
 
 impl Outline {
-    /// The fewest and the most sides. With 17 a polygon would be less than a hundredth of the radius off its disk.
+    /// The smallest and largest number of sides. With 16 sides a polygon deviates from its disk by
+    /// at most `1 - cos(pi / 16)` = 0.02 of the radius.
     pub const SIDES: [u32; 2] = [3, 16];
 
-    /// Of so many sides.
+    /// A polygon with this number of sides.
     ///
     /// # Errors
-    /// [`Error::Usage`] if they are not within [`Self::SIDES`].
+    /// [`Error::Usage`] if the number is not within [`Self::SIDES`].
     pub fn of_sides(sides: u32) -> Result<Self> {
         let [least, most] = Self::SIDES;
         let known = (least..=most).contains(&sides);
         known.then_some(Self(sides)).ok_or_else(|| Error::Usage(format!("an outline has {least} to {most} sides")))
     }
 
-    /// Its sides.
+    /// The number of sides.
     pub fn sides(self) -> u32 {
         self.0
     }
 
-    /// Half the angle of a side, radians; its cosine is how far from the centre the middle of a side lies.
+    /// Half the central angle of a side, radians. Its cosine is the distance from the centre to a
+    /// side.
     pub fn half_angle(self) -> f64 {
         PI / f64::from(self.0)
     }
 
-    /// How far inside its sides (u, v) lies, radii: negative outside.
+    /// The distance of (u, v) to the nearest side in radii, positive inside and negative outside.
     pub fn inside(self, u: f64, v: f64) -> f64 {
         let half = self.half_angle();
         let to_side = |side: u32| {

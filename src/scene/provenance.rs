@@ -1,34 +1,38 @@
-//! Which point of which input a surfel is.
+//! Provenance: the input and point that each surfel comes from.
 
 use std::ops::Range;
 
-/// Where the surfels of a scene come from: inputs one after the other, each without the points that were left out. A scene that nobody
-/// read says nothing and counts as one input.
+/// The origin of a scene's surfels: consecutive inputs, each without the points that were left out.
+/// A scene that was not read from files has no inputs and counts as one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     inputs: Vec<Input>,
-    /// The number that each surfel had before the scene was put into another order.
+    /// For each surfel, its index before the scene was reordered.
     order: Option<Vec<u32>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 struct Input {
-    /// Surfels of the inputs before it.
+    /// The number of surfels in the inputs before this one.
     first: u64,
-    /// Numbers of the points that are no surfels, in order.
+    /// Sorted numbers of the points that became no surfel.
     left_out: Vec<u64>,
-    /// The number of each of the others, where several surfels are of one.
+    /// For each surfel, the number of its point among those that are kept, if a point may have
+    /// several surfels.
     numbers: Option<Vec<u32>>,
 }
 
 impl Provenance {
-    /// Another input follows, whose first surfel would be number `first` of the scene; `left_out` are the numbers, in order, of those of
-    /// its points that become none. Where one point becomes several surfels, `numbers` are those of each surfel's point among those that are kept.
+    /// Appends an input whose first surfel has the index `first` in the scene.
+    ///
+    /// `left_out` are the sorted numbers of its points that become no surfel. If a point may become
+    /// several surfels, `numbers` has for each surfel the number of its point among the points that
+    /// are kept.
     pub fn push(&mut self, first: u64, left_out: Vec<u64>, numbers: Option<Vec<u32>>) {
         self.inputs.push(Input { first, left_out, numbers });
     }
 
-    /// Only those surfels remain whose flag in `keep`, one for each, is set.
+    /// Keeps only the surfels whose flag in `keep` is set; it has one flag per surfel.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         let mut inputs = std::mem::take(&mut self.inputs).into_iter().peekable();
         let mut kept = 0;
@@ -52,7 +56,8 @@ impl Provenance {
         }
     }
 
-    /// The surfels of each input that has some, of `surfels` in all; all together where they are in an order that is not the inputs'.
+    /// The index ranges of each input's surfels, of `surfels` in all, without empty ones. A
+    /// reordered scene has one range for all inputs.
     pub fn ranges(&self, surfels: u64) -> impl Iterator<Item = Range<u64>> {
         let inputs = if self.order.is_some() { &[][..] } else { &self.inputs };
         let firsts = inputs.iter().skip(1).map(|input| input.first);
@@ -60,13 +65,14 @@ impl Provenance {
         [0].into_iter().chain(firsts).zip(ends).map(|(first, end)| first..end).filter(|own| !own.is_empty())
     }
 
-    /// Surfel k becomes what number `order[k]` was.
+    /// Reorders the surfels: the new surfel k is the old surfel `order[k]`.
     pub(crate) fn reorder(&mut self, order: &[u32]) {
         let before = |index: u32| self.order.as_ref().map_or(index, |before| before[index as usize]);
         self.order = Some(order.iter().map(|&index| before(index)).collect());
     }
 
-    /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
+    /// The number of the input of surfel `index`, and the number of its point in that input; both
+    /// start at 0.
     pub fn of(&self, index: u64) -> (u64, u64) {
         let before = |order: &Vec<u32>| order.get(index as usize).copied().map(u64::from);
         let index = self.order.as_ref().and_then(before).unwrap_or(index);
@@ -78,9 +84,10 @@ impl Provenance {
     }
 }
 
-/// The number of the `kept`th point (from 0) that is none of `left_out`, which are in order.
+/// The number of the point with index `kept` (from 0) among the points not in the sorted
+/// `left_out`.
 fn number(left_out: &[u64], kept: u64) -> u64 {
-    // As many of the kept ones lie before the kth that is left out as its number exceeds k.
+    // Binary search: `left_out[k] - k` kept points precede the k-th point that is left out.
     let (mut low, mut high) = (0, left_out.len());
     while low < high {
         let middle = low.midpoint(high);
@@ -99,7 +106,7 @@ mod tests {
         assert_eq!(provenance.of(7), (0, 7));
         provenance.push(0, vec![0, 3, 4], None);
         provenance.push(3, vec![], None);
-        // An input without a surfel.
+        // An input without surfels.
         provenance.push(5, vec![0, 1], None);
         provenance.push(5, vec![1], None);
         let all: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();

@@ -1,21 +1,22 @@
-//! Some surfels of a scene, or all in another order.
+//! Scenes with some of the surfels of another, or with all of them in another order.
 
 use rayon::prelude::*;
 
 use super::{Colors, Scene};
 
-/// The values at these indices; of none, none.
+/// The values at these indices; an empty list stays empty.
 fn at<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
     if values.is_empty() { Vec::new() } else { indices.par_iter().map(|&index| values[index as usize]).collect() }
 }
 
-/// Puts a list in another order.
+/// Replaces a list by its values at these indices.
 fn reorder<T: Copy + Send + Sync>(values: &mut Vec<T>, indices: &[u32]) {
     *values = at(values, indices);
 }
 
 impl Scene {
-    /// The surfels at these indices, in this order, as a scene like this one; without levels of detail, as it is in no tree's order.
+    /// The surfels at `indices`, in that order, with the other contents of this scene. Levels of
+    /// detail are dropped, as the surfels are in no tree's order.
     #[must_use]
     pub fn taken(&self, indices: &[u32]) -> Self {
         let places = || indices.iter().map(|&index| index as usize).collect::<Vec<_>>();
@@ -43,7 +44,8 @@ impl Scene {
         }
     }
 
-    /// The same, where it takes the place of this scene: lists are replaced one after the other.
+    /// As [`Scene::taken`], but consumes the scene: lists are replaced one by one, which saves
+    /// memory.
     #[must_use]
     pub fn into_order(mut self, indices: &[u32]) -> Self {
         let places = || indices.iter().map(|&index| index as usize).collect::<Vec<_>>();
@@ -87,7 +89,7 @@ mod tests {
         let points = |scene: &Scene| (0..5).map(|k| scene.provenance.of(k)).collect::<Vec<_>>();
         assert_eq!(points(&scene), [(0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]);
         assert_eq!(points(&first), [(1, 1), (0, 2), (1, 2), (0, 1), (1, 0)]);
-        // And once more, back.
+        // A second permutation composes with the first.
         assert_eq!(points(&first.taken(&[3, 1, 4, 0, 2])), points(&scene.taken(&[0, 1, 2, 3, 4])));
     }
 }

@@ -1,4 +1,4 @@
-//! The scene: surfels around an origin, their colours, and which way is up.
+//! The scene: surfels around an origin, their attributes, and the up axis.
 
 use std::sync::Arc;
 
@@ -10,15 +10,15 @@ use super::{Cap, Clip, Colors, Fade, Hierarchy, Listed, Provenance, Surfel, Tria
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Up {
-    /// Most mesh formats.
+    /// The up axis of most mesh formats.
     #[default]
     Y,
-    /// Survey data.
+    /// The up axis of survey data.
     Z,
 }
 
 impl Up {
-    /// The unit vector of the axis.
+    /// The axis as a unit vector.
     pub fn axis(self) -> DVec3 {
         match self {
             Self::Y => DVec3::Y,
@@ -26,7 +26,7 @@ impl Up {
         }
     }
 
-    /// `y` or `z`.
+    /// The axis's name, `y` or `z`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Y => "y",
@@ -34,7 +34,7 @@ impl Up {
         }
     }
 
-    /// The unit vector that serves as up in a view along the axis.
+    /// The unit vector that replaces the axis as up in a view along the axis.
     pub fn other(self) -> DVec3 {
         match self {
             Self::Y => DVec3::Z,
@@ -43,60 +43,66 @@ impl Up {
     }
 }
 
-/// What is rendered, as every reader and generator delivers it.
+/// The scene to render, as every reader and generator delivers it.
 ///
-/// Surfel i lies at `origin + surfels[i].center + low[i]`. Splitting a world coordinate into an f64 origin and an f32 offset
-/// keeps georeferenced clouds free of jitter: offsets are as small as the scene, however far away its map origin is. Where they
-/// are not small, as in a scene of two distant clusters, `low` has the digits that an f32 has no room for.
+/// Surfel i lies at `origin + surfels[i].center + low[i]`. An f64 origin with f32 offsets keeps
+/// georeferenced clouds free of jitter: offsets are as small as the scene, however far away the
+/// origin of its map is. Where offsets are large, as in a scene of two distant clusters, `low`
+/// holds the digits beyond f32.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// World coordinates of the point that surfel centres are relative to.
+    /// The origin of the surfel centres, world coordinates.
     pub origin: DVec3,
     /// The surfels, in world units relative to [`Scene::origin`].
     pub surfels: Vec<Surfel>,
-    /// What the f32 centres leave out, world units: one for each surfel, or none at all where it is less than anybody sees.
+    /// The part of each centre beyond f32, world units; empty if it is invisibly small for all
+    /// surfels.
     pub low: Vec<[f32; 3]>,
-    /// Where disks end before their rims: one for each surfel, or none at all.
+    /// The clip lines of each disk; empty if none is clipped.
     pub clips: Vec<Clip>,
-    /// How disks curve: one for each surfel, or none at all where all are flat.
+    /// The curvature of each disk; empty if all are flat.
     pub caps: Vec<Cap>,
-    /// The unit normals that light sees, where they are others than those of the disks' planes: one for each surfel, or none at all.
+    /// The unit normal of each surfel for shading; empty if these are the normals of the disks'
+    /// planes.
     pub normals: Vec<[f32; 3]>,
-    /// How much of each surfel there is: one for each, or none at all where all are whole.
+    /// The fade of each surfel between levels of detail; empty if all are whole.
     pub fades: Vec<Fade>,
-    /// One colour for all, or one for each surfel in the same order.
+    /// One colour for all surfels, or one for each.
     pub colors: Colors,
-    /// They are codes of sRGB, as displays take them, instead of linear light, and are composited as they are: the surfels are Gaussians
-    /// ([`gaussian`](super::gaussian)), or among some.
+    /// Whether colours are sRGB codes that are composited as they are, instead of linear light. It
+    /// is set if there are Gaussian surfels ([`gaussian`](super::gaussian)).
     pub encoded: bool,
-    /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.
+    /// Whether normals were given and thus tell the two sides of a surface apart; estimated ones do
+    /// not.
     pub oriented: bool,
-    /// The surfels close their surfaces and face outward, so that their backs are seen from inside alone.
+    /// Whether the surfels form closed surfaces and face outward, so that backs are visible only
+    /// from inside.
     pub closed: bool,
-    /// Levels of detail of the surfels, which are in the order of the tree.
+    /// The levels of detail; the surfels are in the order of this tree.
     pub hierarchy: Option<Arc<Hierarchy>>,
-    /// Surfels and levels are a part of this: its bounds and ranges are those of the scene.
+    /// The facts about the whole scene if this is a part of it: bounds and ranges are those of the
+    /// whole.
     pub part_of: Option<Box<Whole>>,
     /// Triangles beside the surfels.
     pub triangles: Triangles,
-    /// The axis a camera without instructions takes as up.
+    /// The up axis of cameras that have none of their own.
     pub up: Up,
-    /// Which points of which inputs the surfels are.
+    /// The input and point that each surfel comes from.
     pub provenance: Provenance,
 }
 
-/// Surfels that [`Scene::core`] looks at, at most.
+/// The most surfels that [`Scene::core`] samples.
 const CORE_SAMPLE: usize = 4096;
 
-/// One in so many of them may lie beyond each of its sides.
+/// One in so many sampled surfels may lie beyond each side of the core.
 const CORE_CUT: usize = 64;
 
-/// An axis-aligned box, world units; for a scene relative to [`Scene::origin`].
+/// An axis-aligned box in world units; a scene's is relative to [`Scene::origin`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Smallest coordinates, +inf when nothing is inside.
+    /// Smallest coordinates, +inf for the empty box.
     pub min: DVec3,
-    /// Largest coordinates, -inf when nothing is inside.
+    /// Largest coordinates, -inf for the empty box.
     pub max: DVec3,
 }
 
@@ -107,53 +113,55 @@ impl Default for Bounds {
 }
 
 impl Bounds {
-    /// The box around nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// Whether nothing is inside.
+    /// Whether the box is empty.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// The middle; zero for the empty box.
+    /// The centre; zero for the empty box.
     pub fn center(&self) -> DVec3 {
         if self.is_empty() { DVec3::ZERO } else { self.min + (self.max - self.min) * 0.5 }
     }
 
-    /// The lengths of the edges; zero for the empty box.
+    /// The edge lengths; zero for the empty box.
     pub fn extent(&self) -> DVec3 {
         if self.is_empty() { DVec3::ZERO } else { self.max - self.min }
     }
 
-    /// The smallest box that holds this one and `point`; a non-finite point changes nothing.
+    /// The smallest box that holds this one and `point`. A point that is not finite changes
+    /// nothing.
     pub fn with_point(self, point: DVec3) -> Self {
         if point.is_finite() { Self { min: self.min.min(point), max: self.max.max(point) } } else { self }
     }
 
-    /// The smallest box of the finite ones of `points`.
+    /// The bounding box of the finite ones of `points`.
     pub fn of(points: impl ParallelIterator<Item = DVec3>) -> Self {
         points.fold(|| Self::EMPTY, Self::with_point).reduce(|| Self::EMPTY, Self::union)
     }
 
-    /// The smallest box that holds both.
+    /// The smallest box that holds both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 }
 
 impl Scene {
-    /// The centre of surfel `index`, world units relative to [`Scene::origin`], with all its digits.
+    /// The centre of surfel `index` with all its digits, world units relative to [`Scene::origin`].
     pub fn center(&self, index: usize) -> DVec3 {
         let low = self.low.get(index).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         DVec3::from_array(self.surfels[index].center.map(f64::from)) + low
     }
 
-    /// The surfels and the corners of triangles: how many places the scene has.
+    /// The number of surfels and triangle vertices together.
     pub(crate) fn places(&self) -> usize {
         self.surfels.len() + self.triangles.vertices().len()
     }
 
-    /// A surfel's centre and radius, or past them a triangle's corner and the longest edge there; world units relative to [`Scene::origin`].
+    /// The position and size at `index`: centre and radius of a surfel or, after all surfels, a
+    /// triangle vertex and the longest edge at it. World units relative to [`Scene::origin`].
     pub(crate) fn place(&self, index: usize) -> (DVec3, f64) {
         match self.surfels.get(index) {
             Some(surfel) => (self.center(index), surfel.radius().into()),
@@ -164,8 +172,11 @@ impl Scene {
         }
     }
 
-    /// The box of the surfel centres and the triangles' corners without those few that stray, world units relative to [`Scene::origin`], and how many
-    /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
+    /// The box of surfel centres and triangle vertices without strays, and the number of strays.
+    ///
+    /// The box is in world units relative to [`Scene::origin`]. A stray lies farther from the box
+    /// of nearly all points than sixteen times that box's longest edge. For a part of a scene the
+    /// number is 0.
     pub fn body(&self) -> (Bounds, u64) {
         if let Some(whole) = &self.part_of {
             return (whole.body, 0);
@@ -173,9 +184,13 @@ impl Scene {
         super::body(self.places(), |index| self.place(index).0)
     }
 
-    /// The box of the centres and corners that the default view shows, world units relative to [`Scene::origin`], and how many it leaves out: those
-    /// that [stray](Self::body), and groups of at most 16 points, and a thousandth of all, that lie farther than a quarter of the
-    /// longest edge of the box of nearly all from that box and from all others.
+    /// The box of the centres and vertices that the default view shows, and the number of points
+    /// outside it.
+    ///
+    /// The box is in world units relative to [`Scene::origin`]. It leaves out [strays](Self::body),
+    /// and groups of at most 16 points and at most a thousandth of all that lie farther from the
+    /// box of nearly all points, and from all other groups, than a quarter of that box's longest
+    /// edge. For a part of a scene the number is 0.
     pub fn framed(&self) -> (Bounds, u64) {
         if let Some(whole) = &self.part_of {
             return (whole.framed, 0);
@@ -183,8 +198,8 @@ impl Scene {
         super::framed(&Listed(self.places(), |index| self.place(index)))
     }
 
-    /// The box of the finite surfel centres and of the triangles' corners, world units relative to [`Scene::origin`]; disks reach past it by up to
-    /// [`Scene::largest_radius`].
+    /// The box of the finite surfel centres and triangle vertices, world units relative to
+    /// [`Scene::origin`]. Disks extend past it by up to [`Scene::largest_radius`].
     pub fn bounds(&self) -> Bounds {
         if let Some(whole) = &self.part_of {
             return whole.bounds;
@@ -192,8 +207,10 @@ impl Scene {
         Bounds::of((0..self.places()).into_par_iter().with_min_len(4096).map(|index| self.place(index).0))
     }
 
-    /// A box of nearly all finite surfel centres, or of all corners where there are only triangles, in the same space: those few that lie far from all others, as scanners' stray
-    /// points do, do not widen it. Of a sample, the same each time.
+    /// The box of nearly all finite surfel centres, or of all vertices if there are only triangles.
+    ///
+    /// A few points far from all others, such as a scanner's strays, do not widen it. It is
+    /// computed from a sample of fixed stride, world units relative to [`Scene::origin`].
     pub fn core(&self) -> Bounds {
         if let Some(whole) = &self.part_of {
             return whole.core;
@@ -202,9 +219,11 @@ impl Scene {
         core_of(self.surfels.iter().step_by(step).map(|surfel| surfel.center)).unwrap_or_else(|| self.bounds())
     }
 
-    /// Smallest and largest premultiplied linear colour `(r a, g a, b a, a)` of the scene, each component on its own,
-    /// every product rounded to f32 once. Of harmonics the range that no view exceeds. The same for any order of surfels; zero for a
-    /// scene without surfels.
+    /// The smallest and largest premultiplied linear colours `(r a, g a, b a, a)`, component by
+    /// component.
+    ///
+    /// Every product is rounded to f32 once, so the range is the same for any order of surfels. For
+    /// harmonics it bounds the colours of all views. Zero for a scene without surfels.
     pub fn color_range(&self) -> ([f32; 4], [f32; 4]) {
         if let Some(whole) = &self.part_of {
             return whole.color;
@@ -212,7 +231,7 @@ impl Scene {
         if self.surfels.is_empty() {
             return ([0.0; 4], [0.0; 4]);
         }
-        // Adding +0 makes the two zeros one, or their order would show in the sign bit of the result.
+        // Adding +0 turns -0 into +0, or the order of surfels would determine the sign bit.
         let premultiplied = |[r, g, b, a]: [f32; 4]| [r * a + 0.0, g * a + 0.0, b * a + 0.0, a + 0.0];
         if let Colors::Constant(color) = self.colors {
             let color = premultiplied(color);
@@ -246,7 +265,7 @@ impl Scene {
             .reduce(nothing, merge)
     }
 
-    /// The largest [`Surfel::shorter`], world units; zero for a scene without surfels.
+    /// The largest [`Surfel::shorter`], world units; zero without surfels.
     pub fn largest_shorter(&self) -> f32 {
         if let Some(whole) = &self.part_of {
             return whole.largest_shorter;
@@ -254,8 +273,8 @@ impl Scene {
         self.surfels.par_iter().map(Surfel::shorter).reduce(|| 0.0, f32::max)
     }
 
-    /// The largest [`Surfel::radius`] with the height of its cap, world units: no point of a surfel is farther from its centre. Zero for
-    /// a scene without surfels.
+    /// The largest sum of [`Surfel::radius`] and the height of the cap, world units; zero without
+    /// surfels. No point of a surfel is farther from its centre.
     pub fn largest_radius(&self) -> f32 {
         if let Some(whole) = &self.part_of {
             return whole.largest_radius;
@@ -266,12 +285,12 @@ impl Scene {
     }
 }
 
-/// How many surfels of `count` are passed over for each that [`Scene::core`] looks at, and that one.
+/// The stride at which [`Scene::core`] samples `count` surfels.
 pub(crate) fn core_step(count: usize) -> usize {
     count.div_ceil(CORE_SAMPLE).max(1)
 }
 
-/// The box of nearly all of the finite ones of some centres; None if it has no extent.
+/// The box of nearly all finite `centers`; None if it has no extent.
 pub(crate) fn core_of(centers: impl Iterator<Item = [f32; 3]>) -> Option<Bounds> {
     let sampled: Vec<_> = centers.filter(|center| center.iter().all(|x| x.is_finite())).collect();
     if sampled.is_empty() {
@@ -283,24 +302,26 @@ pub(crate) fn core_of(centers: impl Iterator<Item = [f32; 3]>) -> Option<Bounds>
         along.sort_unstable_by(f32::total_cmp);
         let cut = along.len() / CORE_CUT;
         let (low, high) = (f64::from(along[cut]), f64::from(along[along.len() - 1 - cut]));
-        // An even distribution reaches past both by as much.
+        // A uniform distribution extends past each quantile by this margin.
         let margin = (high - low) / (CORE_CUT - 2) as f64;
         (core.min[axis], core.max[axis]) = (low - margin, high + margin);
     }
     (core.extent() != DVec3::ZERO).then_some(core)
 }
 
-/// A centre whose rounding to f32 is less than this part of its disk's shorter half-axis is as good as any.
+/// A centre's rounding error below this fraction of its disk's shorter half-axis is invisible.
 const LEAST_PART: f64 = 1.0 / 256.0;
 
-/// Whether a centre's `error`, world units, may show at the size of its disk.
+/// Whether an error of the centre, world units, may be visible at the size of its disk.
 pub(crate) fn shows(surfel: &Surfel, error: f64) -> bool {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)).length());
     error > LEAST_PART * s.min(t)
 }
 
-/// [`Scene::low`] of `surfels`, whose centres are `center` with all their digits: nothing where f32 serves for all of them. An
-/// f32 serves for a scene 5,000,000 times as wide as its smallest disks.
+/// [`Scene::low`] for `surfels` whose exact centres are `center`; empty if f32 centres suffice for
+/// all.
+///
+/// They suffice for a scene up to 5,000,000 times as wide as its smallest disks.
 pub(crate) fn low_parts(surfels: &[Surfel], center: impl Fn(usize) -> DVec3 + Sync) -> Vec<[f32; 3]> {
     let low_of = |index: usize| center(index) - DVec3::from_array(surfels[index].center.map(f64::from));
     if !(0..surfels.len()).into_par_iter().any(|index| shows(&surfels[index], low_of(index).abs().max_element())) {

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-/// The sRGB transfer function from a code in [0, 1] to linear light (IEC 61966-2-1).
+/// The sRGB transfer function from a code in [0, 1] to linear light.
 pub fn srgb_to_linear(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
@@ -13,11 +13,12 @@ pub fn linear_to_srgb(linear: f64) -> f64 {
     if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Linear light for each 8-bit sRGB code: the table that host and device share, so that both blend the same values.
+/// Linear light for each 8-bit sRGB code. Host and device share this table, so both blend the same
+/// values.
 pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f64 / 255.0) as f32));
 
-/// The nearest 8-bit sRGB code of linear light, 0 of what is no number.
+/// The nearest 8-bit sRGB code of linear light; 0 for NaN.
 pub fn srgb8_of(linear: f32) -> u8 {
     let Codes { least, of_bits } = &*CODES;
     if linear >= least[254] {
@@ -25,7 +26,7 @@ pub fn srgb8_of(linear: f32) -> u8 {
     }
     if linear >= least[0] {
         let mut code = of_bits[((linear.to_bits() - least[0].to_bits()) >> BUCKET) as usize];
-        // This ends, as the least of the last code is larger.
+        // This loop ends, as the threshold of the last code is larger.
         while least[code as usize] <= linear {
             code += 1;
         }
@@ -34,21 +35,22 @@ pub fn srgb8_of(linear: f32) -> u8 {
     0
 }
 
-/// So many bits below the upper ones: within 1/256 of a power of two there are at most two codes.
+/// The low bits of an f32 that the lookup table ignores: an interval of 1/256 of a power of two
+/// contains at most two codes.
 const BUCKET: u32 = 15;
 
-/// What codes are looked up in: the power that they follow from is much slower.
+/// The lookup tables of [`srgb8_of`], as evaluating the power function is much slower.
 struct Codes {
-    /// The least linear light of each code from 1 on, as [`linear_to_srgb`] says.
+    /// For each code from 1 on, the least linear light that [`linear_to_srgb`] rounds to it.
     least: [f32; 255],
-    /// The code of each `1 << BUCKET`th number from the first of these on.
+    /// The code of every `1 << BUCKET`th f32, from the first threshold on.
     of_bits: Vec<u8>,
 }
 
 static CODES: LazyLock<Codes> = LazyLock::new(|| {
     let code = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as usize;
     let least = std::array::from_fn(|index| {
-        // Numbers from 0 on are in the order of their bits.
+        // Non-negative f32 are in the order of their bits, so this bisects them.
         let (mut below, mut least) = (0, 1f32.to_bits());
         while least - below > 1 {
             let middle = below.midpoint(least);

@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 
-/// An elliptical disk `p + u s + v t`, `u² + v² <= 1`, in world units relative to [`Scene::origin`](super::Scene::origin).
+/// An elliptical disk `p + u s + v t`, `u² + v² <= 1`, in world units relative to
+/// [`Scene::origin`](super::Scene::origin).
 ///
-/// This is the record the device reads too (`Surfel` in `wgsl/layout.wgsl`), so a scene is uploaded as it lies.
+/// The device reads the same record (`Surfel` in `wgsl/layout.wgsl`), so a scene is uploaded as is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Surfel {
@@ -17,10 +18,11 @@ pub struct Surfel {
 }
 
 impl Surfel {
-    /// A circular disk. `normal` need not have unit length but must not be zero; `radius` is positive.
+    /// A circular disk. `normal` must not be zero but may have any length; `radius` is positive.
     pub fn disk(center: Vec3, normal: Vec3, radius: f32) -> Self {
         let n = normal.normalize();
-        // Duff et al. 2017, "Building an orthonormal basis, revisited": no branch point, no division by zero.
+        // Duff et al. 2017, "Building an orthonormal basis, revisited": no branches, no division by
+        // zero.
         let sign = 1f32.copysign(n.z);
         let a = -1.0 / (sign + n.z);
         let b = n.x * n.y * a;
@@ -29,18 +31,21 @@ impl Surfel {
         Self { center: center.to_array(), s: (s * radius).to_array(), t: (t * radius).to_array() }
     }
 
-    /// The ellipse `center + u s + v t`, `u² + v² <= 1`, for any s and t that are not parallel. Those that are not
-    /// perpendicular are turned, within the ellipse, into the half-axes that are.
-    #[inline] // Else a caller's vectors are read from memory before they have come there.
+    /// The ellipse `center + u s + v t`, `u² + v² <= 1`, for any s and t that are not parallel.
+    ///
+    /// Axes that are not perpendicular are replaced by the perpendicular half-axes of the same
+    /// ellipse.
+    #[inline] // Otherwise the vectors are passed through memory, and reading them stalls.
     pub fn ellipse(center: Vec3, s: Vec3, t: Vec3) -> Self {
-        // What f32 half-axes that were meant to be perpendicular miss it by.
+        // The cosine up to which f32 half-axes count as perpendicular.
         const ROUNDING: f64 = 1e-6;
         let (mut s, mut t) = (s.as_dvec3(), t.as_dvec3());
-        // Squares of what is made of f32 neither overflow nor vanish here.
+        // In f64, squares of products of f32 values neither overflow nor vanish.
         if s.dot(t).powi(2) > ROUNDING * ROUNDING * s.length_squared() * t.length_squared() {
-            // (cos a, sin a) and (-sin a, cos a) are perpendicular in (u, v) too, so they give the same ellipse with the same
-            // s x t; their images are perpendicular for this a, the first of them the longer. The second follows from
-            // s x t: as t cos a - s sin a it would be lost to rounding where it is much the shorter.
+            // (cos a, sin a) and (-sin a, cos a) are perpendicular in (u, v), so they give the same
+            // ellipse with the same s x t. For this a their images are perpendicular too, the first
+            // one the longer. The second is computed from s x t: as t cos a - s sin a it would be
+            // lost to rounding if it is much shorter.
             let normal = s.cross(t);
             let angle = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
             s = s * angle.cos() + t * angle.sin();
@@ -49,13 +54,14 @@ impl Surfel {
         Self { center: center.to_array(), s: s.as_vec3().to_array(), t: t.as_vec3().to_array() }
     }
 
-    /// The unnormalised normal s x t; its length is the product of the half-axes for perpendicular axes.
+    /// The normal s x t, not normalised. For perpendicular axes its length is the product of the
+    /// half-axes.
     pub fn normal(&self) -> Vec3 {
         Vec3::from_array(self.s).cross(Vec3::from_array(self.t))
     }
 
-    /// The shorter half-axis: what an epsilon of `radius:K` is measured by, as a long thin disk would else reach through what lies
-    /// behind it.
+    /// The shorter half-axis. The epsilon `radius:K` is a multiple of it, as a long thin disk would
+    /// otherwise reach through surfaces behind it.
     pub fn shorter(&self) -> f32 {
         Vec3::from_array(self.s).length().min(Vec3::from_array(self.t).length())
     }
@@ -83,10 +89,10 @@ mod tests {
             let (u, v) = (rim.dot(major) / major.length_squared(), rim.dot(minor) / minor.length_squared());
             assert!((u.hypot(v) - 1.0).abs() < 1e-5, "{u} {v}");
         }
-        // The axes as they came miss it.
+        // The original axes do not give a point on the rim.
         let rim = s * 0.8 + t * 0.6;
         assert!((rim.dot(s) / s.length_squared()).hypot(rim.dot(t) / t.length_squared()) > 1.1);
-        // However much one is longer.
+        // Half-axes of very different lengths work too.
         let (s, t) = (Vec3::new(0.0, 1.25e-12, 0.0), Vec3::new(0.0, -6e16, -8e15));
         let long = Surfel::ellipse(Vec3::ZERO, s, t);
         let [major, minor] = [long.s, long.t].map(|axis| Vec3::from_array(axis).as_dvec3());

@@ -1,4 +1,4 @@
-//! Images that surfaces are painted with, and surfels that know their places in them.
+//! Textured surfaces: images, and surfels with texture coordinates.
 
 use std::sync::Arc;
 
@@ -16,33 +16,34 @@ pub struct Texture {
     height: u32,
     /// Rows from the top.
     texels: Vec<[u8; 4]>,
-    /// Beyond [0, 1] its edges go on; else it is repeated.
+    /// Coordinates outside [0, 1] take the edge texels if set; otherwise the image repeats.
     clamps: bool,
 }
 
 impl Texture {
-    /// An image of `width` x `height` texels, rows from the top; None if there are not as many, or none.
+    /// An image of `width` x `height` texels, rows from the top. None if `texels` has another
+    /// length or is empty.
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
         (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, clamps: false })
     }
 
-    /// The same image, whose edges go on beyond [0, 1] if it `clamps`, and which else is repeated
-    /// there.
+    /// The same image with another address mode: outside [0, 1], `true` takes the edge texels and
+    /// `false` repeats the image.
     #[must_use]
     pub fn clamped(self, clamps: bool) -> Self {
         Self { clamps, ..self }
     }
 
-    /// Whether its edges go on beyond [0, 1].
+    /// Whether coordinates outside [0, 1] take the edge texels instead of repeating the image.
     pub fn clamps(&self) -> bool {
         self.clamps
     }
 
-    /// The image times a linear colour with straight alpha, in codes of 8 bits.
+    /// The image multiplied by a linear colour with straight alpha, rounded to 8-bit codes again.
     #[must_use]
     pub fn times(&self, factor: [f32; 4]) -> Self {
-        // Three tables of codes, as a texel has no more.
+        // One table of 256 codes per colour channel, as texels are 8-bit.
         let table = |k: usize| -> [u8; 256] {
             let light = |code: usize| f64::from(SRGB8_TO_LINEAR[code] * factor[k]);
             std::array::from_fn(|code| (255.0 * linear_to_srgb(light(code).clamp(0.0, 1.0))).round() as u8)
@@ -54,22 +55,22 @@ impl Texture {
         Self { texels: self.texels.par_iter().map(times).collect(), ..*self }
     }
 
-    /// Width and height, texels.
+    /// Width and height in texels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
     }
 
-    /// The codes, rows from the top.
+    /// The sRGB codes with straight alpha, rows from the top.
     pub fn texels(&self) -> &[[u8; 4]] {
         &self.texels
     }
 
-    /// The colour at texture coordinates (u, v), origin bottom left: linear RGB premultiplied by
-    /// alpha, and alpha. Between the middles of texels it is interpolated; beyond [0, 1] the image
-    /// is repeated, or its edges go on where it [clamps](Self::clamped). The twin of `level_color`
-    /// in `wgsl/textures.wgsl`.
+    /// The bilinear colour at texture coordinates (u, v), origin bottom left.
+    ///
+    /// Returns linear RGB premultiplied by alpha, and alpha. Outside [0, 1] the image repeats, or
+    /// takes its edge texels if it [clamps](Self::clamped). Coordinates that are not finite count
+    /// as 0. The twin of `level_color` in `wgsl/textures.wgsl`.
     pub fn premultiplied_at(&self, [u, v]: [f64; 2]) -> [f64; 4] {
-        // What is not a number has no place; that of 0 serves.
         let place = |turns: f64, size: u32| {
             let turns = if turns.is_finite() { turns } else { 0.0 };
             let within = if self.clamps { turns.clamp(0.0, 1.0) } else { turns - turns.floor() };
@@ -91,13 +92,13 @@ impl Texture {
         sum
     }
 
-    /// The colour at a place, with straight alpha.
+    /// The bilinear colour at (u, v): linear RGB with straight alpha.
     pub fn at(&self, u: f32, v: f32) -> [f32; 4] {
         straight(self.premultiplied_at([u, v].map(f64::from)))
     }
 
-    /// The mean over a square of half the side `reach` about (u, v), straight alpha, from as many lookups as it has texels, but
-    /// not more than 16 x 16.
+    /// The mean colour, straight alpha, over the square of side `2 reach` around (u, v). It takes
+    /// about one lookup per texel that the square covers, at most 16 x 16.
     pub fn mean_about(&self, [u, v]: [f64; 2], reach: f64) -> [f32; 4] {
         const MOST: f64 = 16.0;
         let side = (2.0 * reach * f64::from(self.width.max(self.height))).ceil().clamp(1.0, MOST);
@@ -109,46 +110,54 @@ impl Texture {
     }
 }
 
-/// A premultiplied colour with straight alpha.
+/// Converts a premultiplied colour to straight alpha; 0 if alpha is 0.
 pub(crate) fn straight([r, g, b, a]: [f64; 4]) -> [f32; 4] {
     if a > 0.0 { [r / a, g / a, b / a, a].map(|c| c as f32) } else { [0.0; 4] }
 }
 
-/// The least reach that counts, of the coordinates' range: a variance below its square would be lost to the rounding of f32
-/// means.
+/// The smallest reach that is used, as a fraction of the coordinates' range. The square of a
+/// smaller reach would be lost in the rounding of f32 means.
 const LEAST_REACH: f64 = 1.0 / 128.0;
 
-/// Where a surfel lies in a texture, or in the plane of several ([`Atlas`]).
+/// The texture coordinates of a surfel, in a texture or in the common plane of several ([`Atlas`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
-    /// Texture coordinates (u, v) of its centre, origin bottom left.
+    /// Texture coordinates (u, v) of the centre, origin bottom left.
     pub center: [f32; 2],
-    /// What u and v gain for a world unit along x, y and z: the surface has the coordinates `center + slopes d` at `p + d`.
+    /// The gradients of u and of v along x, y and z, per world unit: the point `p + d` has the
+    /// coordinates `center + slopes d`.
     pub slopes: [[f32; 3]; 2],
-    /// How far they change from the centre to the rim of the disk, at most.
+    /// The largest change of u and of v from the disk's centre to its rim.
     pub extent: [f32; 2],
-    /// How far those of surfels that overlap may be apart where they meet.
+    /// How much the coordinates of overlapping surfels may differ at a pixel if they belong to one
+    /// piece of the texture.
     pub reach: f32,
 }
 
-/// Surfels that are painted by textures: one is looked up once a pixel, at the mean coordinates of the fragments that are blended
-/// there (the TexZ map of paper 002, section 5), so it shows what is finer than surfels.
+/// Textured surfels: the texture is looked up once per pixel, not once per surfel, so it shows
+/// detail that is finer than surfels.
 ///
-/// A fragment has the coordinates of its point of the disk. With those of the centre, as the paper has them, the mean
-/// stays near them around each centre and changes fast in between.
+/// The lookup is at the weighted mean of the texture coordinates of the pixel's fragments (the TexZ
+/// map of paper 002, section 5). A fragment has the coordinates of its point on the disk. The paper
+/// takes the coordinates of the disk's centre; their mean stays near them around each centre and
+/// changes fast in between.
 ///
-/// Coordinates of surfels that meet at a pixel may come from different parts of the image: at its seams, where it is
-/// repeated, and where one surface ends in front of another; and from two images ([`Atlas`]). Their mean is then a place that has nothing to do with
-/// either. So each surfel also has the texture's mean over its disk, and its *reach*. Where the coordinates of a pixel's
-/// fragments vary by no more than `mean of reach^2`, the pixel has the texture's colour; where by more than twice that, the
-/// blended means; in between there is a linear passage. The texture is looked up as a pixel sees it that covers so much of it
-/// ([`Mipmap`]), the mean over its fragments, so that what is seen from afar is averaged.
+/// Surfels that meet at a pixel may come from different parts of an image: at its seams, where it
+/// repeats, and where one surface ends in front of another. They may also come from two images
+/// ([`Atlas`]). The mean of their coordinates is then unrelated to either part. Therefore each
+/// surfel also has the mean colour of the texture over its disk, and a *reach*. A pixel takes the
+/// colour of the texture if the variance of its fragments' coordinates is at most
+/// `mean of reach^2`, the blend of the mean colours if it is more than twice that, and interpolates
+/// linearly in between. The lookup is filtered to the area that the pixel covers in the texture,
+/// averaged over its fragments ([`Mipmap`]).
 ///
-/// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its range. Coordinates err by e times
-/// their span, so a colour by that times the steepest slope of the interpolated texture (the largest difference of
-/// neighbouring texels times their number for each unit); the part of the texture by e, so where terms have 24 bits a pixel of less than a few
-/// millionths of it may be looked up a halving or two too fine; the variance errs by less than `3 e span^2`, so within the
-/// passage the share of the texture errs by `3 e span^2 / mean of reach^2`, which the least reach keeps below `5e4 e`.
+/// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its
+/// range. Coordinates err by e times their span, so a colour errs by that times the steepest slope
+/// of the interpolated texture (the largest difference of neighbouring texels times the texels per
+/// unit). The covered area of the texture errs by e: where terms have 24 bits, a pixel that covers
+/// less than a few millionths of the texture may be looked up one or two levels too fine. The
+/// variance errs by less than `3 e span^2`, so the texture's share of an interpolated pixel errs by
+/// `3 e span^2 / mean of reach^2`, which the smallest reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {
     mipmaps: Arc<[Mipmap]>,
@@ -158,14 +167,14 @@ pub struct Textured {
     range: PlaceRange,
 }
 
-/// Where a scene's coordinates lie, and how they are mapped for the device's sums.
+/// The range of a scene's texture coordinates, which maps them to [0, 1] for the device's sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaceRange {
-    /// The middle of u and of v.
+    /// The middles of the intervals of u and of v.
     pub middle: [f32; 2],
-    /// The larger of the lengths of the intervals of u and v; positive.
+    /// The length of the longer of the two intervals; positive.
     pub span: f32,
-    /// The largest squared reach, in units of `span`.
+    /// The largest squared reach, in units of `span` squared.
     pub most_reach_2: f32,
 }
 
@@ -181,7 +190,7 @@ impl PlaceRange {
         };
         let [(u, width), (v, height)] = [0, 1].map(interval);
         let span = width.max(height);
-        // A little more, so that the ends stay within it after rounding.
+        // Widened a little, so that rounded ends stay inside.
         let span = if span > 0.0 { span * (1.0 + 1e-6) } else { 1.0 };
         let largest = f64::from(places.par_iter().map(|place| place.reach).reduce(|| 0.0, f32::max));
         let most_reach_2 = (largest / f64::from(span)).max(LEAST_REACH).powi(2) as f32;
@@ -190,49 +199,53 @@ impl PlaceRange {
 }
 
 impl Textured {
-    /// Surfels at `places` of the plane in which the textures lie as the `atlas` says, over whose disks these have the mean `colors` (linear,
-    /// straight alpha); those of no texture have these colours.
+    /// Textured surfels from their `places` in the plane of the `atlas` and their mean `colors`
+    /// (linear, straight alpha).
+    ///
+    /// A colour is the mean of the texture over the surfel's disk, or the surfel's own colour if it
+    /// has no texture.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if places and colours are not as many, or the textures not as many as the atlas says.
+    /// [`Error::Usage`] if the numbers of places and colours differ, or if the textures are none or
+    /// not as many as the atlas has.
     pub fn new(textures: Vec<Arc<Texture>>, atlas: Atlas, places: Vec<Place>, colors: Vec<[f32; 4]>) -> Result<Self> {
         if places.len() != colors.len() {
-            return Err(Error::Usage("surfels in a texture have a place and a colour each".into()));
+            return Err(Error::Usage("textured surfels need as many places as colours".into()));
         }
         if textures.is_empty() || textures.len() as u64 != u64::from(atlas.textures) {
-            return Err(Error::Usage("a plane of textures has as many as there are, and one at least".into()));
+            return Err(Error::Usage("an atlas needs at least one texture, and as many as it was made for".into()));
         }
         let range = PlaceRange::of(&places);
         Ok(Self { mipmaps: textures.into_par_iter().map(Mipmap::new).collect(), atlas, places, colors, range })
     }
 
-    /// The images at all scales, by their numbers.
+    /// The images with all their mipmap levels, by texture number.
     pub fn mipmaps(&self) -> &[Mipmap] {
         &self.mipmaps
     }
 
-    /// Where they lie.
+    /// The plane in which the textures lie.
     pub fn atlas(&self) -> Atlas {
         self.atlas
     }
 
-    /// Where each surfel lies.
+    /// The texture coordinates of each surfel.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
 
-    /// The mean of its texture over each disk.
+    /// The mean colour of the texture over each surfel's disk: linear, straight alpha.
     pub fn colors(&self) -> &[[f32; 4]] {
         &self.colors
     }
 
-    /// Where the coordinates lie.
+    /// The range of the surfels' coordinates.
     pub fn range(&self) -> PlaceRange {
         self.range
     }
 
-    /// The same surfels in another order, or some of them.
+    /// The surfels at `indices`, in that order.
     pub fn taken(&self, indices: &[usize]) -> Self {
         let places: Vec<_> = indices.iter().map(|&index| self.places[index]).collect();
         let colors = indices.iter().map(|&index| self.colors[index]).collect();
@@ -240,9 +253,12 @@ impl Textured {
         Self { mipmaps: Arc::clone(&self.mipmaps), atlas: self.atlas, places, colors, range }
     }
 
-    /// What is summed of surfel `index` at the world offset `step` from its centre: the coordinates relative to the middle of their
-    /// range, the squared length of these, and the squared reach; in units of the range's span. And the `part` of the texture that a pixel has
-    /// there, as it is.
+    /// The quantities of surfel `index` that are summed at the offset `step` (world units) from its
+    /// centre.
+    ///
+    /// They are the coordinates (u, v) relative to the middle of their range, `u^2 + v^2` and the
+    /// squared reach, all in units of the range's span; then `part`, the part of the texture that
+    /// the pixel covers, unchanged.
     pub fn terms(&self, index: usize, step: DVec3, part: f64) -> [f64; 5] {
         let PlaceRange { middle, span, .. } = self.range;
         let Place { center, slopes, reach, .. } = self.places[index];
@@ -254,19 +270,26 @@ impl Textured {
         [u, v, u * u + v * v, reach * reach, part]
     }
 
-    /// The part of the whole texture that a pixel has of the plane of surfel `index`, at `depth` along its ray, which is as long as a unit of depth:
-    /// at most all of it. The twin of `area_in_pixel` in `wgsl/camera_pinhole.wgsl` and `wgsl/camera_orthographic.wgsl`.
+    /// The fraction of the whole texture that a pixel covers in the plane of surfel `index`, at
+    /// most 1.
+    ///
+    /// `ray` is the pixel's view ray, scaled to gain a depth of 1; it meets the plane at `depth`,
+    /// world units. The twin of `area_in_pixel` in `wgsl/camera_pinhole.wgsl` and
+    /// `wgsl/camera_orthographic.wgsl`.
     pub fn part_in_pixel(&self, index: usize, camera: &Camera, ray: DVec3, depth: f64) -> f64 {
         let [u, v] = self.places[index].slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));
-        // As long as the texture's area is for a unit of the plane's.
+        // Its length is the area in the texture per unit of area in the plane.
         let normal = u.cross(v);
         let scale = if camera.projection == Projection::Pinhole { depth * depth } else { 1.0 };
         let facing = normal.dot(ray).abs();
         if facing > 0.0 { (normal.length_squared() / facing * scale / (camera.fx * camera.fy)).min(1.0) } else { 0.0 }
     }
 
-    /// What the device has of surfel `index`: the coordinates of its centre and its squared reach, each mapped to [0, 1]; and the
-    /// slopes of u and of v in units of the span. A coordinate of what the surfel's centre leaves out, `low`, comes last in each.
+    /// The record of surfel `index` on the device.
+    ///
+    /// The first row has the centre's coordinates and the squared reach, each mapped to [0, 1]; the
+    /// others have the slopes of u and of v, in units of the span. The last entries of the three
+    /// rows are x, y and z of `low`, the part of the centre beyond f32.
     pub(crate) fn mapped(&self, index: usize, low: Option<&[f32; 3]>) -> [[f32; 4]; 3] {
         let [u, v, _, reach_2, _] = self.terms(index, DVec3::ZERO, 0.0);
         let slope = |k: usize| self.places[index].slopes[k].map(|gain| f64::from(gain) / f64::from(self.range.span));
@@ -276,20 +299,23 @@ impl Textured {
         [center, [ux, uy, uz, y], [vx, vy, vz, z]].map(|values| values.map(|value| value as f32))
     }
 
-    /// The place of a pixel in the plane of textures, from the means of [`Self::terms`].
+    /// The position of a pixel in the plane of textures, from the means of [`Self::terms`].
     fn joint_at(&self, [u, v, ..]: [f64; 5]) -> [f64; 2] {
         let PlaceRange { middle, span, .. } = self.range;
         let at = |k: usize, offset: f64| f64::from(middle[k]) + f64::from(span) * offset;
         [at(0, u), at(1, v)]
     }
 
-    /// The texture coordinates of a pixel from the means of [`Self::terms`].
+    /// The texture coordinates of a pixel, from the means of [`Self::terms`].
     pub fn place_at(&self, means: [f64; 5]) -> [f64; 2] {
         self.atlas.own(self.joint_at(means))
     }
 
-    /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture
-    /// where the coordinates agree, else blended. The twin of `textured` in `wgsl/texture.wgsl`.
+    /// The premultiplied colour of a pixel, from the means of [`Self::terms`] and the blended
+    /// premultiplied colour.
+    ///
+    /// It is the texture's where the coordinates agree, and the blended one elsewhere. The twin of
+    /// `textured` in `wgsl/texture.wgsl`.
     pub fn resolve(&self, means: [f64; 5], blended: [f64; 4]) -> [f64; 4] {
         let [u, v, squared, reach_2, part] = means;
         let share = (2.0 - (squared - u * u - v * v) / reach_2).clamp(0.0, 1.0);
@@ -315,13 +341,14 @@ mod tests {
         assert_eq!(texture.at(0.75, 0.75), [0.0, 0.0, 1.0, 1.0]);
         assert_eq!(texture.at(0.25, 0.25), [0.0, 1.0, 0.0, 1.0]);
         assert_eq!(texture.at(-1.75, 2.75), [1.0, 0.0, 0.0, 1.0]);
-        // Between red and blue, in linear light, and across the seam too; what is clear has no colour to give.
+        // Interpolation is linear in light and wraps around the seam; a transparent texel adds no
+        // colour.
         assert_eq!(texture.at(0.5, 0.75), [0.5, 0.0, 0.5, 1.0]);
         assert_eq!(texture.at(0.0, 0.75), [0.5, 0.0, 0.5, 1.0]);
         assert_eq!(texture.at(0.5, 0.25), [0.0, 1.0, 0.0, 0.5]);
         assert!(texture.at(f32::NAN, f32::INFINITY).iter().all(|c| c.is_finite()));
         assert!(Texture::new(2, 2, vec![red]).is_none() && Texture::new(0, 2, vec![]).is_none());
-        // Clamped, edges go on: no other side shines in at a border, and none beyond.
+        // Clamped: the opposite side does not bleed in at a border, and nothing repeats outside.
         let clamped = texture.clamped(true);
         for (u, v, color) in [(0.0, 0.75, [1.0, 0.0, 0.0, 1.0]), (7.5, 3.0, [0.0, 0.0, 1.0, 1.0])] {
             assert_eq!(clamped.at(u, v), color);

@@ -1,4 +1,4 @@
-//! Triangles beside a scene's surfels: a second source of what a pixel shows.
+//! Triangles beside a scene's surfels, the second source of visible surfaces.
 
 mod places;
 
@@ -13,21 +13,24 @@ use crate::morton;
 
 use places::{LEAST_TOLD, LEAST_WIDTH, Place, doubled, has_area, shown_error, single};
 
-/// A triangle before it is among others: what its corners have.
+/// A triangle as given, before it becomes part of [`Triangles`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// World units relative to the scene's origin, counter-clockwise seen from the front.
     pub corners: [[f64; 3]; 3],
-    /// Unit normals of the corners; none for those of the triangle's plane.
+    /// Unit normals of the corners; None for the normal of the triangle's plane.
     pub normals: Option<[[f32; 3]; 3]>,
     /// Premultiplied linear colours of the corners.
     pub colors: [[f32; 4]; 3],
-    /// The texture that the colours are multiplied with, by its number, and the corners' places in it, (u, v) with the origin bottom left.
+    /// The number of the texture that is multiplied with the colours, and the corners' coordinates
+    /// (u, v) in it, origin bottom left.
     pub texture: Option<(u32, [[f32; 2]; 3])>,
 }
 
-/// Triangles, in an order that depends on what they are alone: by where they are, then by all bits that they have. So the place of one is
-/// its rank wherever two lie at one depth.
+/// Triangles in an order that depends on their set alone: by the Morton codes of their vertices,
+/// then by all other bits.
+///
+/// A triangle's index is therefore its rank where two triangles have the same depth.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
     vertices: Vec<[f32; 3]>,
@@ -40,32 +43,33 @@ pub struct Triangles {
     textures: Vec<Mipmap>,
 }
 
-/// A triangle's texture and the places of its corners in it.
+/// The texture of a triangle and its corners' coordinates in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Painted {
     /// The texture's number, or [`UNPAINTED`].
     pub texture: u32,
-    /// (u, v) of the corners.
+    /// Texture coordinates (u, v) of the corners.
     pub places: [[f32; 2]; 3],
 }
 
-/// The number of no texture.
+/// The texture number of triangles without a texture.
 pub const UNPAINTED: u32 = u32::MAX;
 
-/// Cells of the Morton code along an axis.
+/// Cells of the Morton code's grid along an axis.
 const CELLS: f64 = ((1u32 << 21) - 1) as f64;
 
 impl Triangles {
-    /// Those of `triangles` that have an area, and finite corners.
+    /// Builds the set from those of `triangles` that have an area and finite corners.
     ///
-    /// Vertices at one place are one, whichever triangles they are of: what is computed of a vertex is the same number for all of them.
-    /// Normals are kept if any has some; who has none takes those of its plane. Places are f32, or
-    /// two f32 each where one would show ([`Triangles::low`]).
+    /// Corners at one position become one vertex, so a quantity computed for a vertex is the same
+    /// for all its triangles. If any triangle has normals, the others get those of their planes.
+    /// Positions are f32, or two f32 each if the rounding of one would be visible
+    /// ([`Triangles::low`]).
     pub fn new(triangles: &[Triangle]) -> Self {
         Self::textured(triangles, &[])
     }
 
-    /// The same with textures, by whose places triangles have their numbers.
+    /// As [`Self::new`], with textures, which triangles refer to by their indices.
     pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
         match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
             true => Self::kept(triangles, textures, doubled),
@@ -73,7 +77,7 @@ impl Triangles {
         }
     }
 
-    /// The same, of places that are kept as `stored` numbers.
+    /// As [`Self::textured`], with positions rounded by `stored`.
     fn kept<P: Place>(triangles: &[Triangle], textures: &[Arc<Texture>], stored: fn([f64; 3]) -> P) -> Self {
         let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
@@ -129,67 +133,70 @@ impl Triangles {
         }
     }
 
-    /// The largest error of a coordinate that is kept as two f32, world units, among triangles of
-    /// which it is more than 1/256 of the width.
+    /// The largest error, world units, of a coordinate stored as two f32, among triangles for which
+    /// it exceeds 1/256 of their width; None if there are none.
     pub fn rounding(triangles: &[Triangle]) -> Option<f64> {
         let error = |triangle: &Triangle| shown_error(triangle.corners, doubled, LEAST_TOLD);
         triangles.par_iter().filter_map(error).reduce_with(f64::max)
     }
 
-    /// The same triangles in one colour, linear and premultiplied.
+    /// The same triangles in one premultiplied linear colour, without textures.
     pub fn painted(&self, color: [f32; 4]) -> Self {
         let colors = self.colors.first().map(|_| [color; 3]).into_iter().collect();
         Self { colors, painted: Vec::new(), textures: Vec::new(), ..self.clone() }
     }
 
-    /// How many there are.
+    /// The number of triangles.
     pub fn len(&self) -> usize {
         self.corners.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no triangles.
     pub fn is_empty(&self) -> bool {
         self.corners.is_empty()
     }
 
-    /// The different places of corners, world units relative to the scene's origin, rounded to f32.
+    /// The positions of the vertices, world units relative to the scene's origin, rounded to f32.
     pub fn vertices(&self) -> &[[f32; 3]] {
         &self.vertices
     }
 
-    /// The rest of each place after rounding; empty if the rounding is less than 1/256 of the width
-    /// of every triangle.
+    /// The part of each position beyond f32; empty if that is less than 1/256 of the width of every
+    /// triangle.
     pub fn low(&self) -> &[[f32; 3]] {
         &self.low
     }
 
-    /// The vertices of each triangle, of which the first has the lowest number.
+    /// The vertex indices of each triangle, rotated so that the lowest comes first.
     pub fn corners(&self) -> &[[u32; 3]] {
         &self.corners
     }
 
-    /// The unit normals of each triangle's corners; empty where all have those of their planes.
+    /// The unit normals of each triangle's corners; empty if all are those of their planes.
     pub fn normals(&self) -> &[[[f32; 3]; 3]] {
         &self.normals
     }
 
-    /// The premultiplied linear colours of each triangle's corners; or of all, if there is one record.
+    /// The premultiplied linear colours of each triangle's corners; a single entry if all triangles
+    /// have the same colour.
     pub fn colors(&self) -> &[[[f32; 4]; 3]] {
         &self.colors
     }
 
-    /// What each triangle is painted with; empty if none is.
+    /// The texture and coordinates of each triangle; empty if none has a texture.
     pub fn paint(&self) -> &[Painted] {
         &self.painted
     }
 
-    /// What they are painted with.
+    /// The textures with their mipmaps, by number.
     pub fn textures(&self) -> &[Mipmap] {
         &self.textures
     }
 
-    /// The texture's premultiplied colour at a point of a triangle by its corners' `parts`, of which a pixel has so much as `spread`; white
-    /// without one.
+    /// The filtered premultiplied colour of a triangle's texture; white without one.
+    ///
+    /// `parts` are the barycentric coordinates of the point. `spread` is the area that a pixel
+    /// covers in the plane of `parts[1]` and `parts[2]`, in which the triangle has the area 1/2.
     pub fn texture_at(&self, triangle: usize, parts: [f64; 3], spread: f64) -> [f64; 4] {
         let painted = self.painted.get(triangle).and_then(|of| Some((of, self.textures.get(of.texture as usize)?)));
         let Some((painted, mipmap)) = painted else { return [1.0; 4] };
@@ -204,7 +211,7 @@ impl Triangles {
         self.reaches[vertex].into()
     }
 
-    /// The place of a vertex, world units relative to the scene's origin.
+    /// The position of a vertex with all its digits, world units relative to the scene's origin.
     pub fn place(&self, vertex: usize) -> DVec3 {
         let low = self.low.get(vertex).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         DVec3::from_array(self.vertices[vertex].map(f64::from)) + low
@@ -228,7 +235,7 @@ impl Triangles {
     }
 }
 
-/// The Morton code of where `place` lies in `bounds`.
+/// The Morton code of the cell of `bounds` that contains `place`.
 fn cell(place: DVec3, bounds: &Bounds) -> u64 {
     let extent = bounds.extent().max_element();
     let scale = if extent > 0.0 { CELLS / extent } else { 0.0 };
@@ -236,13 +243,13 @@ fn cell(place: DVec3, bounds: &Bounds) -> u64 {
     morton::code(at.to_array().map(|x| x as u64))
 }
 
-/// The normal of the triangle's plane at all its corners.
+/// The normal of the triangle's plane for each corner.
 fn facet(triangle: &Triangle) -> [[f32; 3]; 3] {
     let [a, b, c] = triangle.corners.map(DVec3::from_array);
     [(b - a).cross(c - a).normalize_or_zero().as_vec3().to_array(); 3]
 }
 
-/// A triangle by the numbers of its vertices.
+/// A triangle with vertex indices instead of positions.
 struct Record {
     corners: [u32; 3],
     normals: [[f32; 3]; 3],
@@ -251,7 +258,7 @@ struct Record {
 }
 
 impl Record {
-    /// The same triangle from its lowest vertex on.
+    /// The same triangle, rotated so that its lowest vertex comes first.
     fn turned(self) -> Self {
         let lowest = (0..3).min_by_key(|&k| self.corners[k]).unwrap_or(0);
         let turn = |k: usize| (lowest + k) % 3;
@@ -297,7 +304,7 @@ mod tests {
         let made = Triangles::new(&given);
         assert_eq!(made, Triangles::new(&other));
         assert!(made.len() > 50 && made.vertices().len() <= 75);
-        // Turned over it is another triangle.
+        // With the other orientation it is another triangle.
         other[7].corners.swap(0, 1);
         assert_ne!(made, Triangles::new(&other));
     }
@@ -320,7 +327,8 @@ mod tests {
         assert!(Triangles::new(&[]).is_empty());
     }
 
-    /// The places of one triangle, from its lowest vertex on, and whether they have trailing parts.
+    /// The stored positions of one triangle's vertices, from the lowest on, and whether they have
+    /// low parts.
     fn kept(corners: [[f64; 3]; 3]) -> (Vec<DVec3>, bool) {
         let made = Triangles::new(&[Triangle { corners, ..triangle(0) }]);
         let places = made.corners().iter().flatten().map(|vertex| made.place(*vertex as usize));
@@ -341,7 +349,7 @@ mod tests {
             let most = error.into_iter().fold(0.0, f64::max);
             assert!(most <= if doubled { 2e-15 } else { 6e-8 } * (far + 1.0), "{far} {most}");
         }
-        // One that f32 have, and one among many that they do not serve.
+        // Exact in f32; and one distant triangle among many near the origin.
         assert!(!kept([[16_777_216.0, 0.0, 0.0], [16_777_218.0, 0.0, 0.0], [16_777_216.0, 1.0, 0.0]]).1);
         let far = Triangle { corners: near.map(|corner| corner.map(|x| x + 1e7)), ..triangle(0) };
         let all: Vec<_> = (0..100).map(triangle).chain([far]).collect();
@@ -355,7 +363,8 @@ mod tests {
             assert_eq!(kept(tip).0.len(), 3, "{long}");
             assert_eq!(kept(tip.map(|[x, y, z]| [z, x, y])).0.len(), 3, "{long}");
         }
-        // Aslant: two f32 resolve the first, a line is none, and the last is resolved in part.
+        // Oblique needles: two f32 resolve the first, and the second is a line. Of those in
+        // `rounding`, the narrower one is resolved in part.
         let aslant = |width: f64| kept([[0.0, 0.0, 0.0], [1e6, 1e6, 1e6], [1e6, 1e6 + width, 1e6]]);
         assert_eq!([aslant(1e-6), aslant(0.0)].map(|(places, _)| places.len()), [3, 0]);
         let rounding = |width: f64| {
@@ -364,7 +373,7 @@ mod tests {
             Triangles::rounding(&[Triangle { corners, ..triangle(0) }])
         };
         assert!(rounding(1.0).is_none() && rounding(5e-6).is_some_and(|error| error < 2.4e-7), "{:?}", rounding(5e-6));
-        // A line whose decimals are rounded asks for no trailing parts.
+        // A line with rounded decimals needs no low parts.
         assert!(!kept([[0.1, 0.2, 0.3], [0.2, 0.4, 0.6], [0.3, 0.6, 0.9]]).1);
     }
 }

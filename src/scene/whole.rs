@@ -1,4 +1,4 @@
-//! What is known of all surfels of a scene that holds a part of them.
+//! Facts about a whole scene with levels of detail, for a scene that holds only a part of it.
 
 use glam::DVec3;
 
@@ -6,13 +6,16 @@ use super::hierarchy::{Hierarchy, Node};
 use super::{Bounds, Listed, Scene, core_and_box, framed_within};
 use rayon::prelude::*;
 
-/// A scene with levels of detail as it is when all of it is there. A picture of a part of it is that of the whole to the bit, and some of what pictures
-/// follow from is told by all surfels alone: the unit of sums, the nearest depth, whether centres need trailing parts.
+/// Facts about all surfels and nodes of a scene with levels of detail.
+///
+/// A picture rendered from a part of the scene equals that of the whole to the bit. Some of the
+/// quantities that it depends on follow from all surfels together: the unit of the sums, the near
+/// depth, and whether centres need trailing digits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Whole {
-    /// Its surfels.
+    /// The number of surfels.
     pub surfels: u32,
-    /// Its nodes.
+    /// The number of octree nodes.
     pub nodes: u32,
     /// [`Scene::origin`].
     pub origin: DVec3,
@@ -30,38 +33,39 @@ pub struct Whole {
     pub largest_radius: f32,
     /// [`Scene::largest_shorter`].
     pub largest_shorter: f32,
-    /// Of its nodes.
+    /// The facts about all nodes.
     pub levels: LevelFacts,
-    /// What surfels have.
+    /// The optional lists that its surfels have.
     pub has: Has,
 }
 
-/// What is known of the nodes of levels of detail.
+/// Facts about the octree nodes of the levels of detail.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LevelFacts {
-    /// The longest half-axis with the height of its cap, world units.
+    /// The largest sum of a node's longer half-axis and the height of its cap, world units.
     pub largest_radius: f32,
-    /// The longest shorter half-axis, world units.
+    /// The largest of the nodes' shorter half-axes, world units.
     pub largest_shorter: f32,
-    /// Some have caps.
+    /// Whether any node has a cap.
     pub caps: bool,
 }
 
 impl LevelFacts {
-    /// Those of `hierarchy`.
+    /// The facts about all nodes of `hierarchy`.
     pub fn of(hierarchy: &Hierarchy) -> Self {
         Self::of_nodes(hierarchy.nodes.par_iter().with_min_len(4096))
     }
 
-    /// Those of some nodes.
+    /// The facts about `nodes`.
     pub fn of_nodes<'a>(nodes: impl ParallelIterator<Item = &'a Node>) -> Self {
         nodes.fold(Self::default, Self::with).reduce(Self::default, Self::both)
     }
 
-    /// Those of these nodes and of one more.
+    /// The facts with one more node.
     fn with(self, node: &Node) -> Self {
         let radius = node.surfel.radius();
-        // A cap is no higher than half the sum of its heights (and what rounding to f32 may add), so few are looked at closely.
+        // A cap is at most half the sum of its heights high, up to f32 rounding. This bound saves
+        // the square root for most nodes.
         let most = f64::from(radius) + 0.500_001 * node.cap.0.iter().map(|height| f64::from(height.abs())).sum::<f64>();
         let may_be_largest = most > f64::from(self.largest_radius);
         let highest = if may_be_largest { node.cap.highest() as f32 } else { 0.0 };
@@ -72,7 +76,7 @@ impl LevelFacts {
         })
     }
 
-    /// Those of these nodes and of others.
+    /// The facts about the nodes of both.
     #[must_use]
     pub fn both(self, other: Self) -> Self {
         Self {
@@ -83,7 +87,7 @@ impl LevelFacts {
     }
 }
 
-/// Which of the lists that may be empty a scene has.
+/// Flags for the lists of a scene that may be empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Has {
     /// [`Scene::low`].
@@ -97,7 +101,8 @@ pub struct Has {
 }
 
 impl Scene {
-    /// Which lists it has; where it holds a part of a scene, that has, though they are empty where it holds no surfel.
+    /// The lists that the scene has. A part of a scene has those of the whole, even where it holds
+    /// no surfel and they are empty.
     pub fn has(&self) -> Has {
         let own = Has {
             low: !self.low.is_empty(),
@@ -110,7 +115,8 @@ impl Scene {
 }
 
 impl Whole {
-    /// That of a scene that has all of its surfels and of their nodes; None of one without nodes.
+    /// The facts about a scene that holds all of its surfels and nodes; None for a scene without
+    /// levels of detail.
     pub fn of(scene: &Scene) -> Option<Self> {
         let hierarchy = scene.hierarchy.as_deref()?;
         let places = Listed(scene.places(), |index| scene.place(index));
@@ -132,7 +138,8 @@ impl Whole {
         })
     }
 
-    /// Whether the surfels of a scene, which is not known to be a part of another, and its nodes, of which `levels` tells, are within what this says of all.
+    /// Whether the surfels of `part` and nodes with these `levels` stay within the bounds stated
+    /// here. `part` must not have [`Scene::part_of`] set.
     pub fn holds(&self, part: &Scene, levels: LevelFacts) -> bool {
         let (own, (low, high)) = (part.bounds(), part.color_range());
         let least = |all: [f32; 4], own: [f32; 4]| all.iter().zip(own).all(|(all, own)| *all <= own);
@@ -147,7 +154,8 @@ impl Whole {
             && part.largest_shorter() <= self.largest_shorter
     }
 
-    /// Whether its origin is one that a scene with this body may have: f32 coordinates about it have the digits that they should.
+    /// Whether f32 coordinates about this origin are precise enough: the body reaches at most 4
+    /// times its longest edge from it.
     pub fn is_near(&self) -> bool {
         let Bounds { min, max } = self.body;
         let most = 4.0 * (max - min).max_element();
@@ -162,7 +170,8 @@ mod tests {
     use crate::random::Random;
     use crate::scene::{Cap, Surfel};
 
-    /// Nodes that are passed over are none of the largest, whatever their heights are and wherever threads begin.
+    /// Skipped nodes never include the largest one, whatever the heights and wherever the threads
+    /// start.
     #[test]
     fn the_largest_node_is_found() {
         let mut random = Random::stream(7, 0);

@@ -1,4 +1,4 @@
-//! One disk, an ellipse, flat or curved, as a ray or a point meets it.
+//! Intersections and distances of one disk: an ellipse, flat or curved.
 
 use glam::{DVec2, DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -6,27 +6,29 @@ use obvhs::aabb::Aabb;
 use super::triangles::PADDING;
 use crate::scene::{Cap, Clip};
 
-/// The shorter half-axis is taken for at least this part of the longer: a disk seen as a line has a distance all the same.
+/// The shorter half-axis is set to at least this fraction of the longer one, so that a disk that
+/// degenerates to a line has a distance too.
 const THINNEST: f64 = 1e-9;
 
-/// In units of the tree's radius, relative to its centre.
+/// A disk in units of the tree's radius, relative to the tree's centre.
 #[derive(Clone, Debug)]
 pub(super) struct Disk {
     pub center: DVec3,
-    /// Unit directions of the longer and of the shorter half-axis, and of the normal.
+    /// Unit directions of the longer half-axis, the shorter one and the normal.
     axes: [DVec3; 3],
     /// Lengths of the half-axes, the longer one first.
     pub half: [f64; 2],
-    /// Where it ends before its rim, by the half-axes that came.
+    /// The clip lines, in terms of the original half-axes.
     clip: Clip,
-    /// The heights of its cap over the principal half-axes, uu, uv and vv; 0 of a flat one.
+    /// The cap's coefficients uu, uv and vv for the principal half-axes; 0 for a flat disk.
     heights: [f64; 3],
-    /// Cosine and sine of the angle from those to the principal ones.
+    /// Cosine and sine of the angle from the original half-axes to the principal ones.
     turn: DVec2,
 }
 
 impl Disk {
-    /// Half-axes that are not perpendicular are conjugate ones of the same ellipse; its principal ones are found here.
+    /// A flat disk. If s and t are not perpendicular, its axes are the principal half-axes of the
+    /// same ellipse.
     pub fn new(center: DVec3, s: DVec3, t: DVec3) -> Self {
         // The rotation by which (s, t) become perpendicular: tan 2x = 2 s.t / (s.s - t.t).
         let turn = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
@@ -39,12 +41,15 @@ impl Disk {
         Self { center, axes: [long, short, long.cross(short)], half, clip: Clip::NONE, heights: [0.0; 3], turn }
     }
 
-    /// That ends at these lines, by the half-axes that came.
+    /// The disk cut by clip lines, which are given in terms of the original half-axes.
     pub fn cut(self, clip: Clip) -> Self {
         Self { clip, ..self }
     }
 
-    /// With the cap of these heights over the half-axes that came: p = u' s' + v' t' with s' = s cos + t sin and t' = t cos - s sin.
+    /// The disk with a cap, whose coefficients are given for the original half-axes.
+    ///
+    /// They are converted to the principal half-axes: p = u' s' + v' t' with s' = s cos + t sin and
+    /// t' = t cos - s sin.
     pub fn curved(self, [uu, uv, vv]: [f64; 3]) -> Self {
         let (c, s) = (self.turn.x, self.turn.y);
         let heights = [
@@ -63,14 +68,17 @@ impl Disk {
         Aabb::new(corner(self.center - reach + low.min(high)), corner(self.center + reach + low.max(high)))
     }
 
-    /// Half the bilinear form of the heights: of one place on the unit disk twice, how high the cap is there.
+    /// The symmetric bilinear form of the cap; `bent(a, a)` is its height at the point a of the
+    /// unit disk.
     fn bent(&self, a: DVec2, b: DVec2) -> f64 {
         let [uu, uv, vv] = self.heights;
         0.5 * (uu * a.x * b.x + uv * (a.x * b.y + a.y * b.x) + vv * a.y * b.y)
     }
 
-    /// Where on the line `point + t * direction` the disk lies, the nearest to `point` of the line's two meetings with a cap; None where
-    /// it does not, or is flat and seen edge-on.
+    /// The parameter t at which the line `point + t * direction` meets the disk.
+    ///
+    /// If the line meets a cap twice, this is the intersection nearer to `point`. None if the line
+    /// misses the disk, or lies in the plane of a flat one.
     pub fn met_at(&self, point: DVec3, direction: DVec3) -> Option<f64> {
         let [long, short, normal] = self.axes;
         let local = |v: DVec3| DVec2::new(v.dot(long) / self.half[0], v.dot(short) / self.half[1]);
@@ -92,9 +100,8 @@ impl Disk {
         [c / far, far / a].into_iter().filter(lies).min_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
-    /// Beyond the rim the nearest point (x', y') of the ellipse with half-axes a and b has the normal through (x, y):
-    /// `x' = a² x / (t + a²)`, `y' = b² y / (t + b²)`, where t is the root of `(a x / (t + a²))² + (b y / (t + b²))² = 1`.
-    /// That function is convex and falls, so Newton's method comes to the root from below and never passes it.
+    /// The squared distance from a point to the disk, in units of the tree's radius. For a curved
+    /// disk it is an upper bound, see `squared_distance_to_cap`.
     pub fn squared_distance(&self, point: DVec3) -> f64 {
         let offset = point - self.center;
         let foot = DVec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1]));
@@ -106,8 +113,11 @@ impl Disk {
         self.squared_distance_to_cap(foot.extend(height), nearest)
     }
 
-    /// From a point in the disk's own axes to its cap, about the place `first` of the plane: from each place on to the nearest of the
-    /// plane that touches the cap there, as long as that is nearer. No distance is less than the true one.
+    /// The squared distance from `point`, in the disk's axes, to the cap, by iteration from the
+    /// point `first` of the plane.
+    ///
+    /// Each step goes to the nearest point of the tangent plane at the previous one, as long as
+    /// that reduces the distance. The result is never less than the true distance.
     fn squared_distance_to_cap(&self, point: DVec3, first: DVec2) -> f64 {
         const STEPS: u32 = 8;
         let half = DVec2::from_array(self.half);
@@ -129,8 +139,11 @@ impl Disk {
         least
     }
 
-    /// The nearest point to `foot` of the ellipse, cut by its lines: that of the whole ellipse where the lines keep it, else one on a
-    /// chord that a line cuts out, as what is kept is convex. Far away where nothing is kept.
+    /// The point of the ellipse, cut by its clip lines, that is nearest to `foot`; infinite if
+    /// nothing is kept.
+    ///
+    /// It is the nearest point of the whole ellipse if the lines keep that one. Otherwise it lies
+    /// on the chord of a line, as the kept part is convex.
     fn nearest_in_plane(&self, foot: DVec2) -> DVec2 {
         let whole = self.nearest_of_ellipse(foot);
         let half = DVec2::from_array(self.half);
@@ -151,12 +164,18 @@ impl Disk {
         on_chord.min_by(nearer).unwrap_or(DVec2::INFINITY)
     }
 
-    /// A line on the unit disk of the principal half-axes.
+    /// Converts a clip line to the principal half-axes.
     fn principal(&self, line: [f32; 3]) -> DVec3 {
         let ([x, y, z], [cos, sin]) = (line.map(f64::from), self.turn.to_array());
         DVec3::new(x * cos + y * sin, y * cos - x * sin, z)
     }
 
+    /// The point of the whole ellipse that is nearest to `foot`.
+    ///
+    /// From outside, the nearest point (x', y') of the ellipse with half-axes a and b has a normal
+    /// through (x, y): `x' = a² x / (t + a²)`, `y' = b² y / (t + b²)`, where t is the root of
+    /// `(a x / (t + a²))² + (b y / (t + b²))² = 1`. The left side is convex and decreasing in t, so
+    /// Newton's method approaches the root from below and never passes it.
     fn nearest_of_ellipse(&self, foot: DVec2) -> DVec2 {
         let [x, y] = foot.abs().to_array();
         let [a, b] = self.half;
@@ -178,13 +197,14 @@ impl Disk {
     }
 }
 
-/// The part of a line that lies on the unit disk and inside the other line: its two ends.
+/// The ends of the part of a line's chord across the unit disk that the `other` line keeps; None if
+/// there is no such part.
 fn chord(line: DVec3, other: DVec3) -> Option<[DVec2; 2]> {
     let length = line.truncate().length();
     let (toward, distance) = (line.truncate() / length, -line.z / length);
     let half = (1.0 - distance * distance).sqrt();
     let (mut low, mut high) = (-half, half);
-    // No chord, of a line past the rim or without a direction, has no ends.
+    // A line beyond the rim or without a direction has no chord.
     if half.is_nan() {
         return None;
     }

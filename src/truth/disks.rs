@@ -1,4 +1,5 @@
-//! The disks of a scene as rays and points meet them: ellipses, flat or curved, neither blended nor filtered.
+//! The disks of a scene for rays and distances: ellipses, flat or curved, neither blended nor
+//! filtered.
 //!
 //! As for triangles, a tree of padded f32 boxes finds candidates, and each is decided in f64.
 
@@ -17,20 +18,20 @@ use super::nearest::nearest;
 use super::triangles::PADDING;
 use crate::scene::{Bounds, Cap, Clip, Scene, Surfel};
 
-/// The disks of a scene in a tree of boxes.
+/// The disks of a scene in a bounding volume hierarchy.
 #[derive(Clone)]
 pub struct DiskTree {
     tree: Bvh2,
     disks: Vec<Disk>,
-    /// The middle of all disks, world coordinates.
+    /// The centre of the bounding box of all disks, world coordinates.
     center: DVec3,
-    /// Half the diagonal of their bounds, world units.
+    /// Half the diagonal of that box, world units.
     radius: f64,
-    /// The longest of the shorter half-axes, in units of `radius`.
+    /// The largest of the shorter half-axes, in units of `radius`.
     widest: f64,
 }
 
-/// A surfel and its centre with all digits.
+/// A surfel, and its centre with all digits.
 struct Placed<'a> {
     center: DVec3,
     surfel: &'a Surfel,
@@ -39,7 +40,7 @@ struct Placed<'a> {
 }
 
 impl Placed<'_> {
-    /// What tells it from others.
+    /// A key that is equal for equal disks only.
     fn bits(&self) -> ([u64; 3], [[u32; 3]; 5]) {
         let (Clip([first, second]), Cap(heights)) = (self.clip, self.cap);
         let axes = [self.surfel.s, self.surfel.t, first, second, heights].map(|axis| axis.map(f32::to_bits));
@@ -48,7 +49,8 @@ impl Placed<'_> {
 }
 
 impl DiskTree {
-    /// Builds the tree. Surfels that are not finite or have no size are left out, and those that are the same are one.
+    /// Builds the tree. It leaves out surfels that are not finite or have no size, and keeps one of
+    /// each set of equal surfels.
     pub fn new(scene: &Scene) -> Self {
         let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let extent = |surfel: &Surfel| (world(surfel.s).powf(2.0) + world(surfel.t).powf(2.0)).map(f64::sqrt);
@@ -66,7 +68,8 @@ impl DiskTree {
         };
         let all = (0..scene.surfels.len()).map(placed);
         let mut surfels: Vec<Placed<'_>> = all.filter(|placed| sized(&placed.surfel)).collect();
-        // Boxes tell nothing apart that is in one place: of thousands that are, each would be looked at for each point.
+        // Boxes cannot separate disks in one position: of thousands, each would be tested for each
+        // point.
         surfels.par_sort_unstable_by_key(Placed::bits);
         surfels.dedup_by_key(|placed| placed.bits());
         let bounds = surfels.par_iter().fold(
@@ -86,7 +89,7 @@ impl DiskTree {
         };
         let disks: Vec<Disk> = surfels.par_iter().map(disk).collect();
         let boxes: Vec<Aabb> = disks.iter().map(Disk::padded_box).collect();
-        // The builder takes no empty list in all of its steps.
+        // Not every step of the builder accepts an empty list.
         let tree = if boxes.is_empty() {
             Bvh2::default()
         } else {
@@ -96,22 +99,23 @@ impl DiskTree {
         Self { tree, disks, center: scene.origin + center, radius, widest }
     }
 
-    /// How many disks there are.
+    /// The number of disks.
     pub fn len(&self) -> usize {
         self.disks.len()
     }
 
-    /// No surfel has a size.
+    /// Whether there are no disks.
     pub fn is_empty(&self) -> bool {
         self.disks.is_empty()
     }
 
-    /// Whether the line through `point` along `direction` (of unit length) meets a disk, no farther from `point` than
-    /// `reach` times the disk's own shorter half-axis. World coordinates.
+    /// Whether the line through `point` along the unit `direction` meets a disk at a distance from
+    /// `point` of at most `reach` times that disk's shorter half-axis. World coordinates.
     pub fn covers(&self, point: DVec3, direction: DVec3, reach: f64) -> bool {
         let point = (point - self.center) / self.radius;
         let farthest = reach * self.widest + f64::from(PADDING);
-        // Nothing is met from outside the ball of the boxes; the f32 numbers below are thus small.
+        // From outside the ball around the boxes nothing is in reach; inside it, the f32 numbers
+        // below are small.
         if self.is_empty() || point.is_nan() || point.length() > 1.1 + farthest {
             return false;
         }
@@ -127,21 +131,21 @@ impl DiskTree {
         })
     }
 
-    /// The distance of a point from the nearest disk, +inf if there is none. World coordinates and units.
+    /// The distance of `point` from the nearest disk, world units; +inf if there is none.
     pub fn distance(&self, point: DVec3) -> f64 {
         let point = (point - self.center) / self.radius;
         let squared = |index: usize| self.disks[index].squared_distance(point);
         nearest(&self.tree, point, squared).0.sqrt() * self.radius
     }
 
-    /// The longer half-axis of the disk nearest to a point, None if there is no disk. World coordinates and units.
+    /// The longer half-axis of the disk nearest to `point`, world units; None if there is no disk.
     pub fn radius_near(&self, point: DVec3) -> Option<f64> {
         let point = (point - self.center) / self.radius;
         let squared = |index: usize| self.disks[index].squared_distance(point);
         nearest(&self.tree, point, squared).1.map(|index| self.disks[index].half[0] * self.radius)
     }
 
-    /// The distance of a point from the nearest disk's centre, +inf if there is none. World coordinates and units.
+    /// The distance of `point` from the nearest disk's centre, world units; +inf if there is none.
     pub fn distance_to_center(&self, point: DVec3) -> f64 {
         let point = (point - self.center) / self.radius;
         let squared = |index: usize| self.disks[index].center.distance_squared(point);
@@ -162,7 +166,8 @@ mod tests {
         }
     }
 
-    /// Disks of all shapes: round, long, needles, and ones whose half-axes are not perpendicular; far from the origin.
+    /// Disks of many shapes, far from the origin: round, long, needles, and with half-axes that are
+    /// not perpendicular.
     fn scene() -> Scene {
         let mut next = noise(1);
         let mut vector = || Vec3::new(next() as f32, next() as f32, next() as f32);
@@ -187,7 +192,8 @@ mod tests {
         }
     }
 
-    /// Lines of all kinds for the disks of `scene()`: that leave out the centre, that meet on the disk, and none.
+    /// Clip lines of many kinds for the disks of `scene()`: some clip the centre, some cross on the
+    /// disk, some clip nothing.
     fn clips() -> Vec<Clip> {
         let mut next = noise(5);
         let line = |angle: f64, z: f64| [angle.cos() as f32, angle.sin() as f32, z as f32];
@@ -203,7 +209,7 @@ mod tests {
         for clips in [Vec::new(), clips()] {
             let scene = Scene { clips, ..scene() };
             let tree = DiskTree::new(&scene);
-            // Forty are the same as others but for their lines.
+            // Forty disks equal others except for their clip lines.
             assert_eq!(tree.len(), if scene.clips.is_empty() { 298 } else { 338 });
             let mut next = noise(2);
             for _ in 0..40 {
@@ -226,7 +232,8 @@ mod tests {
                 }
                 let world = scene.origin + point;
                 let distance = tree.distance(world);
-                // To a corner between lines and rim it is as far along the rim from the next sample.
+                // At a corner between clip line and rim, the distance is uncertain by the spacing
+                // of samples along the rim.
                 let near = if scene.clips.is_empty() { distance.hypot(0.02) } else { distance + 0.02 };
                 assert!(distance < sampled + 1e-8 && sampled < near, "{distance} {sampled}");
                 assert!((tree.distance_to_center(world) - to_center).abs() < 1e-8);
@@ -243,7 +250,8 @@ mod tests {
         for _ in 0..3000 {
             let point = DVec3::new(next(), next(), next()) * 3.0;
             let direction = DVec3::new(next(), next(), next()).normalize();
-            // By Cramer's rule on point + t direction = center + u s + v t, which knows no principal axes.
+            // Cramer's rule on point + t direction = center + u s + v t, which needs no principal
+            // axes.
             let met = |surfel: &Surfel| {
                 let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
                 let (offset, determinant) = (point - center, -direction.dot(s.cross(t)));

@@ -1,8 +1,9 @@
-//! What a surface looks like when no splat is asked: ray casting, the ground truth of reconstruction errors.
+//! Ground truth: ray casting of exact surfaces, against which reconstruction errors are measured.
 //!
-//! Rays and hits are f64. An analytic [`Shape`] is met by its formula, a mesh by each triangle, found through a tree of
-//! boxes ([`triangles`]); the disks that stand for a surface are found in the same way ([`disks`]). The first surface
-//! on a ray is shaded, and where surfaces let something through, those behind it.
+//! Rays and hits are f64. An analytic [`Shape`] is intersected by its formula, a mesh triangle by
+//! triangle, with candidates from a tree of boxes ([`triangles`]); the disks that represent a
+//! surface are found in the same way ([`disks`]). The first surface on a ray is shaded and, through
+//! transparent ones, those behind it.
 
 mod disk;
 pub mod disks;
@@ -30,35 +31,37 @@ use crate::surfels::analytic::{Shape, depth_along_ray};
 /// A surface that rays can meet.
 #[derive(Clone)]
 pub enum Surface {
-    /// One with a formula.
+    /// A surface with a formula.
     Analytic(Shape),
-    /// Triangles.
+    /// A triangle mesh.
     Mesh(TriangleTree),
-    /// Two, of which the nearer is met.
+    /// Two surfaces, of which a ray meets the nearer.
     Both(Box<[Surface; 2]>),
 }
 
-/// Where a ray meets a surface.
+/// The intersection of a ray with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Along the ray, in units of its direction's length; for a camera's ray this is the depth.
+    /// The distance along the ray, in units of its direction's length. For a camera's ray this is
+    /// the depth.
     pub distance: f64,
-    /// Unit normal in world space, on the side that the surface says.
+    /// Unit normal in world space, on the side that the surface specifies.
     pub normal: DVec3,
-    /// Unit normal of the surface's own tangent plane: of the triangle, between whose corners `normal` may be interpolated.
+    /// Unit normal of the tangent plane. For a triangle it is that of its plane, while `normal` may
+    /// be interpolated between the corners.
     pub facet: DVec3,
     /// Linear RGB, straight alpha.
     pub color: [f32; 4],
 }
 
-/// The side of the grid of samples in a pixel when none is chosen: 16 samples.
+/// The default side of the grid of samples in a pixel: 4 x 4 = 16 samples.
 pub const DEFAULT_GRID: u32 = 4;
 
-/// The largest side of that grid.
+/// The largest side of the grid of samples.
 const LARGEST_GRID: u32 = 64;
 
-/// Surfaces that follow each other on a ray by less than this part of the depth and the surface's size are one: a ray
-/// through an edge meets both of its triangles.
+/// Intersections on a ray closer together than this fraction of depth plus size of the surface
+/// count as one, as a ray through an edge meets both of its triangles.
 const SAME_SURFACE: f64 = 1e-9;
 
 impl Surface {
@@ -66,18 +69,20 @@ impl Surface {
     ///
     /// # Errors
     ///
-    /// As that.
+    /// As [`io::read_mesh`] and [`TriangleTree::new`].
     pub fn read(path: &Path, progress: &dyn Progress) -> Result<Self> {
         Self::mesh(&io::read_mesh(path, progress)?)
     }
 
-    /// The triangles of a mesh; see [`TriangleTree::new`].
+    /// A surface from the triangles of a mesh; see [`TriangleTree::new`].
     pub fn mesh(mesh: &Mesh) -> Result<Self> {
         Ok(Self::Mesh(TriangleTree::new(mesh)?))
     }
 
-    /// The first hit at a distance greater than `beyond`, which is not negative. All three in world units, the distance
-    /// in units of the direction's length. Distances err by about 1e-12 of the distance and the surface's size.
+    /// The first intersection at a distance greater than `beyond`, which must not be negative.
+    ///
+    /// `start` and `direction` are in world units, `beyond` in units of the direction's length.
+    /// Distances err by about 1e-12 of the distance and the surface's size.
     pub fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
         match self {
             Self::Analytic(shape) => {
@@ -96,7 +101,7 @@ impl Surface {
         }
     }
 
-    /// About half its diameter, world units.
+    /// About half the diameter, world units.
     fn size(&self) -> f64 {
         match self {
             Self::Analytic(_) => 1.0,
@@ -106,24 +111,27 @@ impl Surface {
     }
 }
 
-/// An image of a surface as it is.
+/// The exact image of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
-    /// - `color`: the mean over the pixel's samples, premultiplied, over the background; linear RGB, straight alpha. Each
-    ///   sample is shaded as [`crate::passes::resolve`] shades a pixel, with the ray through the sample.
-    /// - `depth`: camera-space z of the first surface on the ray through the pixel's centre, world units; +inf for none.
-    /// - `normal`: the unit normal there, in world space, on the side that the surface says; 0 for none.
+    /// Colour, depth and normal maps, rounded from f64 to f32; there are no other maps.
     ///
-    /// All are f64 results rounded to f32. There are no other maps.
+    /// - `color`: the mean over the pixel's samples, premultiplied, over the background; linear
+    ///   RGB, straight alpha. Each sample is shaded as [`crate::passes::resolve`] shades a pixel,
+    ///   with the ray through the sample.
+    /// - `depth`: camera-space z of the first surface on the ray through the pixel's centre, world
+    ///   units; +inf for none.
+    /// - `normal`: the unit normal there, in world space, on the side that the surface specifies; 0
+    ///   for none.
     pub frame: Frame,
-    /// The share of the pixel's samples that meet the surface, in [0, 1].
+    /// The fraction of the pixel's samples that meet the surface, in [0, 1].
     pub coverage: Vec<f32>,
-    /// Camera-space z of the next surface behind the first on the ray through the pixel's centre, whichever side it
-    /// shows, world units; +inf for none.
+    /// Camera-space z, world units, of the second surface on the ray through the pixel's centre,
+    /// whichever side it shows; +inf for none.
     pub second_depth: Vec<f32>,
 }
 
-/// What one pixel sees.
+/// The truth of one pixel.
 struct Pixel {
     color: [f32; 4],
     depth: f32,
@@ -133,14 +141,17 @@ struct Pixel {
 }
 
 impl Truth {
-    /// Casts `grid` x `grid` rays through each pixel, at the centres of as many equal squares, and one through its
-    /// centre; a second goes on from the first surface. What is nearer than the camera's near depth is not seen. Of the
-    /// options shading, lights, background and opacity are used. Where the opacity is below 1, or surfaces are composited, rays go on
-    /// through each surface by the alpha that it has, times the opacity.
+    /// Casts `grid` x `grid` rays per pixel, at the centres of equal squares, for the colour and
+    /// coverage, and one through its centre for the maps.
+    ///
+    /// The centre ray continues behind the first surface for the second depth. Surfaces nearer than
+    /// the camera's near depth are invisible. The options used are shading, lights, background,
+    /// opacity and composite: if the opacity is below 1, or surfaces are composited, the sample
+    /// rays continue through each surface, attenuated by its alpha times the opacity.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for a grid of none or more than 64 x 64 samples.
+    /// [`Error::Usage`] unless `grid` is 1 to 64.
     pub fn cast(
         surface: &Surface,
         camera: &Camera,

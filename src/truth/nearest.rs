@@ -1,10 +1,12 @@
-//! How far a point is from what a tree of boxes holds, and from a triangle.
+//! The nearest primitive in a tree of boxes, and the nearest point of a triangle.
 
 use glam::{DVec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 
-/// The least `squared_distance` over the tree's primitives, and of which it is; +inf and none of them for none. The boxes
-/// must hold what the distances are measured to: a box that is farther than what was found already is passed over.
+/// The least `squared_distance` over the tree's primitives and the index of that primitive; +inf
+/// and None for an empty tree.
+///
+/// Each box must contain its primitive, as boxes farther than the best distance so far are skipped.
 pub(super) fn nearest(tree: &Bvh2, point: DVec3, squared_distance: impl Fn(usize) -> f64) -> (f64, Option<usize>) {
     let mut least = f64::INFINITY;
     let mut nearest = None;
@@ -13,7 +15,7 @@ pub(super) fn nearest(tree: &Bvh2, point: DVec3, squared_distance: impl Fn(usize
     let mut open = Vec::with_capacity(64);
     open.extend(to_box(0));
     while let Some((bound, node)) = open.pop() {
-        // NaN, of a point that is not finite, is passed over too.
+        // NaN, from a point that is not finite, is skipped too.
         if bound.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
             continue;
         }
@@ -47,14 +49,17 @@ pub(super) fn triangle_squared_distance(point: DVec3, corners: &[DVec3; 3]) -> f
     point.distance_squared(corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z)
 }
 
-/// The weights of the corners at the point of a triangle that is nearest to `point`. The triangle has an area.
+/// The barycentric weights of the point of a triangle that is nearest to `point`. The triangle must
+/// have an area.
 pub(crate) fn closest_weights(point: DVec3, corners: &[DVec3; 3]) -> DVec3 {
     let [a, b, c] = *corners;
     let normal = (b - a).cross(c - a);
-    // Twice the areas that the point makes with each edge, as it is seen along the normal.
+    // Areas of the triangles of the point and each edge, seen along the normal, up to one common
+    // factor.
     let area = |from: DVec3, to: DVec3| (to - from).cross(point - from).dot(normal);
     let areas = DVec3::new(area(b, c), area(c, a), area(a, b));
-    // Above the triangle the nearest point is the foot of the perpendicular, else it lies on an edge.
+    // Above the triangle the nearest point is the foot of the perpendicular; otherwise it lies on
+    // an edge.
     if areas.min_element() >= 0.0 {
         return areas / areas.element_sum();
     }

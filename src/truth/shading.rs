@@ -1,5 +1,5 @@
-//! The light that a point of a surface sends to the eye, by its own formulas: a fault of the renderer's shading shows in errors
-//! against the truth.
+//! Shading of exact surfaces, written independently of the renderer, so that a fault in the
+//! renderer's shading shows as an error against the truth.
 
 use glam::{DVec3, DVec4};
 
@@ -7,10 +7,12 @@ use crate::plan::RenderOptions;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Light, Shading};
 
-/// The linear colour of a point of colour `albedo` and unit `normal`, seen along the ray of direction `ray`.
+/// The linear colour that a point with colour `albedo` and unit `normal` sends toward the eye, seen
+/// along `ray`.
 ///
-/// A light of intensity I from the unit direction l lights it by `E = I max(0, n . l)`, a headlight, at the eye, by `I |n . l|`.
-/// Lambert: `albedo E`. Phong: that and [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
+/// A light of intensity I from the unit direction l has the irradiance `E = I max(0, n . l)`, a
+/// headlight, which is at the eye, `E = I |n . l|`. Lambert: `albedo E`. Phong: additionally
+/// [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
 /// `m = 2 (n . l) n - l` the mirrored light.
 pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &RenderOptions) -> DVec3 {
     if options.shading == Shading::Unlit {
@@ -34,7 +36,8 @@ pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &RenderOpt
     sent
 }
 
-/// A colour of premultiplied `light` and `alpha` in front of the straight `background`; straight.
+/// Composites premultiplied `light` with `alpha` over a straight `background`; the result is
+/// straight.
 pub(super) fn in_front(light: DVec3, alpha: f64, background: [f32; 4]) -> [f32; 4] {
     let [r, g, b, opacity] = background.map(f64::from);
     let through = (1.0 - alpha) * opacity;

@@ -1,9 +1,10 @@
-//! Where a ray first meets a triangle mesh.
+//! Ray casting of triangle meshes.
 //!
-//! The mesh is moved and scaled into the unit ball. A tree of boxes in f32 (the crate obvhs) finds candidates: boxes are
-//! padded by more than the rounding of its ray test, so it misses none. Each candidate is then decided in f64 with the edge
-//! functions of Woop, Benthin and Wald 2013, in coordinates across the ray. Two triangles see their common edge by the
-//! same two points, so no ray slips between them.
+//! The mesh is translated and scaled into the unit ball. A tree of f32 boxes (the crate obvhs)
+//! finds candidates: boxes are padded by more than the rounding of its ray test, so no candidate is
+//! missed. Each is then decided in f64 with the edge functions of Woop, Benthin and Wald 2013, in
+//! coordinates across the ray. Two triangles compute their common edge from the same two points, so
+//! no ray slips between them.
 
 use std::time::Duration;
 
@@ -21,42 +22,43 @@ use crate::io::Mesh;
 use crate::scene::Bounds;
 use crate::surfels::LARGEST_COORDINATE;
 
-/// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
-/// centre and is followed for 3: its f32 origin, direction and box distances err by less than 2e-6 of a radius.
+/// The padding of each box, in radii of the mesh. A ray starts within 2 radii of the centre and is
+/// followed for 3, so its f32 origin, direction and box distances err by less than 2e-6 of a
+/// radius.
 pub(super) const PADDING: f32 = 8e-6;
 
-/// The distance of a ray's f32 start from its point nearest to the mesh's centre, radii.
+/// The distance from a ray's f32 start to its point nearest to the mesh's centre, radii.
 const STAND_OFF: f64 = 2.0;
 
-/// The triangles of a mesh in a tree of boxes.
+/// The triangles of a mesh in a bounding volume hierarchy.
 #[derive(Clone)]
 pub struct TriangleTree {
     tree: Bvh2,
     triangles: Vec<Triangle>,
-    /// The middle of the mesh, world coordinates.
+    /// The centre of the mesh's bounding box, world coordinates.
     center: DVec3,
-    /// Half the diagonal of its bounds, world units.
+    /// Half the diagonal of that box, world units.
     radius: f64,
-    /// The mesh without its positions and normals.
+    /// The mesh without positions and normals, for its colours.
     paint: Box<Mesh>,
 }
 
-/// One that has an area.
+/// A triangle that has an area.
 #[derive(Clone, Debug)]
 struct Triangle {
     /// In units of the mesh's radius, relative to its centre.
     corners: [DVec3; 3],
-    /// Of the triangle, unit.
+    /// Unit normal of the triangle's plane.
     normal: DVec3,
-    /// Of its corners, unit or zero; all zero without.
+    /// Unit normals of the corners; zero where missing.
     normals: [DVec3; 3],
-    /// Which of the mesh's.
+    /// The triangle's index in the mesh.
     index: usize,
 }
 
 impl TriangleTree {
-    /// Builds the tree. Triangles without an area, or with a coordinate that is not finite or exceeds [`LARGEST_COORDINATE`], are
-    /// left out: no ray meets them.
+    /// Builds the tree. It leaves out triangles that no ray meets: those without an area, or with a
+    /// coordinate that is not finite or exceeds [`LARGEST_COORDINATE`].
     ///
     /// # Errors
     ///
@@ -80,7 +82,7 @@ impl TriangleTree {
             triangles.push(Triangle { corners, normal, normals, index });
         }
         let boxes: Vec<Aabb> = triangles.iter().map(padded_box).collect();
-        // The builder takes no empty list in all of its steps.
+        // Not every step of the builder accepts an empty list.
         let tree = if boxes.is_empty() {
             Bvh2::default()
         } else {
@@ -98,34 +100,35 @@ impl TriangleTree {
         Ok(Self { tree, triangles, center, radius, paint: Box::new(paint) })
     }
 
-    /// The middle of the mesh's bounds, world coordinates.
+    /// The centre of the mesh's bounding box, world coordinates.
     pub fn center(&self) -> DVec3 {
         self.center
     }
 
-    /// Half the diagonal of the mesh's bounds, world units; 0 for none.
+    /// Half the diagonal of the mesh's bounding box, world units; 0 for an empty mesh.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Triangles that have an area.
+    /// The number of triangles that have an area.
     pub fn len(&self) -> usize {
         self.triangles.len()
     }
 
-    /// No triangle has an area.
+    /// Whether no triangle has an area.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
     }
 
-    /// The distance of a point from the nearest triangle, +inf if there is none. World coordinates and units.
+    /// The distance of `point` from the nearest triangle, world units; +inf if there is none.
     pub fn distance(&self, point: DVec3) -> f64 {
         let point = (point - self.center) / self.radius;
         let squared = |index: usize| triangle_squared_distance(point, &self.triangles[index].corners);
         nearest(&self.tree, point, squared).0.sqrt() * self.radius
     }
 
-    /// The first hit at a distance greater than `beyond`; see [`Surface::first_hit`](super::Surface::first_hit).
+    /// The first intersection at a distance greater than `beyond`; see
+    /// [`Surface::first_hit`](super::Surface::first_hit).
     pub(crate) fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
         let line = Line::new((start - self.center) / self.radius, direction)?;
         let along = |distance: f64| distance * direction.length() / self.radius - line.shift;
@@ -140,7 +143,7 @@ impl TriangleTree {
                 return f32::INFINITY;
             }
             first = Some((t, index, weights));
-            // The padding of the boxes outweighs this rounding, so no nearer triangle is left out.
+            // The padding of the boxes exceeds this rounding, so no nearer triangle is missed.
             (t + STAND_OFF) as f32
         });
         let (t, index, weights) = first?;
@@ -161,38 +164,41 @@ fn padded_box(triangle: &Triangle) -> Aabb {
 }
 
 impl Triangle {
-    /// The corners' normals, interpolated; the triangle's own where they are missing or cancel.
+    /// The interpolated normal of the corners, or that of the plane if corner normals are missing
+    /// or cancel.
     fn normal_at(&self, weights: DVec3) -> DVec3 {
         let [a, b, c] = self.normals;
         (a * weights.x + b * weights.y + c * weights.z).try_normalize().unwrap_or(self.normal)
     }
 }
 
-/// A ray's line, in units of the mesh's radius about its centre.
+/// The line of a ray, in units of the mesh's radius, relative to its centre.
 struct Line {
-    /// Its point nearest to the centre: a far eye costs no digits but those of the distance.
+    /// The line's point nearest to the centre. Starting from it, a distant eye loses digits of the
+    /// distance only.
     nearest: DVec3,
-    /// Unit.
+    /// The unit direction.
     direction: DVec3,
     /// The distance from the ray's start to `nearest`.
     shift: f64,
-    /// Two directions across.
+    /// Two unit directions perpendicular to the line and to each other.
     across: [DVec3; 2],
 }
 
 impl Line {
-    /// None where it cannot meet the unit ball.
+    /// None if the line cannot meet the unit ball.
     fn new(start: DVec3, direction: DVec3) -> Option<Self> {
         let direction = direction.try_normalize()?;
         let shift = -start.dot(direction);
         let nearest = start + direction * shift;
-        // The corners of the bounds may lie on the ball.
+        // The corners of the bounding box may lie on the ball.
         let reaches = nearest.length_squared() <= 1.0 + 1e-6;
         let (right, down) = direction.any_orthonormal_pair();
         reaches.then_some(Self { nearest, direction, shift, across: [right, down] })
     }
 
-    /// Where it meets the triangle, relative to `nearest`, and the weights of the corners there.
+    /// The intersection with a triangle: its distance from `nearest`, and the weights of the
+    /// corners.
     fn meets(&self, corners: &[DVec3; 3]) -> Option<(f64, DVec3)> {
         let corners = corners.map(|corner| corner - self.nearest);
         let [a, b, c] = corners.map(|corner| DVec2::new(corner.dot(self.across[0]), corner.dot(self.across[1])));
@@ -213,7 +219,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Numbers in [-1, 1): the fractions of multiples of square roots.
+    /// Vectors with components in [-1, 1): the fractional parts of multiples of square roots.
     fn vectors(root: f64) -> impl Iterator<Item = DVec3> {
         let number = move |k: u32| 2.0 * (f64::from(k) * root.sqrt()).fract() - 1.0;
         (1..).map(move |k| DVec3::new(number(7 * k), number(7 * k + 3), number(11 * k + 5)))
@@ -221,7 +227,8 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_looking_at_every_triangle_finds() {
-        // Large ones and some below the rounding of f32, across each other, some flat along an axis: boxes without thickness.
+        // Large triangles and some below the rounding of f32, intersecting each other; some are
+        // flat along an axis, so that their boxes have no thickness.
         let (at, across) = (vectors(2.0), vectors(3.0));
         let mut mesh = Mesh::default();
         for (k, (at, across)) in at.zip(across).take(400).enumerate() {
@@ -236,7 +243,8 @@ mod tests {
         assert_eq!((tree.len(), tree.is_empty()), (400, false));
         let mut met = 0;
         for (k, target) in vectors(7.0).take(4000).enumerate() {
-            // A third run along an axis, as those of an orthographic camera do, another third to the middle of a triangle.
+            // A third of the rays run along an axis, as for an orthographic camera, another third
+            // to the middle of a triangle.
             let triangle = mesh.triangles[k % 400].map(|vertex| DVec3::from(mesh.positions[vertex as usize]));
             let middle = triangle.iter().sum::<DVec3>() / 3.0;
             let eye = if k % 5 == 0 { DVec3::new(1e5, 2e5, -1e5) } else { 4.0 * vectors(5.0).nth(k % 50).unwrap() };

@@ -105,13 +105,13 @@ fn broken_trees_are_told() {
     let inner = nodes.iter().skip(1).position(|node| !node.leaf).unwrap() + 1;
     assert!(rejected(&|tree| tree.nodes[inner].first = 0).contains("children"));
     assert!(rejected(&|tree| tree.nodes[inner].first = u32::MAX).contains("children"));
-    assert!(rejected(&|tree| tree.nodes[0].count = 200).contains("too much"));
+    assert!(rejected(&|tree| tree.nodes[0].count = 200).contains("too many children"));
     assert!(rejected(&|tree| tree.nodes[inner].leaf = true).contains("node"));
     let last = nodes.len() - 1;
     assert!(rejected(&|tree| tree.nodes[last].count += 1).contains("points"));
-    assert!(rejected(&|tree| tree.nodes[last].count = 0).contains("nothing"));
+    assert!(rejected(&|tree| tree.nodes[last].count = 0).contains("no children or points"));
     let told = rejected(&|tree| tree.nodes[3].surfel.center[0] = f32::INFINITY);
-    assert!(told.contains("no numbers"), "{told}");
+    assert!(told.contains("not finite"), "{told}");
     // Cut off in what it says of all points, and in its nodes.
     ply::write_scene(&path, &whole, None, &()).unwrap();
     let bytes = std::fs::read(&path).unwrap();

@@ -299,7 +299,7 @@ fn damaged_files_are_told() {
     told(place_of(&bytes, &levels, last as u64), &tree[first].first.to_le_bytes(), "do not follow");
     // What all points say is no number, or not what they are.
     let whole = bytes.len() - 8 * 44;
-    told(whole, &f64::NAN.to_le_bytes(), "no number");
+    told(whole, &f64::NAN.to_le_bytes(), "not a number");
     told(whole + 8 * 6, &(-9.0f64).to_le_bytes(), "leaves out");
     told(whole + 8 * 35, &1e-9f64.to_le_bytes(), "leaves out");
     // A point without a place, one without a disk.

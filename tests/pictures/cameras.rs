@@ -193,7 +193,7 @@ fn sets_that_cannot_be_rendered_end_in_a_sentence() {
     let distorted = transforms(&format!(r#"{LENS}, "k1": 0.01"#), &[good("a")]);
     let distorted = folder.file("distorted.json", distorted);
     let wide = folder.file("wide.json", transforms(r#""camera_angle_x": 3.5"#, &[good("a")]));
-    render(&wide, &[], 1, &["wide.json", "frame 1", "camera_angle_x lies between 0 and pi"]);
+    render(&wide, &[], 1, &["wide.json", "frame 1", "camera_angle_x must lie between 0 and pi"]);
     let nested = folder.file("nested.json", transforms(LENS, &[good("x"), good("b"), good("x.png/y")]));
     render(&nested, &[], 2, &["views/x.png/y.png would lie in", "views/x.png, which is a file"]);
     render(&distorted, &[], 1, &["distorted.json", "k1 = 0.01", "--ignore-distortion"]);

@@ -112,23 +112,23 @@ fn octrees_that_are_none_are_told() {
     };
     let (word, entry) = (|value: i32| value.to_le_bytes(), |k: usize| page + 32 * k);
     for (message, said) in [
-        (with(INFO + 24, &f64::NAN.to_le_bytes()), "has no place, no size or no spacing"),
-        (with(INFO + 32, &0f64.to_le_bytes()), "has no place, no size or no spacing"),
+        (with(INFO + 24, &f64::NAN.to_le_bytes()), "has no valid centre, size or spacing"),
+        (with(INFO + 32, &0f64.to_le_bytes()), "has no valid centre, size or spacing"),
         (with(ROOT, &u64::MAX.to_le_bytes()), "does not fit in the file"),
         (with(ROOT + 8, &(1u64 << 40).to_le_bytes()), "does not fit in the file"),
         (with(ROOT + 8, &33u64.to_le_bytes()), "does not fit in the file"),
         (with(ROOT + 8, &64u64.to_le_bytes()), "its octree has 43 points, and its header promises 1065"),
-        (with(entry(0), &word(-1)), "node -1-0-0-0 of its octree has no place or no size"),
+        (with(entry(0), &word(-1)), "node -1-0-0-0 of its octree has an invalid position or size"),
         (with(entry(0), &word(1_000_000)), "node 1000000-0-0-0 lies outside"),
         (with(entry(0) + 4, &word(1)), "node 0-1-0-0 lies outside"),
         (with(entry(1) + 4, &word(1)), "node 1-1-0-0 is twice"),
         (with(entry(1), &word(2)), "node 2-0-0-0 is twice"),
-        (with(entry(0), &word(5)), "below none"),
+        (with(entry(0), &word(5)), "has no parent"),
         (with(entry(3) + 28, &word(-2)), "node 3-0-0-0 of its octree has -2 points"),
         (with(entry(3) + 28, &word(0x7fff_ffff)), "do not fit in the file"),
         (with(entry(3) + 16, &(1u64 << 60).to_le_bytes()), "do not fit in the file"),
         (with(entry(3) + 24, &word(10)), "do not fit in the file"),
-        (with(entry(3) + 16, &28853u64.to_le_bytes()), "have the same bytes"),
+        (with(entry(3) + 16, &28853u64.to_le_bytes()), "overlap in the file"),
         // A page that is its own.
         (
             with(entry(0) + 16, &[&(page as u64).to_le_bytes()[..], &word(2080), &word(-1)].concat()),

@@ -298,12 +298,12 @@ fn damaged_packed_files_are_refused() {
         (compressed("ascii", &chunks, &rows, &[]), "binary_little_endian files alone"),
         (compressed("binary_little_endian", &chunks[..1], &rows, &[]), "there are 1"),
         (compressed("binary_little_endian", &chunks, &rows, &vec![vec![1.0; 8]; 257]), "8 bytes f_rest_0"),
-        (compressed("binary_little_endian", &chunks, &rows, &vec![vec![1.0; 9]; 256]), "are not as many"),
+        (compressed("binary_little_endian", &chunks, &rows, &vec![vec![1.0; 9]; 256]), "not have one row"),
         (text(&good, "packed_scale", "other_scale"), "has no uint packed_scale"),
         (text(&good, "float max_scale_y", "float mix_scale_y"), "has no float max_scale_y"),
         (text(&good, "element chunk", "element block"), "no element 'chunk'"),
         (good[..good.len() - 1].to_vec(), "the file ends after 256"),
-        (text(&good, "vertex 257", "vertex 9999999999999"), "need a chunk each 256"),
+        (text(&good, "vertex 257", "vertex 9999999999999"), "need one chunk for each 256"),
         (text(&good, "chunk 2", "chunk 99999999999999"), "promises"),
     ] {
         let said = folder.refusal("a.ply", &bytes);

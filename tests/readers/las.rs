@@ -261,7 +261,7 @@ fn las_1_5_is_read_and_what_is_newer_is_named() {
         for version in [[1, 6], [2, 0], [0, 0]] {
             let mut other = newer.clone();
             other[24..26].copy_from_slice(&version);
-            let said = format!("it is LAS {}.{}, of which only 1.0 to 1.5 are read", version[0], version[1]);
+            let said = format!("it is LAS {}.{}, but only 1.0 to 1.5 can be read", version[0], version[1]);
             assert!(folder.refusal("a.laz", &other).starts_with(&said));
         }
     }

@@ -72,7 +72,7 @@ fn fields_that_disagree_are_told() {
     let told = |bytes: Vec<u8>| notes(&folder.read("a.las", &bytes).unwrap());
     assert_eq!(told(whole()), "");
     // A version without the point format.
-    assert!(told(patched(whole(), VERSION, &[1])).contains("LAS 1.1, and point format 3, which LAS 1.2 brought"));
+    assert!(told(patched(whole(), VERSION, &[1])).contains("LAS 1.1, and point format 3, which LAS 1.2 introduced"));
     // Fewer points than there are, and fewer than of all returns.
     let fewer = patched(whole(), LEGACY_COUNT, &400u32.to_le_bytes());
     assert!(told(fewer.clone()).contains("its header says 400 points, and 500 points over all returns"));

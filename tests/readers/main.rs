@@ -132,7 +132,7 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
             (true, true) => "PLY, LAS, LAZ, OBJ, E57 and PCD",
         };
         let expected =
-            format!("its format is not known: {formats} files are read; if it is one, --input-format says which");
+            format!("its format is not known: {formats} files are read; if it is one, name it by --input-format");
         assert_eq!(said, expected);
     }
     let obj = ReadOptions { format: Some(Format::Obj), ..ReadOptions::default() };

@@ -191,12 +191,12 @@ fn headers_that_contradict_themselves_are_refused() {
         ("FIELDS x y z", "FIELDS x y", "its header names 2 fields, but gives 3 sizes, 3 types and 3 counts"),
         ("FIELDS x y z", "FIELDS x y w", "its points have no field z"),
         ("COUNT 1 1 1", "COUNT 1 1 0", "its points have no field z"),
-        ("SIZE 4 8 2", "SIZE 4 8 3", "its field 'z' has numbers of 3 bytes, which cannot be"),
-        ("SIZE 4 8 2", "SIZE 2 8 2", "its field 'x' has numbers of 2 bytes, which cannot be"),
+        ("SIZE 4 8 2", "SIZE 4 8 3", "its field 'z' has numbers of 3 bytes, which its type forbids"),
+        ("SIZE 4 8 2", "SIZE 2 8 2", "its field 'x' has numbers of 2 bytes, which its type forbids"),
         ("SIZE 4 8 2", "SIZE 4 -8 2", "line 4: not a whole number: 'SIZE 4 -8 2'"),
         ("TYPE F F I", "TYPE F F Q", "line 5: a type is I, U or F: 'TYPE F F Q'"),
         ("COUNT 1 1 1", "COUNT 1 9999999999999999999 1", "its points would be longer than any file"),
-        ("POINTS 2", "POINTS 3", "its header says 3 points, but an image of 2"),
+        ("POINTS 2", "POINTS 3", "its header gives 3 points, but WIDTH x HEIGHT is 2"),
         ("POINTS 2", "POINTS", "line 10: one number is needed: 'POINTS'"),
         ("WIDTH 2\nHEIGHT 1\n", "WIDTH 9999999999\nHEIGHT 9999999999\n", "its image is too large"),
         (
@@ -235,7 +235,7 @@ fn promises_are_held_against_the_file() {
             let message = folder.refusal("a.pcd", &[promising.as_bytes(), &bytes[start..]].concat());
             let said = match data {
                 "binary_compressed" => {
-                    format!("the header promises {points} points, but the data of 42 bytes is not theirs")
+                    format!("the header promises {points} points, but the data of 42 bytes does not fit them")
                 }
                 _ => format!("the header promises {points} points, the file ends after 3"),
             };

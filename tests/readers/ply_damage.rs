@@ -16,8 +16,8 @@ fn headers_that_are_none_are_refused_with_their_line() {
         ("", "it is not a PLY file: its first line is not 'ply'"),
         ("ply\n", "the file ends inside the PLY header, at line 2"),
         ("ply\nformat ascii 1.0\nelem", "the file ends inside the PLY header, at line 3"),
-        ("ply\nformat middle_endian 1.0\n", "line 2: not a PLY format that is read"),
-        ("ply\nformat ascii 2.0\n", "line 2: not a PLY format that is read"),
+        ("ply\nformat middle_endian 1.0\n", "line 2: not a supported PLY format"),
+        ("ply\nformat ascii 2.0\n", "line 2: not a supported PLY format"),
         ("ply\nelement vertex 1\nend_header\n", "line 3: the PLY header has no format line"),
         (
             "ply\nformat ascii 1.0\nelement vertex many\n",

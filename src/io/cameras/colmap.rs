@@ -1,11 +1,12 @@
-//! COLMAP's text: lenses in `cameras.txt`, poses in `images.txt`.
+//! COLMAP's text format: lenses in `cameras.txt`, poses in `images.txt`.
 //!
-//! | | a line each of |
-//! |---|---|
-//! | `cameras.txt` | `CAMERA_ID MODEL WIDTH HEIGHT PARAMS...`, in pixels, the centre of the first one at (0.5, 0.5) |
-//! | `images.txt` | `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and then its points `X Y POINT3D_ID ...`, which may be none |
+//! - A line of `cameras.txt` is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS...`, in pixels; the centre of
+//!   the first pixel is (0.5, 0.5).
+//! - An image in `images.txt` is a line `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and a line
+//!   of its points `X Y POINT3D_ID ...`, which may be empty.
 //!
-//! The quaternion and the translation take world coordinates to the camera's: x right, y down, z forward.
+//! The quaternion and the translation map world coordinates to camera coordinates: x right, y down,
+//! z forward.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -40,8 +41,8 @@ pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
 }
 
-/// The cameras by their identifiers; of one that cannot be used why, and on which line: that
-/// matters to images of it alone.
+/// The cameras by identifier. A camera that cannot be used is kept with its line and the reason: it
+/// matters only to the images that refer to it.
 type Lenses = HashMap<u64, Result<Camera, String>>;
 
 fn opened(path: &Path) -> io::Result<File> {
@@ -49,15 +50,15 @@ fn opened(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// What a line of `cameras.txt` says.
+/// A line of `cameras.txt`.
 struct Camera {
     size: (u32, u32),
     intrinsics: [f64; 4],
     distortion: Option<(&'static str, f64)>,
 }
 
-/// The models whose lens is a pinhole where nothing is distorted: whether they have two focal lengths, and what their numbers
-/// after the principal point are called.
+/// The models that are pinholes where all distortion coefficients are 0: name, whether they have
+/// two focal lengths, and the names of the coefficients after the principal point.
 const MODELS: [(&str, bool, &[&str]); 6] = [
     ("SIMPLE_PINHOLE", false, &[]),
     ("PINHOLE", true, &[]),
@@ -86,7 +87,7 @@ fn lens<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Camera, String> 
     let name = words.next().ok_or("it ends before its MODEL")?;
     let model = MODELS.iter().find(|(model, ..)| *model == name);
     let (_, two, distortions) = model.ok_or_else(|| {
-        format!("the model '{}' is not a pinhole's; undistort the pictures first", shown(name.as_bytes()))
+        format!("the model '{}' is not a pinhole; undistort the pictures first", shown(name.as_bytes()))
     })?;
     let size = (whole(words.next(), "WIDTH")?, whole(words.next(), "HEIGHT")?);
     let parameters = words.map(|word| number(Some(word), "PARAMS")).collect::<Result<Vec<_>, _>>()?;
@@ -108,7 +109,7 @@ fn images(lines: &mut Lines<impl BufRead>, lenses: &Lenses) -> Result<Vec<NamedC
     let mut images = Vec::new();
     while lines.next_record()? {
         images.push(image(&lines.line, lenses).map_err(|what| lines.fault(&what))?);
-        // Whoever leaves out the lines of points would lose every second image, and not be told.
+        // In a file without the lines of points, every second image would be lost silently.
         if lines.next()? && !lines.are_points() {
             return Err(lines.fault(
                 "not points X Y POINT3D_ID of the image in the line before; an image without points is followed by an empty \
@@ -135,8 +136,8 @@ fn image(line: &str, lenses: &Lenses) -> Result<NamedCamera, String> {
         *value = number(next(), name)?;
     }
     let id = whole(next(), "CAMERA_ID")?;
-    // A name may hold spaces.
-    let name = name_of(rest.trim()).ok_or("its NAME is no name of a file")?;
+    // A name may contain spaces.
+    let name = name_of(rest.trim()).ok_or("its NAME is not a valid file name")?;
     let lens = lenses.get(&id).ok_or_else(|| format!("there is no camera {id} in {CAMERAS}"))?;
     let lens = lens.as_ref().map_err(|what| format!("its camera {id} cannot be used, {what}"))?;
     let [w, x, y, z, tx, ty, tz] = pose;
@@ -167,7 +168,7 @@ fn whole<T: std::str::FromStr>(word: Option<&str>, what: &str) -> Result<T, Stri
     word.parse().map_err(|_| format!("its {what}, '{}', is not a whole number", shown(word.as_bytes())))
 }
 
-/// The lines of a text, with their numbers.
+/// The lines of a text, and the current line's number.
 struct Lines<R> {
     reader: R,
     line: String,
@@ -179,7 +180,7 @@ impl<R: BufRead> Lines<R> {
         Self { reader, line: String::new(), number: 0 }
     }
 
-    /// Takes the next line; `false` at the end.
+    /// Reads the next line; returns `false` at the end.
     fn next(&mut self) -> Result<bool, Fault> {
         self.line.clear();
         self.number += 1;
@@ -193,7 +194,7 @@ impl<R: BufRead> Lines<R> {
         })
     }
 
-    /// Takes the next line that is neither empty nor a comment; `false` at the end.
+    /// Reads the next line that is neither empty nor a comment; returns `false` at the end.
     fn next_record(&mut self) -> Result<bool, Fault> {
         while self.next()? {
             let line = self.line.trim_start();
@@ -208,7 +209,7 @@ impl<R: BufRead> Lines<R> {
         self.line.split_ascii_whitespace()
     }
 
-    /// Whether the line is the points of an image.
+    /// Whether the line can be the points of an image.
     fn are_points(&self) -> bool {
         let mut count = 0;
         let numbers = self.words().all(|word| {
@@ -241,7 +242,7 @@ mod tests {
 
     #[test]
     fn poses_are_world_to_camera() {
-        // Around (1, 1, 1): the camera's x is the world's y, its y the world's z, its z the world's x... of the inverse.
+        // A third of a turn about (1, 1, 1): the world's x, y and z become the camera's y, z and x.
         let poses = "# Image list\n# two lines each\n\n7 0.5 0.5 0.5 0.5 1 2 3 1 left/a b.jpg\n1.5 2.5 -1 3 4 77\n\
                      # not a comment of the image before\n8 1 0 0 0 0 0 0 2 c.png\n\n9 -1 0 0 0 6e6 0 0 1 d.png";
         let images = read(LENSES, poses).unwrap();
@@ -266,7 +267,7 @@ mod tests {
             ("1 PINHOLE 640 480 500 510 320", "line 1 of cameras.txt: a PINHOLE camera has 4 parameters, not 3"),
             (
                 "\n1 OPENCV_FISHEYE 6 4 5 5 3 2 0 0 0 0",
-                "line 2 of cameras.txt: the model 'OPENCV_FISHEYE' is not a pinhole's",
+                "line 2 of cameras.txt: the model 'OPENCV_FISHEYE' is not a pinhole",
             ),
             ("1", "line 1 of cameras.txt: it ends before its MODEL"),
             ("1 PINHOLE 640 -480 1 1 1 1", "line 1 of cameras.txt: its HEIGHT, '-480', is not a whole number"),
@@ -278,7 +279,7 @@ mod tests {
                 message.starts_with("line 1: its camera 1 cannot be used, ") && message.contains(said),
                 "{message}"
             );
-            // A camera that no image has does not matter.
+            // A camera that no image refers to does not matter.
             let others = format!("{cameras}\n2 PINHOLE 640 480 500 510 320 240\n");
             assert_eq!(read(&others, "7 1 0 0 0 0 0 0 2 a.png\n").unwrap().len(), 1);
         }
@@ -293,8 +294,8 @@ mod tests {
             ("1 0 0 0 0 0 0 0 1 a.png", "line 1: its quaternion has the length 0"),
             ("1 1 0 0 0 x 0 0 1 a.png", "line 1: its TX, 'x', is not a number"),
             ("1 1 0 0 0 0 0", "line 1: it ends before its TZ"),
-            ("1 1 0 0 0 0 0 0 1 ..", "line 1: its NAME is no name"),
-            ("1 1 0 0 0 0 0 0 1", "line 1: its NAME is no name"),
+            ("1 1 0 0 0 0 0 0 1 ..", "line 1: its NAME is not a valid file name"),
+            ("1 1 0 0 0 0 0 0 1", "line 1: its NAME is not a valid file name"),
         ] {
             let message = read(LENSES, poses).unwrap_err();
             assert!(message.starts_with(said), "{poses}: {message}");

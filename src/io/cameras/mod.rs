@@ -1,4 +1,4 @@
-//! Sets of cameras, as reconstruction and radiance-field programs write them: a picture of each.
+//! Sets of cameras that reconstruction and radiance-field programs write: a picture for each.
 
 mod colmap;
 mod transforms;
@@ -14,28 +14,33 @@ use crate::error::Result;
 /// A camera of a set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedCamera {
-    /// What its picture is called: a relative path of `/` and ordinary names, without the extension of an image. It leads
-    /// nowhere out of the folder it is taken from, and no other camera of the set has the same.
+    /// The name of its picture: a relative path without an image's extension, with `/` between
+    /// ordinary names, so that it cannot leave its folder. It is unique within the set.
     pub name: String,
     /// Lens and pose.
     pub camera: CameraFile,
-    /// The first coefficient of its lens distortion that is not zero, and its value. [`camera`](Self::camera) leaves it out.
+    /// The first coefficient of lens distortion that is not 0, and its value.
+    /// [`camera`](Self::camera) ignores distortion.
     pub distortion: Option<(&'static str, f64)>,
 }
 
 /// Reads a set of cameras, in the order of the file:
 ///
-/// - A file is a `transforms.json` as NeRF, instant-ngp and nerfstudio write it. `transform_matrix` is camera-to-world with
-///   OpenGL's axes (x right, y up, z back); the lens is `fl_x fl_y cx cy` in pixels of a picture of `w` x `h`, or
-///   `camera_angle_x` (the horizontal field of view, radians), for all frames or in a frame for itself; `file_path` is the name.
-/// - A folder holds COLMAP's `cameras.txt` and `images.txt`, whose poses are world-to-camera with x right, y down, z forward.
+/// - A file is a `transforms.json` as NeRF, instant-ngp and nerfstudio write it. `transform_matrix`
+///   is camera-to-world with the axes of OpenGL (x right, y up, z back). The lens is
+///   `fl_x fl_y cx cy` in pixels of a picture of `w` x `h`, or `camera_angle_x` (the horizontal
+///   field of view, radians); a frame's own values take precedence over those for all frames.
+///   `file_path` is the name.
+/// - A folder contains COLMAP's `cameras.txt` and `images.txt`, whose poses are world-to-camera
+///   with x right, y down, z forward.
 ///
-/// Coordinates are those of the file. Cameras that give no size of their pictures get `size`, pixels.
+/// Coordinates are those of the file. A camera without a picture size gets `size`, pixels.
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where a file
-/// is not what its format says, a lens is no pinhole even without its distortion, there is no camera, or two have one name.
+/// [`Error::Read`](crate::Error::Read) if the system cannot read,
+/// [`Error::Malformed`](crate::Error::Malformed) if a file violates its format, a lens is not a
+/// pinhole even without its distortion, there is no camera, or two have the same name.
 pub fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
     let (path, cameras) = if path.is_dir() {
         (path.join(colmap::IMAGES), colmap::read(path)?)
@@ -60,11 +65,11 @@ fn check_names(cameras: &[NamedCamera]) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Endings of names that are an image's; what follows another dot belongs to the name.
+/// Extensions of image files; anything else after a dot belongs to the name.
 const IMAGES: [&str; 12] = ["png", "jpg", "jpeg", "exr", "hdr", "tif", "tiff", "webp", "bmp", "ppm", "pgm", "dng"];
 
-/// The name of a picture that a file calls `path`. What leads out of a folder is left out: roots, drives, `..`. None if
-/// nothing is left, or the name cannot be a file's.
+/// The name of the picture that a file calls `path`. Parts that would leave a folder are dropped:
+/// roots, drives and `..`. None if nothing remains, or the name has control characters.
 fn name_of(path: &str) -> Option<String> {
     if path.chars().any(char::is_control) {
         return None;
@@ -75,7 +80,7 @@ fn name_of(path: &str) -> Option<String> {
     };
     let inside = |part: &&str| !matches!(*part, "" | "." | "..") && !part.ends_with(':');
     let parts: Vec<&str> = stem.split(['/', '\\']).filter(inside).collect();
-    // A name that was all ending is none.
+    // If the extension is all there is, there is no name.
     (!parts.is_empty() && !stem.ends_with(['/', '\\'])).then(|| parts.join("/"))
 }
 

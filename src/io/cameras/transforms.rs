@@ -14,7 +14,7 @@ use crate::io::input::text;
 use crate::io::values::{one_line, shown};
 use crate::scene::Lens;
 
-/// Lens models that are a pinhole's where nothing is distorted.
+/// Lens models that are pinholes where all distortion coefficients are 0.
 const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"];
 
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
@@ -36,7 +36,7 @@ fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
     frames.iter().enumerate().map(of_frame).collect()
 }
 
-/// A frame, and what the file says for all.
+/// A frame, and the object of the file, whose values apply to all frames.
 struct Frame<'a> {
     own: &'a Value,
     shared: &'a Value,
@@ -46,16 +46,16 @@ impl Frame<'_> {
     fn camera(&self, index: usize, size: (u32, u32)) -> Result<NamedCamera, String> {
         let name = match self.own.get("file_path") {
             None | Some(Value::Null) => format!("{index:04}"),
-            Some(path) => path.as_str().and_then(name_of).ok_or("its file_path is no name of a file")?,
+            Some(path) => path.as_str().and_then(name_of).ok_or("its file_path is not a valid file name")?,
         };
         if let Some(model) = self.value("camera_model")
             && !model.as_str().is_some_and(|model| PINHOLES.contains(&model))
         {
             let model = shown(model.as_str().unwrap_or_default().as_bytes());
-            return Err(format!("the camera_model '{model}' is not a pinhole's; undistort the pictures first"));
+            return Err(format!("the camera_model '{model}' is not a pinhole; undistort the pictures first"));
         }
         if self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false)) {
-            return Err("a fisheye lens is not a pinhole's; undistort the pictures first".into());
+            return Err("a fisheye lens is not a pinhole; undistort the pictures first".into());
         }
         let mut distortion = None;
         for key in DISTORTIONS {
@@ -76,11 +76,12 @@ impl Frame<'_> {
         Ok(NamedCamera { name, camera, distortion })
     }
 
-    /// Focal lengths by pixels, or else by angles; square pixels unless both are given.
+    /// The lens from focal lengths in pixels, or else from angles. Pixels are square if only one of
+    /// fx and fy is known.
     fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
         let of_angle = |key: &str, side: f64| match self.number(key)? {
             Some(angle) if !(angle > 0.0 && angle < PI) => {
-                Err(format!("its {key} lies between 0 and pi, {angle:?} does not: it is in radians"))
+                Err(format!("its {key} must lie between 0 and pi (radians), but it is {angle:?}"))
             }
             angle => Ok(angle.map(|angle| 0.5 * side / (0.5 * angle).tan())),
         };
@@ -106,7 +107,7 @@ impl Frame<'_> {
         Ok(Pose::Rigid((to_world * turned).transpose(), eye))
     }
 
-    /// The frame's own value, or else that for all.
+    /// The frame's own value, or else the one for all frames.
     fn value(&self, key: &str) -> Option<&Value> {
         let given = |object: &'_ Value| object.get(key).is_some_and(|value| !value.is_null());
         if given(self.own) { self.own.get(key) } else { self.shared.get(key).filter(|value| !value.is_null()) }
@@ -117,7 +118,7 @@ impl Frame<'_> {
         self.value(key).map(number).transpose()
     }
 
-    /// A number of pixels, which programs write with a decimal point too.
+    /// A number of pixels; programs also write it with a decimal point.
     fn pixels(&self, key: &str) -> Result<Option<u32>, String> {
         let whole = |number: f64| {
             let pixels = number as u32;
@@ -126,7 +127,7 @@ impl Frame<'_> {
         self.number(key)?.map(whole).transpose()
     }
 
-    /// What the file calls the frame, for messages.
+    /// The frame's `file_path` in brackets, for messages; empty if there is none.
     fn shown(&self) -> String {
         let name = self.own.get("file_path").and_then(Value::as_str);
         name.map_or(String::new(), |name| format!(" ({})", shown(name.as_bytes())))
@@ -151,7 +152,7 @@ mod tests {
         assert_eq!((camera.name.as_str(), camera.camera.size, camera.distortion), ("train/r_7", None, None));
         let Pose::Rigid(rotation, eye) = camera.camera.pose else { panic!() };
         assert_eq!(eye, DVec3::new(3.0, 4.0, 5.0));
-        // Its y axis, up in the picture, is the world's z; it looks along -z, which is the world's y.
+        // Up in the picture (the camera's y) is the world's z; the view (its -z) is the world's y.
         assert_eq!((rotation * DVec3::X, rotation * DVec3::Z, rotation * DVec3::Y), (DVec3::X, -DVec3::Y, DVec3::Z));
         let Lens::Intrinsics([fx, fy, cx, cy]) = camera.camera.lens else { panic!() };
         assert!((fx - 200.0).abs() < 1e-12 && fy == fx && (cx, cy) == (200.0, 150.0), "{fx} {fy} {cx} {cy}");
@@ -178,9 +179,9 @@ mod tests {
             (r#""w": -8, "h": 7, "fl_x": 5,"#, "", "w is not a number of pixels"),
             (r#""camera_angle_x": "wide","#, "", "camera_angle_x is not a number"),
             (r#""camera_angle_x": 1, "camera_model": "OPENCV_FISHEYE","#, "", "'OPENCV_FISHEYE'"),
-            (r#""camera_angle_x": 3.2,"#, "", "camera_angle_x lies between 0 and pi, 3.2 does not"),
-            (r#""camera_angle_x": 0,"#, "", "camera_angle_x lies between 0 and pi"),
-            (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y lies between 0 and pi"),
+            (r#""camera_angle_x": 3.2,"#, "", "camera_angle_x must lie between 0 and pi (radians), but it is 3.2"),
+            (r#""camera_angle_x": 0,"#, "", "camera_angle_x must lie between 0 and pi"),
+            (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y must lie between 0 and pi"),
             (r#""camera_angle_x": 1, "is_fisheye": true,"#, "", "fisheye"),
             (r#""camera_angle_x": 1,"#, r#""k2": [],"#, "k2 is not a number"),
         ] {
@@ -193,7 +194,7 @@ mod tests {
             (r#"{"frames": 5}"#, "no list 'frames'"),
             (r#"{"frames": [5]}"#, "frame 1: it gives neither"),
             (r#"{"camera_angle_x": 1, "frames": [{}]}"#, "frame 1: it has no transform_matrix"),
-            (r#"{"camera_angle_x": 1, "frames": [{"file_path": 7}]}"#, "no name of a file"),
+            (r#"{"camera_angle_x": 1, "frames": [{"file_path": 7}]}"#, "not a valid file name"),
             (r#"{"camera_angle_x": 1, "frames": [{"transform_matrix": [[1]]}]}"#, "not 4 rows"),
         ] {
             let message = parse(text, (8, 8)).unwrap_err();

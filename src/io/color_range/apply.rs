@@ -1,4 +1,4 @@
-//! From numbers to colours.
+//! Conversion of a file's colour numbers to [`Colors`].
 
 use super::rule::{AlphaRule, Rule};
 use super::{Kind, Number, Numbers, Values};
@@ -7,7 +7,10 @@ use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
 use rayon::prelude::*;
 
-/// Colours of numbers that follow these rules.
+/// Converts a run's colour numbers to colours by the rules for their kind.
+///
+/// Points without a colour get the default one. Floats become 8-bit codes only if the rule and the
+/// alphas are 8-bit, else linear light.
 pub(super) fn colors(numbers: Numbers, rule: Rule, alpha: Option<AlphaRule>) -> Colors {
     let kind = numbers.kind;
     match (numbers.values, rule) {
@@ -48,11 +51,11 @@ pub(super) fn colors(numbers: Numbers, rule: Rule, alpha: Option<AlphaRule>) -> 
     }
 }
 
-/// The 8-bit code of a number.
+/// The 8-bit code of one float channel.
 fn byte(rule: Rule) -> impl Fn(f32) -> u8 {
     move |value| match rule {
         Rule::HighBytes => (value as u16 >> 8) as u8,
-        // A cast takes what is larger for 255.
+        // The cast saturates: values above 255 become 255.
         _ => value as u8,
     }
 }
@@ -69,10 +72,10 @@ fn opaque([r, g, b]: [f32; 3]) -> [f32; 4] {
     [r, g, b, 1.0]
 }
 
-/// The linear light of a number of a channel.
+/// Maps (channel, number) to linear light.
 fn light(rule: Rule, kind: Kind) -> impl Fn(usize, f64) -> f32 {
     let (bytes, words) = (&*SRGB8_TO_LINEAR, &*SRGB16_TO_LINEAR);
-    // Floats without limits may be brighter than white.
+    // Floats without limits in the header may be brighter than white, so they are not clamped.
     let is_limited = kind.limits.is_some() || kind.number != Number::Float;
     let is_word = is_limited && rule == Rule::Codes([(0.0, 65535.0); 3]);
     move |channel, value| match rule {
@@ -88,14 +91,17 @@ fn light(rule: Rule, kind: Kind) -> impl Fn(usize, f64) -> f32 {
     }
 }
 
-/// The 8-bit code of the default colour.
+/// The default colour as 8-bit sRGB codes.
 fn default_code() -> [u8; 4] {
     let code = |light: f32| (linear_to_srgb(light.into()) * 255.0).round() as u8;
     let [r, g, b, _] = DEFAULT_COLOR;
     [code(r), code(g), code(b), 255]
 }
 
-/// The colours of runs as one, each with its number of points; None if none of them has any.
+/// Joins the colours of runs, each with its number of points. None if no run has colours.
+///
+/// If all runs with colours have 8-bit codes, so does the result; else it is linear light. Runs
+/// without colours get the default colour.
 pub(super) fn joined(mut runs: Vec<(Option<Colors>, usize)>) -> Option<Colors> {
     if runs.iter().all(|(colors, _)| colors.is_none()) {
         return None;

@@ -1,30 +1,32 @@
-//! Evidence in the numbers of colours about their range.
+//! Statistics of colour numbers, from which their range is decided.
 
 use super::{Kind, Numbers, Values};
 use rayon::prelude::*;
 
-/// Points that a thread looks at at once.
+/// Points per parallel chunk.
 const TOGETHER: usize = 1 << 14;
 
-/// No colour is larger.
+/// Numbers beyond this magnitude are ignored, as placeholders for infinity.
 const LARGEST: f64 = 1e12;
 
-/// Evidence in the numbers of all channels.
+/// Statistics of the numbers of all channels. Zeros, NaN and magnitudes above [`LARGEST`] only
+/// enter `count` and `outside`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::io) struct Evidence {
-    /// Numbers that are not zero.
+    /// The number of non-zero numbers.
     pub nonzero: u64,
-    /// Numbers above 1, 255 and 65535.
+    /// The counts of numbers above 1, 255 and 65535.
     pub above: [u64; 3],
-    /// Numbers between 0 and 1, as shares of 1 are.
+    /// The count of numbers strictly between 0 and 1, as fractions of white are.
     pub shares: u64,
-    /// Numbers of these that are 8-bit codes times 257, and times 256.
+    /// The counts of 8-bit codes widened to 16 bits: multiples of 257 up to 65535, and multiples of
+    /// 256.
     pub widened: [u64; 2],
-    /// Numbers that are not whole.
+    /// The count of numbers that are not whole.
     pub fractions: u64,
-    /// Numbers outside of the limits that the header states.
+    /// The count of numbers outside the limits in the header.
     pub outside: u64,
-    /// All of them, zeros too.
+    /// The count of all numbers, including zeros.
     pub count: u64,
     pub largest: f64,
 }
@@ -43,7 +45,7 @@ impl Evidence {
         numbers.fold(add, Self::both)
     }
 
-    /// Evidence in alphas.
+    /// The statistics of the alphas.
     pub fn of_alphas(numbers: &Numbers) -> Self {
         fn add(mut all: Evidence, alpha: f64) -> Evidence {
             all.add(alpha);
@@ -60,7 +62,7 @@ impl Evidence {
 
     fn add(&mut self, value: f64) {
         self.count += 1;
-        // A number that stands for infinity says nothing.
+        // A placeholder for infinity says nothing about the range.
         if value == 0.0 || value.is_nan() || value.abs() > LARGEST {
             return;
         }
@@ -94,7 +96,8 @@ impl Evidence {
 }
 
 impl Numbers {
-    /// Runs `add` over all colours and joins results by `both`; the default is the result of none.
+    /// Folds the colours of all points that have one with `add`, in parallel, and joins partial
+    /// results with `both`. The default value must be neutral for `both`.
     pub(super) fn fold<T: Default + Send>(
         &self,
         add: impl Fn(T, [f64; 3]) -> T + Sync,

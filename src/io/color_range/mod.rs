@@ -1,23 +1,27 @@
-//! How the numbers that files have for colours and intensities become colours: one rule for all
-//! formats, and one decision for all inputs of a scene, so that two tiles of one scan meet without
-//! a seam.
+//! Decides what the colour and intensity numbers of files mean.
 //!
-//! Readers keep colours as they are in the file, with their type and the limits that the header
-//! states ([`RawColors`]). [`ColorRules`] then looks at all numbers of one kind together:
+//! One rule holds for all formats, and one decision for all inputs of a scene, so that two tiles of
+//! one scan meet without a seam.
 //!
-//! | numbers | taken for |
-//! |---|---|
-//! | bytes, signed ones too | 8-bit sRGB codes |
-//! | integers of which at most 1 of 100 that are not zero is above 255 | 8-bit sRGB codes; the few above become 255 |
-//! | 16-bit integers of which 99 of 100 are `257 v`, or 99 of 100 `256 v` | the 8-bit sRGB codes `v` |
-//! | other integers | sRGB codes of 16 bits, or of the type if more than 1 of 100 is above 65535 |
-//! | integers with limits in the header | sRGB codes between these, unless more than 1 of 100 lies outside; 8-bit codes where the limits reach 4095 or more and no more than 1 of 100 is above 255 |
-//! | floats of which more are above 1 than between 0 and 1, and one is 2 or more | sRGB codes of 0 to 255, or of 0 to 65535 if more than 1 of 100 is above 255 |
-//! | other floats | shares of 1: linear light in a PLY file, else sRGB |
+//! Readers store colours as they are in the file, with their type and the limits that the header
+//! states ([`RawColors`]). [`ColorRules`] then interprets all numbers of one kind together. A few
+//! outliers are allowed: "most" means at least 99 of 100 numbers that are not zero.
 //!
-//! Alphas are judged in the same way by themselves. Where the colours of a file are missing or all
-//! zero, its intensities become grey: the 99.9th percentile of all inputs is white, and zero is
-//! black, or where some are negative the 0.1th percentile.
+//! - Bytes, also signed ones, are 8-bit sRGB codes.
+//! - Integers, most of them at most 255, are 8-bit sRGB codes; the few above become 255.
+//! - 16-bit integers, most of them `257 v` or most of them `256 v`, are the 8-bit sRGB codes `v`.
+//! - Other integers are 16-bit sRGB codes if most are at most 65535, else sRGB codes of their type.
+//! - Numbers with limits in the header are sRGB codes between these. The limits are ignored if more
+//!   than 1 of 100 numbers lies outside, if they reach from 0 to 4095 or more and most numbers are
+//!   at most 255, or if they reach from 0 to 255 or more and the numbers are fractions, none above
+//!   one. Then the rule for the type holds.
+//! - Floats, more of them above 1 than between 0 and 1 and at least one 2 or more, are sRGB codes
+//!   of 0 to 255 if most are at most 255, else of 0 to 65535.
+//! - Other floats are fractions of white: linear light in a PLY file, else sRGB.
+//!
+//! Alphas are interpreted separately, in the same way. Where the colours of a file are missing or
+//! all zero, its intensities become grey: white is the 99.9th percentile over all inputs, and black
+//! is zero, or the 0.1th percentile if some intensities are negative.
 
 mod apply;
 mod evidence;
@@ -31,60 +35,61 @@ use evidence::Evidence;
 use rule::{AlphaRule, Rule};
 use shade::{Levels, Shading};
 
-/// The meaning of a number of a colour.
+/// The type of a colour number in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
-    /// An 8-bit code.
+    /// An integer of 8 bits.
     Byte,
-    /// An integer of more than 8 bits, whose largest is this.
+    /// An integer of more than 8 bits, with the largest value of its type.
     Integer(u64),
-    /// A float.
+    /// A float, or an integer that the file scales.
     Float,
 }
 
 impl Number {
-    /// 16-bit integers.
+    /// The 16-bit integer type.
     pub(super) const WORD: Self = Self::Integer(u16::MAX as u64);
 }
 
-/// Facts of numbers before their values are read: runs of one kind are judged together.
+/// Facts about colour numbers that are known before the values. Runs of one kind are interpreted
+/// together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
     pub(super) number: Number,
-    /// The smallest and the largest of each channel, if the header states them.
+    /// The smallest and largest value of each channel, if the header states them.
     pub(super) limits: Option<[(f64, f64); 3]>,
-    /// Floats from 0 to 1 are linear light, and not sRGB.
+    /// Floats from 0 to 1 are linear light, not sRGB.
     pub(super) light: bool,
-    /// By the format's convention zeros alone mean that there are no colours.
+    /// By the format's convention, all zeros mean that there are no colours.
     pub(super) zero_is_none: bool,
 }
 
 impl Kind {
-    /// Numbers of which the header states no more than their type.
+    /// The kind of numbers about which the header states only their type.
     pub(super) fn of(number: Number) -> Self {
         Self { number, limits: None, light: false, zero_is_none: false }
     }
 
-    /// The kind by which runs are judged together: a format's conventions are no
-    /// matter of what numbers range over.
+    /// The key by which runs are interpreted together. Facts that do not affect the range are
+    /// removed: `zero_is_none`, and `light` unless the numbers are floats.
     fn judged(self) -> Self {
         Self { light: self.light && self.number == Number::Float, zero_is_none: false, ..self }
     }
 }
 
-/// Colours as a file has them.
+/// Colour numbers as they are in the file, one entry per point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     /// 8-bit sRGB codes with alpha.
     Bytes(Vec<[u8; 4]>),
-    /// 16-bit numbers.
+    /// 16-bit RGB.
     Words(Vec<[u16; 3]>),
-    /// Other numbers, with alpha if there is one; red is not a number where a point has no colour.
+    /// Other numbers: RGB, and alpha if the file has one. Red is NaN where a point has no colour.
     Floats(Vec<[f32; 4]>),
 }
 
 impl Values {
-    /// Whether none differs from another.
+    /// Whether all colours are equal.
     fn are_one(&self) -> bool {
         match self {
             Self::Bytes(codes) => codes.windows(2).all(|pair| pair[0] == pair[1]),
@@ -94,12 +99,12 @@ impl Values {
     }
 }
 
-/// The colours of a run of points.
+/// The colour numbers of a run of points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Numbers {
     pub(super) values: Values,
     pub(super) kind: Kind,
-    /// The kind of alphas, if there are some.
+    /// The type of the alphas, if there are any.
     pub(super) alpha: Option<Number>,
 }
 
@@ -107,67 +112,69 @@ pub(super) struct Numbers {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shades {
     Words(Vec<u16>),
-    /// Others, which are integers in the file or not.
+    /// Other types; `integer` if they are integers in the file.
     Floats {
         values: Vec<f32>,
         integer: bool,
     },
 }
 
-/// Points one after the other whose colours are of one kind, such as a scan of an E57 file.
+/// Consecutive points whose colours are of one kind, such as a scan of an E57 file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Run {
     pub(super) count: usize,
     pub(super) colors: Option<Numbers>,
-    /// Kept where colours are missing or all zero.
+    /// The intensities, stored only if colours are missing or all zero.
     pub(super) shades: Option<Shades>,
 }
 
-/// The colours and intensities of an input as its file has them, before it is known what they range
-/// over.
+/// The colours and intensities of an input as they are in the file, before their range is decided.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawColors {
-    /// The file's name in notes.
+    /// The name of the file, for notes.
     pub(super) name: String,
-    /// In the order of the points.
+    /// The runs, in the order of the points.
     pub(super) runs: Vec<Run>,
-    /// The class of each point, where classes make a difference to their opacities.
+    /// The class of each point; empty unless classes have different opacities.
     pub(super) classes: Vec<u8>,
     pub(super) opacities: ClassOpacities,
-    /// Whether each point stays, where some go: all of them tell what numbers range over.
+    /// For each point, whether it is kept, if some are dropped. Dropped points still count in the
+    /// decision about the range.
     pub(super) keep: Option<Vec<bool>>,
 }
 
 impl RawColors {
-    /// Numbers of points that are one run.
+    /// The numbers of points that form a single run.
     pub(super) fn of_run(count: usize, colors: Option<Numbers>, shades: Option<Shades>) -> Self {
         Self { runs: vec![Run { count, colors, shades }], ..Self::default() }
     }
 
-    /// Whether no colour differs from another, and no intensities are kept.
+    /// Whether there is at most one run, all its colours are equal, and no intensities are stored.
     pub(super) fn is_one_color(&self) -> bool {
         let is_one =
             |run: &Run| run.shades.is_none() && run.colors.as_ref().is_none_or(|colors| colors.values.are_one());
         self.runs.len() < 2 && self.runs.iter().all(is_one)
     }
 
-    /// Whether some colour is not zero: then no intensities are kept.
+    /// Whether a run has colours and no stored intensities. Readers drop intensities at the first
+    /// non-zero colour.
     pub(super) fn is_colored(&self) -> bool {
         self.runs.iter().any(|run| run.colors.is_some() && run.shades.is_none())
     }
 }
 
-/// Meanings of numbers, which the first settled inputs decide and all later ones keep,
-/// such as other parts of the same files.
+/// The rule for each kind of numbers. The first inputs decide it, and later ones, such as other
+/// parts of the same files, follow it.
 #[derive(Clone, Debug, Default)]
 pub struct ColorRules {
     colors: Vec<(Kind, Rule)>,
     alphas: Vec<(Number, AlphaRule)>,
-    /// One for integers and one for floats.
+    /// Black and white of integer intensities, and of floats. The outer option is None until it is
+    /// decided, the inner one if all intensities are equal.
     shades: [Option<Option<Shading>>; 2],
 }
 
-/// Evidence in the numbers of inputs, before it is decided what they mean.
+/// Statistics of the numbers of inputs, from which the rules are decided.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Survey {
     colors: Vec<(Kind, Evidence)>,
@@ -175,13 +182,14 @@ pub(super) struct Survey {
     shades: [Levels; 2],
 }
 
-/// Settles what the colours of inputs mean that are one scene: by all of their numbers together.
+/// Decides what the colours of one scene's inputs mean, from all of their numbers together, and
+/// sets [`Points::colors`].
 pub fn settle_colors(inputs: &mut [Points]) {
     ColorRules::default().settle(inputs);
 }
 
 impl ColorRules {
-    /// Gives the inputs the colours that their numbers mean.
+    /// Converts the raw colours of the inputs to [`Points::colors`], and adds notes about them.
     pub fn settle(&mut self, inputs: &mut [Points]) {
         let mut survey = Survey::default();
         let found = |points: &Points| points.raw.as_deref().map_or(Vec::new(), |raw| survey.add(raw));
@@ -194,7 +202,7 @@ impl ColorRules {
         }
     }
 
-    /// Decides what is not decided yet.
+    /// Decides the rules that are not decided yet.
     pub(super) fn decide(&mut self, survey: &Survey) {
         for (kind, evidence) in &survey.colors {
             if self.colors.iter().all(|(known, _)| known != kind) {
@@ -213,7 +221,8 @@ impl ColorRules {
         }
     }
 
-    /// Gives points their colours, and what is to be told of these.
+    /// Sets the colours of an input, adds notes and descriptions of them, and drops points that are
+    /// not kept.
     fn give(&self, points: &mut Points, raw: RawColors, found: &[Evidence]) {
         let RawColors { name, runs, classes, opacities, keep } = raw;
         let mut all = Vec::with_capacity(runs.len());
@@ -257,13 +266,13 @@ impl ColorRules {
     }
 }
 
-/// Whether colours show, and not the intensities beside them.
+/// Whether the colours are drawn, rather than the intensities beside them.
 fn shows(kind: &Kind, evidence: &Evidence, shading: Option<Shading>) -> bool {
     evidence.nonzero > 0 || shading.is_none() && !kind.zero_is_none
 }
 
 impl Survey {
-    /// Adds the numbers of an input; what the colours of each of its runs say.
+    /// Adds the numbers of an input, and returns the statistics of the colours of each of its runs.
     pub(super) fn add(&mut self, raw: &RawColors) -> Vec<Evidence> {
         raw.runs.iter().map(|run| self.add_run(run)).collect()
     }
@@ -284,7 +293,7 @@ impl Survey {
     }
 }
 
-/// Adds what numbers say to what others of their kind say.
+/// Adds statistics to those of the same kind.
 fn merge<K: PartialEq>(all: &mut Vec<(K, Evidence)>, kind: K, evidence: Evidence) {
     match all.iter_mut().find(|(known, _)| *known == kind) {
         Some((_, known)) => *known = known.both(evidence),

@@ -1,4 +1,4 @@
-//! Notes for users about how numbers became colours.
+//! Notes and warnings for users about how numbers became colours.
 
 use super::Numbers;
 use super::evidence::Evidence;
@@ -7,14 +7,14 @@ use super::shade::Shading;
 use crate::io::about::{Attribute, Role};
 use crate::scene::color::srgb_to_linear;
 
-/// A picture is nearly black where fewer than 1 of 100 numbers comes to this code of 255.
+/// A picture is nearly black if fewer than 1 of [`FEW`] numbers reaches this code of 255.
 const DARK: f64 = 16.0;
 const FEW: u64 = 100;
 
 /// Findings over all runs of an input.
 #[derive(Debug, Default)]
 pub(super) struct Told {
-    /// Numbers of colours, those that come to [`DARK`], and those that are brighter than white.
+    /// The counts of all colour numbers, of those that reach [`DARK`], and of those above white.
     count: u64,
     bright: u64,
     clamped: u64,
@@ -24,13 +24,13 @@ pub(super) struct Told {
     white: f64,
     limits: Option<(f64, f64)>,
     descriptions: Vec<String>,
-    /// The range of intensities, and what shows of them.
+    /// Black and white of the intensities, if they are drawn.
     shading: Option<Shading>,
-    /// Alphas that are hardly opacities go up to this.
+    /// The largest alpha, if the alphas are so small that they are hardly opacities.
     doubtful_alpha: Option<f64>,
 }
 
-/// Numbers that come to [`DARK`], and that are brighter than white.
+/// The counts of numbers that reach [`DARK`], and of those above white.
 fn levels(numbers: &Numbers, rule: Rule) -> [u64; 2] {
     let white = rule.white();
     let dark = |channel: usize| match rule {
@@ -71,22 +71,22 @@ impl Told {
         self.doubtful_alpha = self.doubtful_alpha.or(doubtful);
     }
 
-    /// Adds the intensities of a run.
+    /// Records the black and white of the intensities.
     pub fn shades(&mut self, shading: Shading) {
         self.shading = Some(shading);
     }
 
-    /// A description of the colours, if there are some.
+    /// A description of the colours, if there are any.
     pub fn description(&self) -> Option<String> {
         (!self.descriptions.is_empty()).then(|| self.descriptions.join("; "))
     }
 
-    /// Black and white of intensities, if they are drawn.
+    /// Black and white of the intensities, if they are drawn.
     pub fn intensities(&self) -> Option<[f64; 2]> {
         self.shading.map(|shading| [shading.black, shading.white])
     }
 
-    /// Marks what does not show as not used.
+    /// Sets `used` of colours and intensities according to what is drawn.
     pub fn mark(&self, attributes: &mut [Attribute]) {
         for attribute in attributes {
             match attribute.role {
@@ -97,7 +97,7 @@ impl Told {
         }
     }
 
-    /// A sentence for everything that may surprise.
+    /// One sentence for each finding that may surprise.
     pub fn notes(&self, name: &str) -> Vec<String> {
         let Self { count, bright, clamped, outside, nonzero, largest, white, .. } = *self;
         let mut notes = Vec::new();
@@ -111,7 +111,7 @@ impl Told {
             notes.push(match nonzero {
                 0 => format!("warning: {name}: its colours are all zero, so it is black"),
                 _ => format!(
-                    "warning: {name}: its colours are nearly black: {bright} of {count} numbers come to {DARK} of 255 where \
+                    "warning: {name}: its colours are nearly black: only {bright} of {count} numbers reach {DARK} of 255 where \
                      white is {white}, and the largest is {largest}"
                 ),
             });
@@ -123,8 +123,8 @@ impl Told {
         }
         if let Some(largest) = self.doubtful_alpha {
             notes.push(format!(
-                "{name}: its alpha is at most {largest} of 255, as numbers of classes are and opacities hardly are: --ignore-alpha \
-                 leaves it out"
+                "{name}: its alpha is at most {largest} of 255, which looks like class numbers and not like opacities: \
+                 --ignore-alpha leaves it out"
             ));
         }
         notes

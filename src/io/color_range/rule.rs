@@ -1,34 +1,34 @@
-//! The rule: what numbers range over, by their type, the limits of the header and their values.
+//! The rule that decides the range of numbers from their type, the header's limits and the values.
 
 use super::evidence::Evidence;
 use super::{Kind, Number};
 
-/// How the numbers of a colour become one.
+/// How colour numbers are converted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rule {
-    /// 8-bit sRGB codes; what is above 255 is 255.
+    /// 8-bit sRGB codes; larger numbers become 255.
     Bytes,
     /// 8-bit sRGB codes in the upper bytes of 16-bit numbers.
     HighBytes,
-    /// sRGB codes between the smallest and the largest of each channel.
+    /// sRGB codes, with the (black, white) of each channel.
     Codes([(f64, f64); 3]),
     /// Linear light.
     Light,
 }
 
-/// At most one of this many numbers is an outlier.
+/// At most 1 of this many numbers may be an outlier.
 const FEW: u64 = 100;
 
-/// Limits that reach this say that 8-bit values would be black.
+/// Limits from 0 to this or more are ignored if the values are 8-bit, which would be nearly black.
 const WIDE: f64 = 4095.0;
 
-/// Whether so few of all are outliers.
+/// Whether there are few enough outliers.
 fn few(outliers: u64, all: u64) -> bool {
     FEW * outliers <= all
 }
 
 impl Rule {
-    /// By what all numbers of a kind say.
+    /// Decides the rule from the statistics of all numbers of a kind.
     pub fn of(kind: &Kind, evidence: &Evidence) -> Self {
         let by_limits = kind.limits.and_then(|limits| Self::of_limits(limits, kind.number, evidence));
         by_limits.unwrap_or_else(|| match kind.number {
@@ -38,7 +38,7 @@ impl Rule {
         })
     }
 
-    /// By the limits of a header; None where the values contradict them.
+    /// The rule by the header's limits. None if the values contradict them.
     fn of_limits(limits: [(f64, f64); 3], number: Number, evidence: &Evidence) -> Option<Self> {
         let largest = limits.iter().map(|(_, high)| *high).fold(0.0, f64::max);
         let from_zero = limits.iter().all(|(low, _)| *low == 0.0);
@@ -78,7 +78,7 @@ impl Rule {
         }
     }
 
-    /// The largest number that is no whiter than white, of each channel.
+    /// The number that is white, of each channel.
     pub fn white(&self) -> [f64; 3] {
         match self {
             Self::Bytes => [255.0; 3],
@@ -88,7 +88,7 @@ impl Rule {
         }
     }
 
-    /// A description of these numbers for people.
+    /// A description of the numbers for users.
     pub fn describe(&self, kind: &Kind) -> String {
         let of = match kind.number {
             Number::Byte => "",
@@ -107,13 +107,14 @@ impl Rule {
     }
 }
 
-/// Whether 16-bit numbers are 8-bit ones, all times 257 or all times 256.
+/// Whether the numbers are 8-bit codes widened to 16 bits: nearly all times 257, or nearly all
+/// times 256.
 fn is_widened(evidence: &Evidence) -> bool {
     let all = evidence.nonzero;
     evidence.widened.iter().any(|widened| few(all - widened.min(&all), all))
 }
 
-/// The largest float of a range: 1, 255 or 65535.
+/// The float that is white: 1, 255 or 65535.
 fn full_of_floats(evidence: &Evidence) -> f64 {
     let Evidence { nonzero, above, shares, largest, .. } = *evidence;
     if largest < 2.0 || above[0] <= shares {
@@ -128,11 +129,11 @@ fn full_of_floats(evidence: &Evidence) -> f64 {
 /// How alphas become opacities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AlphaRule {
-    /// The number of an opaque alpha.
+    /// The number that is opaque.
     pub full: f64,
-    /// They are whole numbers of 0 to 255.
+    /// Whether all alphas are whole numbers from 0 to 255.
     pub bytes: bool,
-    /// The largest of all.
+    /// The largest alpha of all.
     pub largest: f64,
 }
 
@@ -151,10 +152,10 @@ impl AlphaRule {
         Self { full, bytes: full == 255.0 && fractions == 0, largest }
     }
 
-    /// Classes and the like are taken for opacities: these are whole and of 255 no more than this.
+    /// Whole alphas up to this of 255 are doubtful: they look like class numbers.
     const FAINT: f64 = 31.0;
 
-    /// Whether alphas are hardly opacities.
+    /// Whether the alphas are so small that they are hardly opacities.
     pub fn is_doubtful(&self) -> bool {
         self.bytes && self.largest <= Self::FAINT
     }

@@ -1,26 +1,26 @@
-//! Grey from intensities.
+//! Conversion of intensities to grey.
 
 use super::Shades;
 use rayon::prelude::*;
 
-/// Which intensities are black and white.
+/// The intensities that become black and white.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shading {
     pub black: f64,
     pub white: f64,
 }
 
-/// The intensities of all inputs, by how often each is there.
+/// A histogram of the intensities of all inputs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Levels {
-    /// Counts of each whole number of 16 bits; empty where there is none.
+    /// Counts of the whole numbers from 0 to 65535; empty until intensities are added.
     words: Vec<u64>,
-    /// All others that are finite.
+    /// All other finite values.
     others: Vec<f32>,
 }
 
 impl Shades {
-    /// Integers are judged together, and so are floats.
+    /// Index of the group that is scaled together: 0 for integers, 1 for floats.
     pub(super) fn class(&self) -> usize {
         match self {
             Self::Words(_) | Self::Floats { integer: true, .. } => 0,
@@ -28,11 +28,11 @@ impl Shades {
         }
     }
 
-    /// Codes of grey.
+    /// Grey codes with alpha 255.
     pub(super) fn grey(&self, shading: Shading) -> Vec<[u8; 4]> {
         let Shading { black, white } = shading;
         let code = |value: f64| {
-            // A cast takes what is no number for 0, and what is beyond the range for its end.
+            // The cast maps NaN to 0 and saturates values outside 0 to 255.
             let code = ((value - black) / (white - black) * 255.0).round() as u8;
             [code, code, code, 255]
         };
@@ -63,8 +63,10 @@ impl Levels {
         }
     }
 
-    /// White is the 99.9th percentile, so that a few glints do not blacken the rest; black is zero,
-    /// or where some are negative the 0.1th percentile. None where all are the same.
+    /// Chooses black and white. None if all intensities are equal.
+    ///
+    /// White is the 99.9th percentile, so that a few glints do not darken the rest. Black is zero,
+    /// or the 0.1th percentile if some intensities are negative.
     pub fn shading(&self) -> Option<Shading> {
         let mut others = self.others.clone();
         others.par_sort_unstable_by(f32::total_cmp);
@@ -72,7 +74,7 @@ impl Levels {
         let of_words = of_words.map(|(word, count)| (word as f64, *count));
         let mut of_words = of_words.peekable();
         let mut of_others = others.iter().map(|other| f64::from(*other)).peekable();
-        // All levels, from the smallest on, with how many there are of each.
+        // All levels in ascending order, with their counts.
         let ascending = std::iter::from_fn(|| match (of_words.peek(), of_others.peek()) {
             (Some((word, _)), Some(other)) if other < word => of_others.next().map(|other| (other, 1)),
             (None, Some(_)) => of_others.next().map(|other| (other, 1)),
@@ -94,7 +96,7 @@ impl Levels {
             found.map_or(most, |(level, _)| *level)
         };
         let black = if least < 0.0 { at(0.001) } else { 0.0 };
-        // Where nearly all are as dark as black, any other is white.
+        // If nearly all intensities are at most black, the next larger one is white.
         let next = || ascending.iter().map(|(level, _)| *level).find(|level| *level > black);
         let white = Some(at(0.999)).filter(|white| *white > black).or_else(next)?;
         Some(Shading { black, white })

@@ -62,7 +62,7 @@ fn one_of_a_hundred_is_an_outlier_and_two_are_not() {
     assert_eq!(Rule::of(&Kind::of(Number::WORD), &of(&widened, Number::WORD)), Rule::Codes([(0.0, 65535.0); 3]));
 }
 
-/// Runs of one file are joined: what one has no colour for is grey.
+/// Runs of one file are joined: points without a colour get the default grey.
 #[test]
 fn runs_are_joined() {
     let kind = Kind::of(Number::Byte);

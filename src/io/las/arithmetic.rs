@@ -1,22 +1,23 @@
-//! The entropy coder of LAZ, as far as a chunk table needs it: adaptive arithmetic decoding of 32-bit integers
-//! (Said 2004, "Introduction to Arithmetic Coding"; Isenburg 2013, "LASzip: lossless compression of LiDAR data").
+//! The entropy coder of LAZ, as far as chunk tables use it: adaptive arithmetic decoding of 32-bit
+//! integers (Said 2004, "Introduction to Arithmetic Coding"; Isenburg 2013, "LASzip: lossless
+//! compression of LiDAR data").
 
 use std::io::{self, Read};
 
-/// Below this interval length the decoder takes another byte.
+/// Shortest interval; when it is shorter, the decoder reads another byte.
 const MIN_LENGTH: u32 = 1 << 24;
 /// Fractional bits of a symbol's share of the interval.
 const SYMBOL_BITS: u32 = 15;
-/// Fractional bits of a bit's share of the interval.
+/// Fractional bits of the share of a zero bit.
 const BIT_BITS: u32 = 13;
-/// Correctors of up to so many bits are one symbol; of longer ones only the upper eight bits are.
+/// Widest corrector (coded difference) that is one symbol, bits; of wider ones, the top eight are.
 const SYMBOL_WIDTH: u32 = 8;
 
-/// How probable each symbol is, learnt as they come.
+/// Adaptive probabilities of symbols.
 #[derive(Debug)]
 struct SymbolModel {
     counts: Vec<u32>,
-    /// Sum of the shares of all symbols before this one, in units of 2^-15.
+    /// The sum of the shares of all symbols before each one, in units of 2^-15.
     starts: Vec<u32>,
     total: u32,
     cycle: u32,
@@ -52,7 +53,7 @@ impl SymbolModel {
     }
 }
 
-/// How probable a zero is, learnt as bits come.
+/// The adaptive probability of a zero bit.
 #[derive(Debug)]
 struct BitModel {
     zeros: u32,
@@ -83,7 +84,7 @@ impl BitModel {
     }
 }
 
-/// The interval that the bytes so far have narrowed down to.
+/// The interval that the bytes read so far leave.
 #[derive(Debug)]
 struct Decoder<R> {
     bytes: R,
@@ -103,7 +104,7 @@ impl<R: Read> Decoder<R> {
             let mut byte = [0];
             self.bytes.read_exact(&mut byte)?;
             self.value = (self.value << 8) | u32::from(byte[0]);
-            // A valid stream never gets to zero; a corrupt one must not loop.
+            // A valid stream never reaches zero; with a corrupt one this must not loop forever.
             self.length = (self.length << 8).max(1);
         }
         Ok(())
@@ -129,7 +130,7 @@ impl<R: Read> Decoder<R> {
 
     fn symbol(&mut self, model: &mut SymbolModel) -> io::Result<u32> {
         let unit = self.length >> SYMBOL_BITS;
-        // The last symbol that starts at or below the value; the first starts at zero.
+        // The last symbol whose start is not above the value; the first one starts at 0.
         let symbol = model.starts.partition_point(|start| start.wrapping_mul(unit) <= self.value).saturating_sub(1);
         let start = model.starts.get(symbol).map_or(0, |start| start.wrapping_mul(unit));
         let end = model.starts.get(symbol + 1).map_or(self.length, |end| end.wrapping_mul(unit));
@@ -146,7 +147,7 @@ impl<R: Read> Decoder<R> {
         Ok(symbol as u32)
     }
 
-    /// So many bits, at most 32, all values equally probable.
+    /// Decodes `count` bits, at most 32, whose values are all equally probable.
     fn bits(&mut self, count: u32) -> io::Result<u32> {
         if count > 19 {
             let low = self.bits(16)?;
@@ -161,7 +162,8 @@ impl<R: Read> Decoder<R> {
     }
 }
 
-/// Integers coded as differences to a prediction; each context learns the differences' widths for itself.
+/// Decodes integers as differences to a prediction. Each context has its own statistics of the
+/// widths of differences.
 #[derive(Debug)]
 pub(super) struct Integers<R> {
     decoder: Decoder<R>,
@@ -180,7 +182,7 @@ impl<R: Read> Integers<R> {
         })
     }
 
-    /// The next integer, given what it is predicted to be.
+    /// Decodes the next integer, given its prediction.
     pub(super) fn next(&mut self, predicted: i32, context: usize) -> io::Result<i32> {
         let (Some(widths), invalid) = (self.widths.get_mut(context), io::ErrorKind::InvalidData) else {
             return Err(io::ErrorKind::InvalidInput.into());
@@ -196,7 +198,7 @@ impl<R: Read> Integers<R> {
                     let lower = width - SYMBOL_WIDTH;
                     corrector = corrector << lower | self.decoder.bits(lower)?;
                 }
-                // Width k holds the values -(2^k - 1) ..= -2^(k-1) and 2^(k-1) + 1 ..= 2^k.
+                // Width k covers the values -(2^k - 1) ..= -2^(k-1) and 2^(k-1) + 1 ..= 2^k.
                 if corrector >= 1 << (width - 1) {
                     corrector.wrapping_add(1) as i32
                 } else {

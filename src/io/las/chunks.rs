@@ -1,7 +1,9 @@
-//! What a LAS or LAZ file promises, checked against how long it is, before the decoder allocates what it promises.
+//! Checks the lengths in a LAS or LAZ file against the size of the file, before the decoder
+//! allocates memory by them.
 //!
-//! The decoder takes every length in a file for true: a record's, a chunk's, a layer's. One flipped bit would have it
-//! allocate gigabytes, which no error handling survives, so each of these lengths is looked at here first.
+//! The decoder trusts all lengths in a file: of records, chunks and layers. One flipped bit could
+//! make it allocate gigabytes, and no error handling survives that, so each length is checked here
+//! first.
 
 use super::arithmetic::Integers;
 use super::extra::Field;
@@ -10,22 +12,24 @@ use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
-/// A decoded chunk larger than this is decoded by one thread, which needs no buffer for it.
+/// Largest decoded chunk, bytes, that is decoded in parallel with others. A file with a larger one
+/// is decoded by one thread, which needs no buffer for it.
 pub(super) const CHUNK_LIMIT: u64 = 1 << 28;
 
-/// No byte is more points than this: at its cheapest a point is a symbol of 64 whose probability is 1 - 63 / 2^15, 0.0028 bits.
+/// No byte holds more points than this: the cheapest point is one symbol of 64 with the probability
+/// 1 - 63 / 2^15, which is 0.0028 bits.
 pub(super) const MOST_A_BYTE: u64 = 1 << 12;
 
-/// Which layer of a point has its intensity.
+/// Index of the layer of intensities among those of a point.
 const INTENSITIES: usize = 4;
 
-/// Where a LASzip record has the points per chunk.
+/// Offset of the points per chunk in a LASzip record, bytes.
 const CHUNK_SIZE: usize = 12;
 
-/// How a file's points are decoded.
+/// How the points of a file are decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Decoding {
-    /// Uncompressed, or one chunk after the other.
+    /// In order: points are uncompressed, or chunks are decoded one by one.
     Sequential,
     /// Chunks in parallel.
     Parallel,
@@ -43,7 +47,7 @@ pub(super) fn promised(header: &Header) -> u64 {
     }
 }
 
-/// Checks that every length in the file lies within its `length` bytes, and says how its points can be decoded.
+/// Checks that all lengths lie within the `length` bytes of the file; chooses how to decode it.
 pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -> Result<Decoding, Fault> {
     let start = u64::from(header.offset_to_point_data);
     let record = u64::from(header.point_data_record_length);
@@ -85,7 +89,7 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
                 "the header promises {promised} points, more than a file of {length} bytes can hold"
             ));
         }
-        // One run of all points has no use for a chunk size, but the decoder takes none at all for a table of chunks.
+        // A single run of points has no chunk size, but the decoder takes 0 for a table of chunks.
         file.get_mut().show(at + CHUNK_SIZE as u64, &u32::to_le_bytes(1));
         return Ok(Decoding::Sequential);
     }
@@ -101,14 +105,14 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
     Ok(if largest.saturating_mul(record) > CHUNK_LIMIT { Decoding::Sequential } else { Decoding::Parallel })
 }
 
-/// The data of the record that says how the points are compressed, and where it lies.
+/// Finds the record that says how points are compressed; returns its data and their offset.
 pub(super) fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<(u64, Vec<u8>)>, Fault> {
     file.seek(SeekFrom::Start(u64::from(header.header_size)))?;
     for _ in 0..header.number_of_variable_length_records {
         let Ok(record) = Vlr::read_from(&mut *file, false) else {
             return malformed("it ends inside its variable-length records");
         };
-        // The very record that the decoder takes: any other could have another follow that nobody checked.
+        // The decoder's own condition: with another one, it could use a record that is not checked.
         let name = record.user_id.split(|byte| *byte == 0).next();
         if record.record_id == 22204 && name == Some(b"laszip encoded") {
             return Ok(Some((file.stream_position()? - record.data.len() as u64, record.data)));
@@ -117,22 +121,23 @@ pub(super) fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> R
     Ok(None)
 }
 
-/// How the points are compressed.
+/// The compression of the points.
 #[derive(Debug)]
 pub(super) struct Scheme {
-    /// 1: one run of points, without chunks; 2: chunks; 3: chunks in layers.
+    /// 1: one run of points without chunks; 2: chunks; 3: chunks of layers.
     pub(super) compressor: u16,
-    /// Points per chunk; `None` where the chunk table gives them.
+    /// Points per chunk; `None` if the chunk table gives them.
     pub(super) chunk: Option<u32>,
-    /// Bytes per decoded point.
+    /// Size of a decoded point, bytes.
     pub(super) record: u64,
-    /// Whether the decoder knows colours among the layers.
+    /// Whether the layers include colours that the decoder knows.
     pub(super) has_color: bool,
-    /// Of each layer of a chunk, where chunks are in layers, whether anything is taken of it.
+    /// Whether each layer of a chunk is needed; empty unless chunks consist of layers.
     pub(super) needed: Vec<bool>,
-    /// The layer of the first extra byte, where layers are told apart and points have such.
+    /// Index of the layer of the first extra byte, if there are extra bytes and layers are in the
+    /// usual order.
     pub(super) extra: Option<usize>,
-    /// The layer of intensities, where layers are told apart and points have colours.
+    /// Index of the layer of intensities, if there are colours and layers are in the usual order.
     pub(super) intensities: Option<usize>,
 }
 
@@ -144,7 +149,7 @@ impl Scheme {
         let (mut record, mut layers, mut kinds) = (0, Vec::new(), Vec::new());
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
-            // Where a size is not the kind's own, the decoder would look for layers elsewhere than they are checked.
+            // With another size than the kind's own, the decoder would find unchecked layers.
             let (own_size, own_layers) = match kind {
                 0 => (size, 0),              // extra bytes
                 6 => (20, 0),                // point of formats 0 to 5
@@ -158,12 +163,12 @@ impl Scheme {
                 14 => (size, size as usize), // extra bytes: one layer each
                 _ => return None,
             };
-            // Nor are layers looked for outside chunks of layers, but the decoder would take their lengths for true.
+            // Only chunks of layers may have layers: elsewhere, their lengths are not checked.
             if size != own_size || (kind >= 10) != (compressor == 3) {
                 return None;
             }
             record += size;
-            // The header's own number is as long.
+            // The header's own record length has 16 bits.
             if record > u64::from(u16::MAX) {
                 return None;
             }
@@ -171,10 +176,10 @@ impl Scheme {
             layers.extend((0..own_layers).map(|layer| (kind, layer)));
         }
         let has_color = kinds.iter().any(|kind| matches!(kind, 11 | 12));
-        // As LAS has points in layers: what is behind a colour is of no matter.
+        // The usual order in LAS files: a point, then its colour; what follows does not matter.
         let usual = kinds.first() == Some(&10) && (!has_color || matches!(kinds.get(1), Some(11 | 12)));
         let needed = |(kind, layer): (u16, usize)| match kind {
-            // A point's place, class and flags; and where nothing has a colour intensities are taken for one.
+            // Position, class and flags of a point, and its intensity if there are no colours.
             10 => layer < INTENSITIES || !has_color && layer == INTENSITIES,
             11 | 12 => layer == 0,
             _ => false,
@@ -186,26 +191,28 @@ impl Scheme {
         Some(Self { compressor, chunk, record, has_color, needed, extra, intensities })
     }
 
-    /// Whether the intensities of points with colours are taken, which may all be zero.
+    /// Sets whether intensities are needed beside colours, which may turn out to be all zero.
     pub(super) fn need_intensities(&mut self, taken: bool) {
         if let Some(needed) = self.intensities.and_then(|layer| self.needed.get_mut(layer)) {
             *needed = taken;
         }
     }
 
-    /// Takes an attribute of the extra bytes, each of which is a layer.
+    /// Marks an attribute of the extra bytes as needed; each of its bytes is a layer.
     pub(super) fn need_extra(&mut self, field: &Field) {
         let Some(first) = self.extra else { return };
         let layers = self.needed.iter_mut().skip(first + field.start).take(field.size.into());
         layers.for_each(|needed| *needed = true);
     }
 
-    /// Bytes of a chunk in layers before these: its first point, how many it has, and how long each layer is.
+    /// Size of the head of a chunk of layers, bytes: its first point, its number of points, and the
+    /// length of each layer.
     pub(super) fn start(&self) -> u64 {
         self.record + 4 + 4 * self.needed.len() as u64
     }
 
-    /// The points that a chunk of so many bytes, which begins with these, says that it has; None if its layers do not fit in it.
+    /// The number of points in the head `start` of a chunk of `bytes` bytes; None if its layers do
+    /// not fit in the chunk.
     pub(super) fn points_in(&self, start: &[u8], bytes: u64) -> Option<u64> {
         let words = start.get(self.record as usize..self.start() as usize)?.as_chunks().0;
         let mut words = words.iter().map(|word| u64::from(u32::from_le_bytes(*word)));
@@ -214,7 +221,7 @@ impl Scheme {
     }
 }
 
-/// One separately compressed run of points.
+/// A run of points that is compressed by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chunk {
     pub(super) points: u64,
@@ -239,7 +246,7 @@ pub(super) fn chunk_table(
     file.seek(SeekFrom::Start(start))?;
     let mut table = read_u64(file)?;
     if table as i64 <= start as i64 {
-        // A writer that could not seek back puts the table's place at the end of the file.
+        // A writer that cannot seek back puts the offset of the table at the end of the file.
         file.seek(SeekFrom::Start(length - 8))?;
         table = read_u64(file)?;
     }
@@ -249,7 +256,7 @@ pub(super) fn chunk_table(
     file.seek(SeekFrom::Start(table))?;
     let count = read_u64(file)? >> 32;
     let available = table - start - 8;
-    // A chunk begins with one whole point.
+    // Each chunk starts with one uncompressed point.
     if count > available / scheme.record {
         return malformed(format!("its chunk table lists {count} chunks, more than the file can hold"));
     }
@@ -275,7 +282,8 @@ pub(super) fn chunk_table(
     Ok(chunks)
 }
 
-/// Checks that the layers of each chunk lie within it, and learns from them how full the last chunk is.
+/// Checks that the layers of each chunk lie within it. The heads also give the number of points of
+/// the last chunk, which may be shorter.
 fn check_layers(
     file: &mut (impl Read + Seek),
     mut at: u64,
@@ -310,7 +318,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The data of a LASzip record with these items: kinds and sizes.
+    /// The data of a LASzip record with these items, given as kind and size.
     fn record(items: &[(u16, u16)]) -> Vec<u8> {
         let mut data = vec![0; 32];
         data[0] = if items.iter().any(|(kind, _)| *kind >= 10) { 3 } else { 2 };
@@ -330,7 +338,7 @@ mod tests {
         assert_eq!(needed(&[(10, 30), (11, 6), (14, 2)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (12, 8), (13, 29)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (14, 6)]), [0, 1, 2, 3, 4]);
-        // In another order the decoder takes something else for what is asked for.
+        // In another order the decoder would select other layers than those that are asked for.
         assert_eq!(needed(&[(10, 30), (14, 1), (11, 6)]).len(), 11);
         assert_eq!(needed(&[(14, 1), (10, 30)]).len(), 10);
     }
@@ -340,11 +348,11 @@ mod tests {
         let scheme = Scheme::parse(&record(&[(10, 30), (12, 8), (14, 5)]));
         assert!(scheme.is_some_and(|scheme| (scheme.record, scheme.needed.len()) == (43, 16)));
         assert!(Scheme::parse(&record(&[(6, 20), (7, 8), (8, 6), (0, 5)])).is_some());
-        // Layers and chunks of layers go together.
+        // Layers and chunks of layers only occur together.
         let mut without = record(&[(10, 30)]);
         without[0] = 1;
         assert!(Scheme::parse(&without).is_none());
-        // Longer than any record, with a layer for each byte.
+        // Longer than any record, with one layer per byte.
         assert!(Scheme::parse(&record(&[(14, u16::MAX); 10_000])).is_none());
         for item in [(11, 30), (10, 29), (6, 30), (12, 6), (5, 8), (15, 1)] {
             assert!(Scheme::parse(&record(&[item])).is_none(), "{item:?}");

@@ -1,4 +1,4 @@
-//! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture takes few.
+//! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture needs few.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
 use super::extra::Normals;
@@ -17,54 +17,55 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
-/// Where a COPC file says that it is one: the header of its first record, and what that holds.
+/// Where a COPC file identifies itself: the header and the data of its first record.
 const RECORD: u64 = 375;
 const INFO: u64 = RECORD + 54;
 const INFO_SIZE: usize = 160;
 
-/// Bytes of an entry of the octree's pages.
+/// Size of an entry in the pages of the octree, bytes.
 const ENTRY: u64 = 32;
 
-/// A COPC file, of which any nodes can be read.
+/// A COPC file, open for reading any of its nodes.
 ///
-/// The octree is checked when it is opened: each node is there once, below one that is there, and its chunk lies in the file.
+/// The octree is checked when the file is opened: no node occurs twice, each has a parent, and its
+/// chunk lies within the file.
 pub struct Copc {
     pub(super) file: File,
     pub(super) path: PathBuf,
-    /// Which nodes it has.
+    /// The nodes of the file.
     pub octree: PointOctree,
-    /// The chunk of each.
+    /// The chunk of each node.
     pub(super) chunks: Vec<Chunk>,
-    /// What is needed of each, once it was looked at.
+    /// The needed layers of each node, once its chunk has been looked at.
     pub(super) layers: Vec<Option<Layers>>,
     pub(super) scheme: Scheme,
-    /// The record that says how chunks are compressed.
+    /// The data of the record that says how chunks are compressed.
     pub(super) laszip: Vec<u8>,
     pub(super) format: las::point::Format,
     pub(super) transforms: Vector<Transform>,
-    /// Points of all nodes.
+    /// The number of points of all nodes.
     pub(super) count: u64,
     /// The attribute that shows, once points have been read.
     pub(super) looks: Option<Looks>,
-    /// The meaning of colours' numbers, once some have been read by [`read`](Self::read).
+    /// The meaning of the numbers of colours, once [`read`](Self::read) has read some.
     pub(super) rules: ColorRules,
-    /// The normals that points have beside their format.
+    /// The normals among the extra bytes of points.
     pub(super) normals: Option<Normals>,
-    /// Sentences about odd fields of it.
+    /// Sentences about odd fields of the header.
     pub(super) notes: Vec<String>,
 }
 
-/// Where the points of a node lie.
+/// Where the points of a node are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Chunk {
-    /// Bytes from the file's start.
+    /// Offset from the start of the file, bytes.
     pub offset: u64,
     pub bytes: u64,
-    /// The number of its first point, as the file has them one after the other.
+    /// Index of its first point in the order of the file.
     pub first: u64,
 }
 
-/// A node as pages have it.
+/// An entry of a page that is a node.
 struct Entry {
     offset: u64,
     bytes: u64,
@@ -72,11 +73,12 @@ struct Entry {
 }
 
 impl Copc {
-    /// Opens an input that is a COPC file; None if it is another one.
+    /// Opens a COPC file; returns None for any other file.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the file says that it is COPC and is not.
+    /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the file says that it is
+    /// COPC but is invalid.
     pub fn open(input: Input) -> Result<Option<Self>> {
         let Input { file, length, path, format, .. } = input;
         let opened = surviving(|| {
@@ -88,28 +90,28 @@ impl Copc {
         opened.map_err(|fault| fault.of(&path))
     }
 
-    /// Bytes of the chunks of all nodes.
+    /// Size of the chunks of all nodes, bytes.
     pub fn bytes(&self) -> u64 {
         self.chunks.iter().map(|chunk| chunk.bytes).sum()
     }
 
-    /// Bytes that [`read`](Self::read) takes of these nodes, which were read before.
+    /// Bytes that [`read`](Self::read) reads for these nodes; a node counts 0 until it was read.
     pub fn bytes_read(&self, nodes: &[usize]) -> u64 {
         nodes.iter().filter_map(|&node| self.layers[node].as_ref()).map(Layers::bytes).sum()
     }
 
-    /// Points of all nodes.
+    /// The number of points of all nodes.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// A failure that is the file's.
+    /// Adds the path of the file to an error.
     pub(super) fn fault(&self, fault: Fault) -> Error {
         fault.of(&self.path)
     }
 }
 
-/// Whether a file's first record is COPC's.
+/// Whether the first record of a file is that of COPC.
 fn says_copc(file: &File) -> Result<bool, Fault> {
     let mut start = Vec::new();
     file.take(INFO).read_to_end(&mut start)?;
@@ -136,11 +138,11 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         return malformed("its LASzip record does not describe its points");
     }
     if !format.is_extended || scheme.has_color != format.has_color {
-        // The decoder takes for something else what colours are taken from.
+        // Bytes that are read as colours come from other items then, so all layers are needed.
         scheme.needed.fill(true);
         scheme.intensities = None;
     }
-    // Until it is known that colours show.
+    // Needed until a colour that is not zero has been read.
     scheme.need_intensities(true);
     let mut info = [0; INFO_SIZE];
     file.seek(SeekFrom::Start(INFO))?;
@@ -149,7 +151,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     let [x, y, z, half, spacing] = [0, 1, 2, 3, 4].map(|at| f64::from_le_bytes(words[at]));
     let (center, root) = (DVec3::new(x, y, z), [5, 6].map(|at| u64::from_le_bytes(words[at])));
     if !(center.is_finite() && half.is_finite() && half > 0.0 && spacing.is_finite() && spacing > 0.0) {
-        return malformed("its octree has no place, no size or no spacing");
+        return malformed("its octree has no valid centre, size or spacing");
     }
     let entries = entries(&mut file, root, length)?;
     let (nodes, chunks) = checked(entries, (&scheme, length))?;
@@ -184,7 +186,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     })
 }
 
-/// The entries of all pages, from the root's on, by their keys.
+/// Reads the entries of all pages, from the root page on, by level and position.
 fn entries(
     file: &mut (impl Read + Seek),
     root: [u64; 2],
@@ -192,7 +194,7 @@ fn entries(
 ) -> Result<BTreeMap<(u32, [u32; 3]), Entry>, Fault> {
     let mut entries = BTreeMap::new();
     let mut pages = vec![root];
-    // Pages that name each other have more entries than the file can hold.
+    // Pages that refer to each other in a circle have more entries than the file can hold.
     let mut left = length / ENTRY;
     while let Some([offset, bytes]) = pages.pop() {
         let within = offset.checked_add(bytes).is_some_and(|end| end <= length);
@@ -212,7 +214,7 @@ fn entries(
             let name = || format!("{level}-{x}-{y}-{z}");
             let whole = [level, x, y, z].map(u32::try_from);
             let ([Ok(level), Ok(x), Ok(y), Ok(z)], Ok(bytes)) = (whole, u64::try_from(bytes)) else {
-                return malformed(format!("node {} of its octree has no place or no size", name()));
+                return malformed(format!("node {} of its octree has an invalid position or size", name()));
             };
             if level >= MOST_LEVELS || [x, y, z].iter().any(|place| u64::from(*place) >> level > 0) {
                 return malformed(format!("node {} lies outside its octree", name()));
@@ -232,7 +234,8 @@ fn entries(
     Ok(entries)
 }
 
-/// The nodes in the order of their keys, each below one that is there, with chunks within the file.
+/// The nodes and their chunks, sorted by level and position. Checks that each node has a parent,
+/// and that chunks lie in the file and do not overlap.
 fn checked(
     entries: BTreeMap<(u32, [u32; 3]), Entry>,
     (scheme, length): (&Scheme, u64),
@@ -242,7 +245,7 @@ fn checked(
         let &Entry { offset, bytes, points } = entry;
         let name = || format!("{level}-{}-{}-{}", place[0], place[1], place[2]);
         if level > 0 && !entries.contains_key(&(level - 1, place.map(|place| place >> 1))) {
-            return malformed(format!("node {} of its octree is below none", name()));
+            return malformed(format!("node {} of its octree has no parent", name()));
         }
         let fits = offset.checked_add(bytes).is_some_and(|end| end <= length);
         if points > 0 && !(fits && bytes >= scheme.start() && points / MOST_A_BYTE <= bytes) {
@@ -259,7 +262,7 @@ fn checked(
     let mut first = 0u64;
     for pair in in_file.windows(2) {
         if chunks[pair[0]].offset + chunks[pair[0]].bytes > chunks[pair[1]].offset {
-            return malformed("two nodes of its octree have the same bytes");
+            return malformed("two nodes of its octree overlap in the file");
         }
     }
     for node in in_file {

@@ -1,40 +1,40 @@
-//! The record that names the bytes of points behind those of their format.
+//! The record that describes the extra bytes of points, which follow those of the point format.
 
 use crate::io::attributes::{NORMAL, find_triple};
 use las::raw::Vlr;
 
-/// Whose record it is, and which.
+/// User and number of the record.
 const USER: &[u8] = b"LASF_Spec";
 const EXTRA: u16 = 4;
 
-/// Bytes of an entry, and where it has its type, its options and its name.
+/// Size of an entry, bytes, and the offsets of its type, its options and its name.
 const ENTRY: usize = 192;
 const KIND: usize = 2;
 const OPTIONS: usize = 3;
 const NAME: std::ops::Range<usize> = 4..36;
 
-/// One attribute: the first of its numbers.
+/// An attribute among the extra bytes; only its first number is used.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field {
     pub name: String,
-    /// Bytes before it among those behind the format's own.
+    /// Offset within the extra bytes, bytes.
     pub start: usize,
-    /// Bytes of it.
+    /// Size, bytes.
     pub size: u16,
     kind: u8,
     scale: f64,
     offset: f64,
 }
 
-/// Which bits of an entry's options say that it has a scale and an offset.
+/// Bits of an entry's options: it has a scale, it has an offset.
 const HAS_SCALE: u8 = 1 << 3;
 const HAS_OFFSET: u8 = 1 << 4;
 
-/// Where an entry has these.
+/// Where the scale and the offset are in an entry, bytes.
 const SCALE: usize = 112;
 const OFFSET: usize = 136;
 
-/// The attributes in their order.
+/// The attributes in their order; None if this is another record.
 pub(super) fn fields(record: &Vlr) -> Option<Vec<Field>> {
     let user = record.user_id.split(|byte| *byte == 0).next();
     if record.record_id != EXTRA || user != Some(USER) {
@@ -57,7 +57,7 @@ pub(super) fn fields(record: &Vlr) -> Option<Vec<Field>> {
 }
 
 impl Field {
-    /// Its number in the bytes behind the format's own; None if they do not hold it.
+    /// The attribute's first number in a point's extra bytes; None if they are too short.
     fn number(&self, bytes: &[u8]) -> Option<f64> {
         macro_rules! number {
             ($type:ty) => {
@@ -81,7 +81,7 @@ impl Field {
     }
 }
 
-/// Attributes that are normals, behind so many bytes of a point.
+/// The three attributes that are normals, after the `own` bytes of the point format.
 #[derive(Clone, Debug)]
 pub(super) struct Normals {
     own: usize,
@@ -89,21 +89,21 @@ pub(super) struct Normals {
 }
 
 impl Normals {
-    /// The normals of points whose format has `own` bytes, if all three are there and are numbers.
+    /// Finds normals among `fields`, for a format of `own` bytes; None unless three are numbers.
     pub fn of(fields: &[Field], own: u16) -> Option<Self> {
         let found = find_triple(NORMAL, fields.iter().map(|field| field.name.as_str()))?;
         let fields = found.map(|index| fields[index].clone());
         fields.iter().all(|field| (1..=10).contains(&field.kind)).then_some(Self { own: own.into(), fields })
     }
 
-    /// The normal of a record; zero where it is too short.
+    /// The normal of a record; zero if the record is too short.
     pub fn of_record(&self, record: &[u8]) -> [f32; 3] {
         let bytes = record.get(self.own..).unwrap_or_default();
         [0, 1, 2].map(|axis: usize| self.fields[axis].number(bytes).unwrap_or(0.0) as f32)
     }
 }
 
-/// Bytes of a type: one to three numbers, or for 0 as many as the options say.
+/// Size of an attribute, bytes: one to three numbers, or for the type 0 as many as the options say.
 fn size(kind: u8, options: u8) -> u16 {
     const SIZES: [u16; 10] = [1, 1, 2, 2, 4, 4, 8, 8, 4, 8];
     match kind {

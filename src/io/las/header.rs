@@ -1,4 +1,4 @@
-//! Facts in the header of a LAS file, and where two of its fields disagree.
+//! Facts in the header of a LAS file, and notes about fields that contradict each other.
 
 use super::chunks::promised;
 use super::extra::{self, Field, Normals};
@@ -9,41 +9,41 @@ use las::point::Format;
 use las::raw::{Header, Vlr};
 use std::io::{Read, Seek, SeekFrom};
 
-/// Bytes of the headers of versions 1.0 to 1.2, 1.3 and 1.4.
+/// Size of the header, bytes: of versions 1.0 to 1.2, of 1.3 and of 1.4.
 const SIZES: [u16; 3] = [227, 235, 375];
 
-/// Bytes before the data of a variable-length record.
+/// Size of the header of a variable-length record, bytes.
 const RECORD_HEADER: u64 = 54;
 
-/// Where a header says that its coordinate system is a text.
+/// Flag: the coordinate system is given as text (WKT).
 const IS_TEXT: u16 = 1 << 4;
 
-/// The start of a note about a picture that is hardly what was meant.
+/// Start of a note about a defect that probably spoils the picture.
 const WARNING: &str = "warning: ";
 
-/// Entries of the system field that name no system that measured something.
+/// System identifiers that do not name a scanner.
 const NO_SYSTEMS: [&str; 5] = ["MERGE", "MODIFICATION", "EXTRACTION", "TRANSFORMATION", "OTHER"];
 
-/// Points may lie outside of the header's box by this many steps of their coordinates.
+/// Steps of the coordinates by which points may exceed the header's bounding box.
 const STEPS: f64 = 2.0;
 
-/// Facts of a file before its points are read.
+/// Facts of a file that are known before its points are read.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found {
     pub about: About,
-    /// Whether coordinates are degrees, if a coordinate system says it.
+    /// Whether coordinates are degrees, if a coordinate system says so.
     pub geographic: Option<bool>,
-    /// The normals that points have beside their format.
+    /// The normals among the extra bytes of points.
     pub normals: Option<Normals>,
     /// Sentences about odd fields.
     pub notes: Vec<String>,
-    /// The box that the header gives, and the step of coordinates.
+    /// The bounding box in the header, and the step of coordinates.
     bounds: [[f64; 3]; 2],
     step: [f64; 3],
 }
 
-/// Reads what the header and its records say; `legacy` is the count of points of LAS 1.0 to 1.3 as
-/// the file has it.
+/// Reads the facts in the header and its records. `legacy` is the file's own point count in the
+/// field of LAS 1.0 to 1.3.
 pub(super) fn look(
     file: &mut (impl Read + Seek),
     (header, legacy): (&Header, u32),
@@ -57,7 +57,7 @@ pub(super) fn look(
     notes.extend(places(header, end));
     if system.is_some() && (header.global_encoding & IS_TEXT != 0) != systems.text.is_some() {
         let (says, has) = if systems.text.is_some() { ("GeoTIFF keys", "a text") } else { ("a text", "GeoTIFF keys") };
-        notes.push(format!("its header says that {says} tell its coordinate system, and its records have {has}"));
+        notes.push(format!("its header gives its coordinate system by {says}, but its records have {has}"));
     }
     let scales = [header.x_scale_factor, header.y_scale_factor, header.z_scale_factor];
     notes.extend(scale(scales));
@@ -78,7 +78,7 @@ pub(super) fn look(
 }
 
 impl Found {
-    /// A sentence if points lie outside of the box that the header gives.
+    /// A sentence if points lie outside the bounding box in the header.
     pub fn outside(&self, name: &str, positions: &[[f64; 3]]) -> Option<String> {
         let [min, max] = self.bounds;
         let is_outside = |position: &&[f64; 3]| {
@@ -88,7 +88,7 @@ impl Found {
             };
             (0..3).any(beyond)
         };
-        // A box that is upside down is told by itself, and so are scales that are none.
+        // An inverted box and a scale of 0 have notes of their own.
         if (0..3).any(|axis| min[axis] > max[axis] || self.step[axis] == 0.0) {
             return None;
         }
@@ -107,12 +107,12 @@ impl Found {
     }
 }
 
-/// Facts in the records of a file.
+/// Facts in the variable-length records of a file.
 struct Records {
     systems: system::Records,
-    /// Fields of points beside those of their format.
+    /// Attributes in the extra bytes of points.
     extra: Vec<Field>,
-    /// Where the last record ends.
+    /// Offset of the end of the last record, bytes.
     end: u64,
 }
 
@@ -133,11 +133,11 @@ fn records(file: &mut (impl Read + Seek), header: &Header) -> Result<Records, Fa
     Ok(Records { systems: found, extra, end })
 }
 
-/// Counts that disagree.
+/// A sentence if the two point counts disagree.
 fn counts(header: &Header, legacy: u32) -> Option<String> {
     let large = header.large_file?.number_of_point_records;
     let legacy = u64::from(legacy);
-    // Zero is how a writer says that it is not used.
+    // Writers put 0 into a field that they do not use.
     if legacy == 0 || legacy == large {
         return None;
     }
@@ -145,7 +145,7 @@ fn counts(header: &Header, legacy: u32) -> Option<String> {
     Some(format!("its header says {large} points, and {legacy} in the field of older versions: {taken} are read"))
 }
 
-/// More room than the points take, or more returns than points.
+/// A sentence if the file has space for more points, or returns have more points than there are.
 fn room(header: &Header, length: u64) -> Option<String> {
     let count = promised(header);
     let by_return: u64 = match header.large_file {
@@ -163,8 +163,7 @@ fn room(header: &Header, length: u64) -> Option<String> {
     (is_plain && held > count).then(|| format!("its header says {count} points, and the file has bytes for {held}"))
 }
 
-/// A version that does not have the point format, or a record that is longer than the format and
-/// says not why.
+/// A sentence if the version does not have the point format.
 fn formats(header: &Header) -> Option<String> {
     let format = header.point_data_record_format & 0x3f;
     let since = match format {
@@ -175,10 +174,10 @@ fn formats(header: &Header) -> Option<String> {
     };
     let minor = header.version.minor;
     (minor < since)
-        .then(|| format!("its header says LAS 1.{minor}, and point format {format}, which LAS 1.{since} brought"))
+        .then(|| format!("its header says LAS 1.{minor}, and point format {format}, which LAS 1.{since} introduced"))
 }
 
-/// Offsets and sizes that disagree with each other.
+/// Sentences about offsets and sizes that contradict each other.
 fn places(header: &Header, end: u64) -> Vec<String> {
     let mut notes = Vec::new();
     let size = match header.version.minor {
@@ -205,7 +204,7 @@ fn places(header: &Header, end: u64) -> Vec<String> {
     notes
 }
 
-/// Scales that place points wrongly.
+/// A sentence if scales put points into wrong positions.
 fn scale(scales: [f64; 3]) -> Option<String> {
     let along = |is: fn(f64) -> bool| {
         let axes = scales.iter().zip(["x", "y", "z"]).filter(|(scale, _)| is(**scale)).map(|(_, axis)| axis);
@@ -223,7 +222,7 @@ fn scale(scales: [f64; 3]) -> Option<String> {
         .then(|| format!("{WARNING}its header gives a scale along {} that is no positive number", odd.join(", ")))
 }
 
-/// The description for people.
+/// The description of the file for its user.
 fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
     let text = |bytes: &[u8]| {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
@@ -246,7 +245,7 @@ fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
     }
 }
 
-/// The attributes of a point of a format.
+/// The attributes of a point, and which of them are used.
 fn attributes(format: u8, record: u16, named: &[Field]) -> Vec<Attribute> {
     let Ok(known) = Format::new(format) else { return Vec::new() };
     let always = [("x y z", true, Role::Other), ("intensity", false, Role::Intensity), ("returns", false, Role::Other)];

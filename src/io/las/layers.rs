@@ -1,4 +1,4 @@
-//! Layers of a chunk, each of which has one quantity of all its points: those that nobody asks for are not read.
+//! Chunks of layers, each of which holds one quantity of all points; only needed layers are read.
 
 use super::chunks::Scheme;
 use crate::io::fault::{Fault, reserve};
@@ -6,18 +6,19 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 
-/// Of a chunk in layers what is needed of it.
+/// The part of a chunk that is needed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Layers {
-    /// The chunk's first bytes: its first point, how many it has, and how long each layer is. The lengths of layers that are left out are 0, as
-    /// where all points have what the first one has.
+    /// The head of the chunk: its first point, its number of points, and the length of each layer.
+    /// Layers that are not needed have the length 0, which means that all points have the first
+    /// one's value.
     start: Vec<u8>,
-    /// Where the layers lie that are needed, bytes from the chunk's start.
+    /// The needed layers, as ranges of bytes from the start of the chunk.
     runs: Vec<Range<u64>>,
 }
 
 impl Layers {
-    /// Those that are needed of a chunk that begins with these bytes, [`Scheme::start`] of them.
+    /// Selects the needed layers of a chunk with this head, [`Scheme::start`] bytes.
     pub(super) fn of(mut start: Vec<u8>, scheme: &Scheme) -> Self {
         let lengths = start[scheme.record as usize + 4..].as_chunks_mut().0;
         let mut runs: Vec<Range<u64>> = Vec::new();
@@ -34,12 +35,12 @@ impl Layers {
         Self { start, runs }
     }
 
-    /// Bytes that are read of the chunk.
+    /// Bytes of the chunk that are read.
     pub(super) fn bytes(&self) -> u64 {
         self.start.len() as u64 + self.runs.iter().map(|run| run.end - run.start).sum::<u64>()
     }
 
-    /// The chunk that lies at this place of the file, as if it had no other layers.
+    /// Reads the chunk at this offset of the file as if it had no other layers.
     pub(super) fn read(&self, mut file: &File, offset: u64) -> Result<Vec<u8>, Fault> {
         let mut bytes = Vec::new();
         reserve(&mut bytes, self.bytes())?;

@@ -29,33 +29,34 @@ use std::path::Path;
 
 pub use copc::Copc;
 
-/// Bytes of records that are decoded together.
+/// Size of the records that are decoded together, bytes.
 const BLOCK: u64 = 1 << 25;
 
-/// Reads the points of a LAS or LAZ file, COPC included: all but those marked as withheld, which are deleted points and are counted
-/// in [`Points::withheld`], or with [`ReadOptions::keep_withheld`] these too, and those whose class has the opacity 0, which are counted in
-/// [`Points::unseen`]. Synthetic, key and overlap points (legacy class 12 too) are points like
-/// any other, as they are to PDAL.
+/// Reads the points of a LAS or LAZ file, including COPC.
 ///
-/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours are the
-/// 16-bit numbers of the format's RGB, of which zeros alone mean none, and without them intensities
-/// ([`RawColors`]). Where two fields of the header disagree, [`Points::notes`] says it.
+/// Two kinds of points are left out: withheld ones, which are marked as deleted, unless
+/// [`ReadOptions::keep_withheld`] is set; and those whose class has the opacity 0. They are counted
+/// in [`Points::withheld`] and [`Points::unseen`]. Synthetic, key and overlap points (legacy class
+/// 12 too) are read like any other, as PDAL does.
 ///
-/// A chunk of a compressed file that cannot be decoded is left out, and told by [`Points::unread`],
-/// if another one can be decoded and
-/// [`ReadOptions::strict`] is not said.
+/// Coordinates are scaled and offset in f64, in the file's own coordinate system; z is up. Colours
+/// are the 16-bit RGB of the point format. If all are zero or missing, intensities are used
+/// ([`RawColors`]). [`Points::notes`] names fields of the header that contradict each other.
+///
+/// A chunk of a compressed file that cannot be decoded is left out and named in [`Points::unread`],
+/// if another one can be decoded and [`ReadOptions::strict`] is not set.
 ///
 /// # Errors
 ///
-/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where
-/// the file is not LAS, ends early, or cannot be decoded.
+/// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the file is not LAS, ends
+/// early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let again = file.try_clone().map_err(|error| Error::read(&path, error))?;
     match whole((file, length), &path, options, progress) {
         Err(Fault::Malformed(what)) if !options.strict => {
             let points = deep(|| rest::read((again, length), &path, options, progress));
-            // The header's faults were told already.
+            // The first attempt has found the cause.
             points.map_err(|fault| match fault {
                 Fault::Malformed(_) => Fault::Malformed(what),
                 of_system => of_system,
@@ -66,7 +67,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     .map_err(|fault| fault.of(&path))
 }
 
-/// All points of a file that is what its header says.
+/// Reads all points of an intact file.
 fn whole(
     (file, length): (File, u64),
     path: &Path,
@@ -84,7 +85,7 @@ fn whole(
     });
     let (file, decoding, promised, found) = opened?;
     if promised == 0 {
-        // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
+        // The decoder would still trust the length of a chunk table, which is not checked here.
         return Ok(described(Points { up: Some(Up::Z), ..Points::default() }, found, &name, options));
     }
     progress.begin(&format!("reading {name}"), promised);
@@ -93,20 +94,21 @@ fn whole(
     Ok(described(points?, found, &name, options))
 }
 
-/// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
-/// change between GPS time sequences (laz 0.13.0), of which a damaged file of a few bytes can hold a million in a row. A
-/// call takes 64 bytes of stack, so this is room for four million; in the usual 2 MiB the program would be aborted.
+/// Stack size of the threads that decode, bytes; pages are committed only when they are used. The
+/// decoder recurses at each change between GPS time sequences (laz 0.13.0), and a damaged file of a
+/// few bytes can contain a million of them in a row. A call takes 64 bytes of stack, so this
+/// suffices for four million; with the usual 2 MiB the process would be aborted.
 const DECODER_STACK: usize = 1 << 28;
 
 /// Runs `decode`, which may panic, on threads whose stacks are deep enough for damaged files.
 fn deep<T: Send>(decode: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
-    // The decoder's panics come up on all of them.
+    // The decoder may panic on any of the threads.
     let pool =
         rayon::ThreadPoolBuilder::new().stack_size(DECODER_STACK).start_handler(|_| fault::hush_thread()).build();
     pool.map_err(|error| Fault::Io(io::Error::other(error)))?.install(|| surviving(decode))
 }
 
-/// The decoder's failures that are the file's fault, told from the system's.
+/// Sorts the decoder's errors into those of the file and those of the system.
 fn of_las(error: las::Error) -> Fault {
     match error {
         las::Error::Io(error) => early(Fault::Io(error)),
@@ -168,7 +170,7 @@ fn decode(
     Ok(kept.points(0..read, read_options))
 }
 
-/// Points with what the file of this name says of itself, and what is odd about it.
+/// Adds what the file, called `name`, says of itself, and notes about odd fields and coordinates.
 fn described(mut points: Points, found: Found, name: &str, options: &ReadOptions) -> Points {
     points.notes.extend(found.notes.iter().cloned());
     points.notes.extend(found.outside(name, &points.positions));
@@ -178,7 +180,7 @@ fn described(mut points: Points, found: Found, name: &str, options: &ReadOptions
     points
 }
 
-/// The form of a file's records, as the decoder takes it.
+/// The format of a file's records, and the scales and offsets of its coordinates.
 fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transform>), Fault> {
     let record = header.point_data_record_length;
     let mut format = las::point::Format::new(header.point_data_record_format & 0x3f).map_err(of_las)?;
@@ -195,42 +197,42 @@ fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transfor
     Ok((format, transforms))
 }
 
-/// Which attribute of the points shows.
+/// The attribute that shows as the colour of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Looks {
     Colors,
     Intensities,
 }
 
-/// What is kept of the points so far.
+/// Collects points block by block.
 #[derive(Default)]
 struct Kept<'a> {
     positions: Vec<[f64; 3]>,
-    /// Which bytes are normals, and these.
+    /// The normals among the extra bytes, and their values.
     has_normals: Option<&'a Normals>,
     normals: Vec<[f32; 3]>,
     codes: Vec<[u16; 3]>,
-    /// As long as no colour says anything.
+    /// Collected until a colour that is not zero occurs.
     intensities: Vec<u16>,
-    /// The attribute that shows, as soon as it is known.
+    /// The attribute that shows, once it is known.
     looks: Option<Looks>,
-    /// The attribute that shows was known before these points were read.
+    /// `looks` was known before these points were read.
     decided: bool,
-    /// Of each, where classes make a difference.
+    /// The class of each point, if classes have different opacities.
     classes: Vec<u8>,
-    /// Points of each class that are not deleted.
+    /// The number of points of each class, without deleted ones.
     counts: BTreeMap<u8, u64>,
     left_out: Vec<u64>,
 }
 
 impl<'a> Kept<'a> {
-    /// Nothing yet, of a file of which it may be known what shows.
+    /// An empty collection; `looks` is known if other points of the file have been read.
     fn of(looks: Option<Looks>, has_normals: Option<&'a Normals>) -> Self {
         Self { looks, decided: looks.is_some(), has_normals, ..Self::default() }
     }
 
-    /// As points, of which all that were read have these numbers, in order; colours are as they are
-    /// in the file.
+    /// The collected points, with colours as they are in the file. `numbers` are the indices of all
+    /// points that were read, in order.
     fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
         let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, left_out } =
             self;
@@ -251,8 +253,9 @@ impl<'a> Kept<'a> {
         points
     }
 
-    /// As points, of which those that were read have the numbers of these runs; `all` are in the
-    /// file. Points are numbered as in the file, if it has fewer than 2^32, else as they are kept.
+    /// The collected points, which were read in `runs` of indices, of a file of `all` points.
+    /// Points keep their indices if the file has fewer than 2^32; otherwise they are numbered as
+    /// they are kept.
     fn numbered(self, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Points {
         let numbers = || runs.iter().cloned().flatten();
         let mut points = self.points(numbers(), options);
@@ -264,7 +267,7 @@ impl<'a> Kept<'a> {
         points
     }
 
-    /// Adds the points of a block, the first of which has the number `first`, but for those that are deleted.
+    /// Adds the points of a block, of which `first` is the first index, except deleted ones.
     fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
         let mut keeps = Vec::with_capacity(block.len());
         for ((withheld, class), number) in withheld(block).zip(classes(block)).zip(first..) {
@@ -299,8 +302,8 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// Leaves out the points whose class has the opacity 0, as soon as all of them have decided what
-/// colours mean; all have these numbers.
+/// Leaves out the points whose class has the opacity 0, once all of them have been used to find the
+/// range of colours. `numbers` are the indices of all points that were read.
 fn leave_out_unseen(points: &mut Points, numbers: impl Iterator<Item = u64>) {
     let Some(raw) = &mut points.raw else { return };
     let keep: Vec<bool> = raw.classes.iter().map(|class| raw.opacities.of(*class) > 0.0).collect();
@@ -320,14 +323,14 @@ fn records(block: &PointData) -> impl Iterator<Item = &[u8]> {
     block.raw_bytes().chunks_exact(block.record_len().max(1))
 }
 
-/// Whether each point of a block is marked as deleted: bit 7 of the classification byte, in the extended formats bit 2
-/// of the flags before it.
+/// Whether each point of a block is marked as deleted: bit 7 of the classification byte, or in the
+/// extended formats bit 2 of the byte of flags before it.
 fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
     let mask = if block.format().is_extended { 1 << 2 } else { 1 << 7 };
     records(block).map(move |record| record.get(15).is_some_and(|b| b & mask != 0))
 }
 
-/// The class of each point: of byte 15 the lower five bits, in the extended formats byte 16.
+/// The class of each point: the lower five bits of byte 15, or in the extended formats byte 16.
 fn classes(block: &PointData) -> impl Iterator<Item = u8> {
     let (byte, mask) = if block.format().is_extended { (16, 0xff) } else { (15, 0x1f) };
     records(block).map(move |record| record.get(byte).map_or(0, |b| b & mask))
@@ -341,7 +344,7 @@ mod tests {
     use las::{Builder, Writer};
     use std::io::Cursor;
 
-    /// A LAZ file of no points.
+    /// A LAZ file without points.
     fn compressed() -> Vec<u8> {
         let mut builder = Builder::from((1, 4));
         builder.point_format = Format::new(0).unwrap();
@@ -357,7 +360,7 @@ mod tests {
         let mut bytes = compressed();
         let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
         let table = u64::from_le_bytes(*bytes[start..].first_chunk().unwrap()) as usize;
-        // A count of chunks that would take 64 GiB, and the bytes that a decoder of it begins with.
+        // A chunk count that would take 64 GiB, and the bytes with which its decoder starts.
         bytes.truncate(table + 4);
         bytes.extend([0xff; 4]);
         bytes.extend([0x7f; 64]);
@@ -366,7 +369,8 @@ mod tests {
         assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
     }
 
-    /// Panics of a decoder are not printed, on whatever thread of its pool; others are. Seen from outside, in a process of its own.
+    /// A decoder's panics are not printed, whatever thread of its pool they occur on; others are.
+    /// The output is checked from outside, by a process of its own.
     #[test]
     fn a_decoders_panic_is_not_printed() {
         const WHOSE: &str = "EPSPLAT_TEST_PANIC";

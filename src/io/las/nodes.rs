@@ -1,4 +1,5 @@
-//! Nodes of a COPC file: what is needed of their chunks is read in the order of the file, many at a time, and decoded by all threads.
+//! Reads nodes of a COPC file: the needed layers of many chunks in the order of the file, which all
+//! threads then decode.
 
 use super::chunks::{CHUNK_LIMIT, malformed};
 use super::copc::Copc;
@@ -14,30 +15,32 @@ use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor};
 use rayon::prelude::*;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-/// Bytes that are read and records that are decoded together, unless one node has more.
+/// Bytes that are read, and bytes of records that are decoded, in one batch; a larger node is a
+/// batch of its own.
 const MOST_READ: u64 = 1 << 25;
 const MOST_DECODED: u64 = 1 << 27;
 
 impl Copc {
-    /// Reads the points of these nodes, by their indices in the octree, as [`read`](super::read) reads those of a whole file: in the order in
-    /// which the file has them. What 16-bit colours and intensities mean is told by the first nodes that are read, for all later ones too.
+    /// Reads the points of these nodes, given by their indices in the octree, in the order of the
+    /// file, as [`read`](super::read) does for a whole file. The first nodes that are read decide
+    /// for all later ones what the numbers of 16-bit colours and intensities mean.
     ///
-    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are kept. A node
-    /// that cannot be decoded is left out, and told by
-    /// [`Points::unread`], if another one can be and [`ReadOptions::strict`] is not said.
+    /// Points have their indices in the file if it has fewer than 2^32 points; otherwise they are
+    /// numbered as they are kept. A node that cannot be decoded is left out and named in
+    /// [`Points::unread`], if another one can be decoded and [`ReadOptions::strict`] is not set.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read) where the system cannot read,
-    /// [`Error::Malformed`](crate::Error::Malformed) where nodes cannot be decoded.
+    /// [`Error::Read`](crate::Error::Read) if the system cannot read,
+    /// [`Error::Malformed`](crate::Error::Malformed) if nodes cannot be decoded.
     pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut points = self.read_raw(nodes, options, progress)?;
         self.rules.settle(std::slice::from_mut(&mut points));
         Ok(points)
     }
 
-    /// The same with colours as the file has them ([`Points::raw`]), which are to be settled with
-    /// those of other files.
+    /// The same, but with colours as they are in the file ([`Points::raw`]), so that their meaning
+    /// can be decided together with other files.
     ///
     /// # Errors
     ///
@@ -71,7 +74,7 @@ impl Copc {
         let count = self.octree.points(nodes);
         let normals = self.normals.clone();
         let (mut kept, mut read) = (Kept::of(self.looks, normals.as_ref()), Vec::new());
-        // No longer than the file, whatever it promises.
+        // The promised number may be wrong, so the number of bytes caps the reservation.
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
             let compressed = |&node: &usize| {
@@ -103,8 +106,8 @@ impl Copc {
         Ok(Points { unread, ..points })
     }
 
-    /// Decides what shows of all nodes by the first ones that are read: where that is colours,
-    /// intensities are read no more.
+    /// Decides by the first nodes that are read whether colours or intensities show, for all nodes.
+    /// If colours do, intensities are no longer read.
     fn decide(&mut self, kept: &Kept) {
         if self.looks.is_none() && !kept.positions.is_empty() {
             self.looks = Some(kept.looks.unwrap_or(Looks::Intensities));
@@ -112,7 +115,7 @@ impl Copc {
         }
     }
 
-    /// Runs of nodes that are read together.
+    /// Splits nodes into batches that are read together.
     fn batches<'a>(&self, nodes: &'a [usize]) -> Vec<&'a [usize]> {
         let size = |&node: &usize| (self.chunks[node].bytes, self.octree.nodes[node].points * self.scheme.record);
         let (mut batches, mut rest) = (Vec::new(), nodes);
@@ -130,8 +133,8 @@ impl Copc {
         batches
     }
 
-    /// Finds what is needed of these nodes, whose lengths are checked; only those of which it is
-    /// found remain.
+    /// Looks at the chunks of nodes whose layers are not known yet. Nodes whose chunk is invalid
+    /// are removed from `nodes`.
     fn look(
         &mut self,
         nodes: &mut Vec<usize>,
@@ -159,7 +162,7 @@ impl Copc {
         let (chunk, points) = (self.chunks[node], self.octree.nodes[node].points);
         if points * self.scheme.record > CHUNK_LIMIT {
             return malformed(format!(
-                "a node of its octree has {points} points, more than are decoded at once: leave --lod out to read the whole file"
+                "a node of its octree has {points} points, more than can be decoded at once: omit --lod to read the whole file"
             ));
         }
         let mut start = Vec::new();

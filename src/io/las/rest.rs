@@ -1,5 +1,4 @@
-//! The chunks of a damaged file that can be decoded: each is decoded by itself, and the others are
-//! left out.
+//! Reads a damaged file chunk by chunk, and leaves out the chunks that cannot be decoded.
 
 use super::chunks::{CHUNK_LIMIT, Chunk, MOST_A_BYTE, Scheme, chunk_table, laszip_record, malformed, promised};
 use super::shown::Shown;
@@ -15,20 +14,20 @@ use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// A chunk, and where it lies.
+/// A chunk, and where it is in the file.
 struct Place {
-    /// From 1.
+    /// Counted from 1.
     number: usize,
-    /// Bytes from the file's start.
+    /// Offset from the start of the file, bytes.
     offset: u64,
     bytes: u64,
-    /// The number of its first point.
+    /// Index of its first point.
     first: u64,
     points: u64,
 }
 
-/// Reads the points of all chunks that can be decoded, of a file in chunks whose table is whole.
-/// Fails where all of them can be, or none.
+/// Reads the points of all chunks that can be decoded, of a file whose chunk table is intact. Fails
+/// if all chunks can be decoded, or none.
 pub(super) fn read(
     (mut file, length): (File, u64),
     path: &Path,
@@ -83,8 +82,9 @@ pub(super) fn read(
     Ok(Points { unread, ..described(points, found, &name, options) })
 }
 
-/// The chunks of a table, one after the other from `offset` on, which hold all points: those of one
-/// size but for the last.
+/// Where the chunks of a table are, from `offset` on. The last chunk is cut to the `promised`
+/// points, as a table of equal chunks gives it the full size. Fails if the chunks hold fewer
+/// points.
 fn places(table: &[Chunk], mut offset: u64, promised: u64) -> Result<Vec<Place>, Fault> {
     let (mut places, mut first) = (Vec::new(), 0);
     for (index, &Chunk { points, bytes }) in table.iter().enumerate() {
@@ -105,11 +105,11 @@ fn bytes_of(file: &mut File, place: &Place) -> Result<Vec<u8>, Fault> {
     Ok(bytes)
 }
 
-/// The records of a chunk, whose lengths are looked at before the decoder takes them for true.
+/// Decodes the records of a chunk. Its lengths are checked first, as the decoder trusts them.
 fn decoded(place: &Place, bytes: &[u8], scheme: &Scheme, vlr: &LazVlr) -> Result<Vec<u8>, Fault> {
     let size = place.points.saturating_mul(scheme.record);
     if place.points / MOST_A_BYTE > bytes.len() as u64 || size > CHUNK_LIMIT {
-        return malformed("it has more points than its bytes can hold, or than are decoded at once");
+        return malformed("it has more points than its bytes can hold, or than can be decoded at once");
     }
     let failed = |error: laz::LasZipError| early(of_las(error.into()));
     let mut records = Vec::new();
@@ -119,7 +119,7 @@ fn decoded(place: &Place, bytes: &[u8], scheme: &Scheme, vlr: &LazVlr) -> Result
         match scheme.points_in(bytes, bytes.len() as u64) {
             Some(points) if points == place.points => {}
             Some(points) => {
-                return malformed(format!("it says that it has {points} points, and its table {}", place.points));
+                return malformed(format!("it says that it has {points} points, but its table {}", place.points));
             }
             None => return malformed("its layers do not fit in it"),
         }

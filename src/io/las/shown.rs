@@ -1,36 +1,39 @@
-//! A LAS file as the decoder is shown it: valid headers that it does not know as those that it does.
+//! Adapts the header of a LAS file to the decoder: valid headers that it does not know are shown to
+//! it as ones that it knows.
 
 use crate::io::fault::Fault;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Where a header has its version, its point format, and how many points there are by the count of
-/// LAS 1.0 to 1.3 and by that of 1.4.
+/// Offsets in the header, bytes: the version, the point format, and the point counts of LAS 1.0 to
+/// 1.3 and of 1.4.
 const VERSION: u64 = 24;
 const FORMAT: usize = 104;
 const LEGACY_COUNTS: u64 = 107;
 const COUNT: usize = 247;
-/// Bytes up to the end of that of 1.4.
+/// End of the point count of LAS 1.4, bytes.
 const COUNTS_END: u64 = 255;
-/// Bytes of those counts: of all points, and of five returns.
+/// Size of the counts of LAS 1.0 to 1.3, bytes: of all points, and of five returns.
 const LEGACY_COUNTS_SIZE: usize = 24;
 
-/// A file of which a few bytes read as others.
+/// A file that reads as if a few of its bytes were others.
 #[derive(Debug)]
 pub(super) struct Shown {
     file: File,
     at: u64,
-    /// Places and bytes.
+    /// The replaced bytes, and their offsets.
     others: Vec<(u64, Vec<u8>)>,
-    /// The count of points of LAS 1.0 to 1.3, as the file has it; that of LAS 1.5 is none.
+    /// The file's own point count in the field of LAS 1.0 to 1.3; 0 for LAS 1.5, which has none.
     pub(super) legacy: u32,
 }
 
 impl Shown {
-    /// The file from its start. One of LAS 1.5 is shown as of 1.4, whose header is the same but for
-    /// times at its end, and without the counts that 1.5 does away with; so is one of 1.4 whose
-    /// point format is 6 or above, for which these have no meaning, if it has another count. A
-    /// version that is none of 1.0 to 1.5 is refused.
+    /// Starts at the beginning of the file.
+    ///
+    /// LAS 1.5 is shown as 1.4, whose header is the same except for times at its end, and without
+    /// the legacy counts, which 1.5 abolished. LAS 1.4 with a point format of 6 or above, where
+    /// legacy counts have no meaning, is shown without them if it has the other count. Versions
+    /// other than 1.0 to 1.5 are refused.
     pub(super) fn new(mut file: File) -> Result<Self, Fault> {
         let mut start = Vec::new();
         (&mut file).take(COUNTS_END).read_to_end(&mut start)?;
@@ -50,21 +53,21 @@ impl Shown {
             Some(&[1, 0..5]) => {}
             Some(&[major, minor]) if start.starts_with(b"LASF") => {
                 let what =
-                    format!("it is LAS {major}.{minor}, of which only 1.0 to 1.5 are read; convert it to one of these");
+                    format!("it is LAS {major}.{minor}, but only 1.0 to 1.5 can be read; convert it to one of these");
                 return Err(Fault::Malformed(what));
             }
-            // What is too short or no LAS file is refused by its reader.
+            // Files that are too short or not LAS are refused by their reader.
             _ => {}
         }
         Ok(shown)
     }
 
-    /// The file as it is.
+    /// The unmodified file.
     pub(super) fn into_file(self) -> File {
         self.file
     }
 
-    /// Lets `bytes` be read at `at` from now on.
+    /// Shows `bytes` at the offset `at` from now on.
     pub(super) fn show(&mut self, at: u64, bytes: &[u8]) {
         self.others.push((at, bytes.to_vec()));
     }

@@ -1,35 +1,34 @@
-//! The coordinate system that the records of a LAS file name: by a text (WKT), or by the keys of
-//! GeoTIFF.
+//! The coordinate system that the records of a LAS file name, by text (WKT) or by GeoTIFF keys.
 
 use las::raw::Vlr;
 use std::io::{Read, Seek, SeekFrom};
 
-/// Whose records they are, and which: keys, their texts, and well-known text.
+/// User and numbers of the records: keys, the texts of keys, and well-known text.
 const USER: &[u8] = b"LASF_Projection";
 const KEYS: u16 = 34735;
 const TEXTS: u16 = 34737;
 const TEXT: u16 = 2112;
 
-/// Keys of GeoTIFF: the kind of model, and what names it.
+/// GeoTIFF keys: the kind of model, its codes, and texts that name it.
 const MODEL: u16 = 1024;
 const GEOGRAPHIC: u16 = 2048;
 const PROJECTED: u16 = 3072;
 const CITATIONS: [u16; 3] = [3073, 1026, 2049];
 
-/// Models are projected, of degrees, or from the Earth's centre.
+/// The kind of model whose coordinates are degrees; others are projected or geocentric.
 const MODEL_OF_DEGREES: u16 = 2;
 
-/// The code of what has none.
+/// The code of a system without a code.
 const USER_DEFINED: u16 = 32767;
 
-/// No text is longer, and no more extended records are looked at.
+/// Longest text that is read, bytes, and the number of extended records that are looked at.
 const LONGEST: u64 = 1 << 20;
 const MOST_EXTENDED: u32 = 64;
 
-/// Bytes before the data of an extended record.
+/// Size of the header of an extended record, bytes.
 const EXTENDED_HEADER: u64 = 60;
 
-/// The records that tell it.
+/// The records that describe the coordinate system.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Records {
     keys: Vec<u16>,
@@ -58,7 +57,7 @@ impl Records {
         }
     }
 
-    /// Looks for a text among extended records; those that cannot be read have none.
+    /// Looks for a text among extended records; ignores those that cannot be read.
     pub fn look_in_extended(&mut self, file: &mut (impl Read + Seek), mut at: u64, count: u32) {
         for _ in 0..count.min(MOST_EXTENDED) {
             let mut head = [0; EXTENDED_HEADER as usize];
@@ -79,8 +78,8 @@ impl Records {
     }
 }
 
-/// The code of the whole, which is the last thing in its brackets; those of its parts have more
-/// brackets behind them.
+/// The EPSG code of the whole system: the last entry within its brackets. Codes of parts are
+/// followed by more brackets.
 fn code_of_whole(text: &str) -> Option<&str> {
     let inner = text.strip_suffix("]]")?.trim_end_matches('"');
     let digits = inner.len() - inner.trim_end_matches(|c: char| c.is_ascii_digit()).len();
@@ -94,7 +93,7 @@ fn code_of_whole(text: &str) -> Option<&str> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct System {
     pub name: String,
-    /// Whether its coordinates are degrees.
+    /// Whether its coordinates are degrees, if that is known.
     pub geographic: Option<bool>,
 }
 
@@ -103,7 +102,7 @@ impl System {
         records.text.as_deref().map(Self::of_text).or_else(|| Self::of_keys(&records.keys, &records.texts))
     }
 
-    /// Well-known text, of either version.
+    /// Parses well-known text of version 1 or 2.
     fn of_text(text: &str) -> Self {
         let upper = text.to_ascii_uppercase();
         let has = |word: &str| upper.contains(word);
@@ -116,7 +115,7 @@ impl System {
         Self { name: code.map_or(name.clone(), |code| format!("{name} (EPSG:{code})")), geographic }
     }
 
-    /// Keys of GeoTIFF: four numbers each, after four of the directory.
+    /// Parses GeoTIFF keys: four numbers each, after four numbers of the directory.
     fn of_keys(keys: &[u16], texts: &[u8]) -> Option<Self> {
         let entries = || keys.as_chunks::<4>().0.iter().skip(1);
         let value = |id: u16| entries().find(|key| key[0] == id && key[1] == 0).map(|key| key[3]);
@@ -153,7 +152,7 @@ mod tests {
         let degrees = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984"],ID["EPSG",4326]]"#;
         let expected = System { name: "WGS 84 (EPSG:4326)".into(), geographic: Some(true) };
         assert_eq!(System::of_text(degrees), expected);
-        // The code of a unit is none of the whole.
+        // The code of a unit is not that of the whole.
         let feet = r#"PROJCS["Lambert",GEOGCS["NAD83"],UNIT["foot",0.3048,AUTHORITY["EPSG","9002"]]]"#;
         assert_eq!(System::of_text(feet), System { name: "Lambert".into(), geographic: Some(false) });
         let keys = [1, 1, 0, 3, MODEL, 0, 1, 1, PROJECTED, 0, 1, 25832, 3073, TEXTS, 6, 0];

@@ -1,4 +1,4 @@
-//! The `f` lines of an OBJ file, and the triangles that they make.
+//! The `f` lines of an OBJ file, and their triangles.
 
 use glam::DVec3;
 
@@ -6,13 +6,13 @@ use crate::io::fault::Fault;
 use crate::io::polygon;
 use crate::io::values::shown;
 
-/// The number of what a corner does not name.
+/// Index of an attribute that a corner does not name.
 const NONE: u32 = u32::MAX;
 
-/// Texture coordinates among vertex, texture coordinates and normal.
+/// Index of texture coordinates among vertex, texture coordinates and normal.
 const TEXTURE: usize = 1;
 
-/// A corner of a face: which vertex, texture coordinates and normal of the file it names.
+/// A corner of a face: indices of its vertex, texture coordinates and normal.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     vertex: u32,
@@ -24,26 +24,26 @@ struct Corner {
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     corners: Vec<Corner>,
-    /// Of each face where its corners end, and its material or [`NONE`].
+    /// The end of each face's corners, and its material or [`NONE`].
     faces: Vec<(usize, u32)>,
-    /// A corner without a normal was among them.
+    /// Some corner has no normal.
     lacks_normal: bool,
-    /// A corner with texture coordinates was.
+    /// Some corner has texture coordinates.
     has_texture: bool,
 }
 
-/// How corners are numbered where a face is, and what is wrong with them is said.
+/// The context of a face, by which the numbers of its corners are resolved.
 #[derive(Clone, Copy)]
 pub(super) struct Numbering {
-    /// Vertices, texture coordinates and normals so far, from which a number below 0 counts back.
+    /// Vertices, texture coordinates and normals so far; negative numbers count back from these.
     pub(super) counts: [usize; 3],
-    /// The line of the file.
+    /// The line number, for errors.
     pub(super) line: u64,
-    /// Texture coordinates that are none are an error; else they are as if there were none.
+    /// Whether invalid texture coordinates are an error; otherwise the corner has none.
     pub(super) strict: bool,
 }
 
-/// What corners name.
+/// The attributes that corners refer to.
 #[derive(Clone, Copy)]
 pub(super) struct Named<'a> {
     pub(super) positions: &'a [[f64; 3]],
@@ -53,28 +53,28 @@ pub(super) struct Named<'a> {
 
 /// A triangle of a face.
 pub(super) struct Triangle {
-    /// The numbers of its vertices in the file.
+    /// The indices of its vertices in the file.
     pub(super) vertices: [u32; 3],
-    /// The normals that its corners name, if every corner of the file names one.
+    /// The normals of its corners; None unless every corner of the file names one.
     pub(super) normals: Option<[[f64; 3]; 3]>,
-    /// Its corners' texture coordinates; not a number where one of them names none.
+    /// The texture coordinates of its corners; all NaN if one of them has none.
     pub(super) texture: [[f32; 2]; 3],
-    /// The number of its material; `u32::MAX` before the first `usemtl`.
+    /// The index of its material; `u32::MAX` before the first `usemtl`.
     pub(super) material: u32,
 }
 
 impl Faces {
-    /// There is none.
+    /// Whether there is no face.
     pub(super) fn is_empty(&self) -> bool {
         self.faces.is_empty()
     }
 
-    /// A corner names texture coordinates.
+    /// Whether some corner has texture coordinates.
     pub(super) fn have_texture(&self) -> bool {
         self.has_texture
     }
 
-    /// Adds the face of a line's `words`, which is of a material by its number.
+    /// Adds the face of a line's `words`, with the index of its material.
     pub(super) fn add<'w>(
         &mut self,
         words: impl Iterator<Item = &'w [u8]> + Clone,
@@ -105,9 +105,9 @@ impl Faces {
         Ok(())
     }
 
-    /// Fails if a corner names what the file, which has so many of each, has not. Of texture
-    /// coordinates or normals that a file has none of at all none is missed: programs write their
-    /// numbers anyway; nor is any of texture coordinates, if this is not `strict`.
+    /// Checks that all indices are below `counts`. Programs write indices of texture coordinates
+    /// and normals even where a file has none at all, so these are ignored; so is every invalid
+    /// index of texture coordinates unless `strict`.
     pub(super) fn check(&mut self, counts: [usize; 3], strict: bool) -> Result<(), Fault> {
         self.has_texture &= counts[TEXTURE] > 0;
         self.lacks_normal |= counts[2] == 0;
@@ -157,8 +157,8 @@ fn part_of(part: &[u8]) -> Option<i64> {
     std::str::from_utf8(part).ok()?.parse().ok()
 }
 
-/// The place of the `number`th of `count`, the first of which is 1, or, from the last one back, -1; of one that cannot be the place
-/// after all there may be.
+/// Converts an OBJ number to an index below `count`: 1 is the first, -1 the last. Invalid numbers
+/// give `NONE - 1`, which is out of range but differs from [`NONE`].
 fn place(number: i64, count: usize) -> u32 {
     let place = match number {
         1.. => Some(number - 1),

@@ -1,47 +1,47 @@
-//! The lines of an MTL file that say colours and images.
+//! The lines of an MTL file that define colours and images.
 
 use glam::DVec2;
 
 use crate::io::values::parse_number;
 
-/// A material as its library describes it.
+/// A material as its library defines it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Definition {
     /// `Kd`, linear light.
     pub(super) diffuse: Option<[f64; 3]>,
-    /// `d`: alpha.
+    /// `d`, the opacity.
     pub(super) dissolve: Option<f64>,
-    /// `map_Kd`.
+    /// `map_Kd`, the image.
     pub(super) map: Option<ColorMap>,
 }
 
-/// An image, and how texture coordinates become places in it.
+/// An image, and how texture coordinates map to positions in it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ColorMap {
     pub(super) name: String,
-    /// `-s`: what they are multiplied with.
+    /// `-s`: the factor on texture coordinates.
     pub(super) scale: DVec2,
-    /// `-o`: what is added then.
+    /// `-o`: the offset that is added after scaling.
     pub(super) offset: DVec2,
-    /// `-clamp on`: the image is there once, and its edges go on.
+    /// `-clamp on`: the image does not repeat, and its edge pixels continue outwards.
     pub(super) clamps: bool,
 }
 
 impl ColorMap {
-    /// The place in the image of texture coordinates.
+    /// Maps texture coordinates to the position in the image.
     pub(super) fn place(&self, [u, v]: [f32; 2]) -> [f32; 2] {
         (DVec2::new(u.into(), v.into()) * self.scale + self.offset).as_vec2().to_array()
     }
 
-    /// Places are what coordinates are.
+    /// Whether positions are the texture coordinates themselves.
     pub(super) fn is_plain(&self) -> bool {
         (self.scale, self.offset) == (DVec2::ONE, DVec2::ZERO)
     }
 }
 
-/// The materials of a library with their names, in order. Keywords may be in any case, and what
-/// cannot be read is passed over. At one line that it cannot read the parser gives up on all
-/// materials, so it gets no lines but those that it can.
+/// The materials of a library with their names, in order. Keywords may be in any case, and lines
+/// that cannot be read are skipped. One such line would make the parser drop all materials, so it
+/// is given only lines that it can read.
 pub(super) fn definitions(text: &str) -> Vec<(String, Definition)> {
     let (mut lines, mut named) = (String::new(), false);
     for line in text.lines() {
@@ -73,7 +73,7 @@ fn number(word: &str) -> Option<f64> {
     parse_number(word.as_bytes())
 }
 
-/// `r g b`, or `r` for all three.
+/// Parses `r g b`, or `r` for all three.
 fn color(rest: &str) -> Option<[f64; 3]> {
     let words = rest.split_whitespace().take_while(|word| !word.starts_with('#'));
     let values: Option<Vec<f64>> = words.map(number).collect();
@@ -84,7 +84,7 @@ fn color(rest: &str) -> Option<[f64; 3]> {
     }
 }
 
-/// Parses the rest of a `map_Kd` line: options, and the name of the file, which may have spaces.
+/// Parses the rest of a `map_Kd` line: options, then the name of the file, which may have spaces.
 pub(super) fn color_map(map: &str) -> Option<ColorMap> {
     let (mut scale, mut offset, mut clamps) = (DVec2::ONE, DVec2::ZERO, false);
     let mut rest = map.trim();
@@ -118,7 +118,7 @@ pub(super) fn color_map(map: &str) -> Option<ColorMap> {
     (!rest.is_empty()).then(|| ColorMap { name: rest.to_owned(), scale, offset, clamps })
 }
 
-/// A text's first word, and what follows it.
+/// The first word of a text, and the rest after it.
 pub(super) fn first_word(text: &str) -> (&str, &str) {
     let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
     (word, rest.trim_start())

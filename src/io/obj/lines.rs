@@ -11,45 +11,46 @@ use std::io::{BufRead, Read};
 
 use super::faces::{Faces, Named, Numbering, Triangle};
 
-/// No line is longer, with those that continue it; a polygon of a million corners is shorter.
+/// Longest line with its continuation lines, bytes. A polygon of a million corners is shorter.
 const LINE_LIMIT: usize = 1 << 24;
 
-/// What the lines of a file say.
+/// The content of a file.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
-    /// One colour and alpha for each position, or none at all, as the file has them; none of its own is not a number.
+    /// The colour and alpha of each position, as they are in the file, NaN for a vertex without
+    /// one; empty if no vertex has one.
     colors: Vec<[f64; 4]>,
-    /// Codes of `#MRGB` lines, one vertex after the other.
+    /// The codes of `#MRGB` lines, vertex by vertex.
     polypaint: Vec<[u8; 4]>,
     pub(super) normals: Vec<[f64; 3]>,
     pub(super) texture: Vec<[f32; 2]>,
-    /// What `mtllib` names.
+    /// The text after each `mtllib`.
     pub(super) libraries: Vec<String>,
-    /// Names after `usemtl`, each once, and their numbers.
+    /// The distinct names after `usemtl`; their indices are in `numbers`.
     pub(super) materials: Vec<String>,
     numbers: HashMap<String, u32>,
-    /// The number of the current one.
+    /// The index of the current material.
     material: Option<u32>,
     pub(super) faces: Faces,
-    /// Lines read.
+    /// The number of the current line.
     count: u64,
 }
 
-/// The lines that are not read yet.
+/// Reads line by line.
 struct Reader<'a, R> {
     reader: R,
     progress: &'a dyn Progress,
     unreported: u64,
-    /// Lines so far, those of the current one too.
+    /// Lines so far, the current one included.
     count: u64,
     line: Vec<u8>,
-    /// What lines end with.
+    /// The byte that ends a line.
     line_end: u8,
 }
 
 impl<R: BufRead> Reader<'_, R> {
-    /// Takes the next line, with those that continue it; `false` at the end of the file.
+    /// Reads the next line with its continuation lines; returns `false` at the end of the file.
     fn next_line(&mut self) -> Result<bool, Fault> {
         self.line.clear();
         if self.count == 0 {
@@ -87,11 +88,11 @@ impl<R: BufRead> Reader<'_, R> {
 }
 
 impl Lines {
-    /// Reads all of them. Texture coordinates that are none are an error only if `strict`: for
-    /// points it matters little where in a texture they are.
+    /// Reads all lines. Invalid texture coordinates are an error only if `strict`: for points they
+    /// matter little.
     ///
     /// # Errors
-    /// A number that is none, or a face that names what does not exist.
+    /// A word that is not a number, or a face that refers to an attribute that does not exist.
     pub(super) fn read(reader: impl BufRead, strict: bool, progress: &dyn Progress) -> Result<Self, Fault> {
         let line_end = b'\n';
         let mut rest = Reader { reader, progress, unreported: 0, count: 0, line: Vec::new(), line_end };
@@ -105,7 +106,7 @@ impl Lines {
         Ok(lines)
     }
 
-    /// Names after `mtllib`, as far as lines can be read.
+    /// The text after each `mtllib`, up to the first line that cannot be read.
     pub(super) fn libraries(reader: impl BufRead) -> Vec<String> {
         let mut rest = Reader { reader, progress: &(), unreported: 0, count: 0, line: Vec::new(), line_end: b'\n' };
         let mut libraries = Vec::new();
@@ -124,12 +125,12 @@ impl Lines {
         self.faces.triangles(named)
     }
 
-    /// Vertices, texture coordinates and normals so far.
+    /// The number of vertices, texture coordinates and normals so far.
     fn counts(&self) -> [usize; 3] {
         [self.positions.len(), self.texture.len(), self.normals.len()]
     }
 
-    /// Takes a line.
+    /// Parses a line.
     fn take(&mut self, line: &[u8], strict: bool) -> Result<(), Fault> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
@@ -158,8 +159,8 @@ impl Lines {
     }
 }
 
-/// The codes of a line `#MRGB` of ZBrush: of each vertex a mask, red, green and blue, two digits of
-/// base 16 each.
+/// The colours of a line `#MRGB`, which ZBrush writes: for each vertex a mask, red, green and blue,
+/// of two hexadecimal digits each.
 fn polypaint(digits: &[u8]) -> impl Iterator<Item = [u8; 4]> {
     let of_vertex = |digits: &[u8; 8]| {
         let code = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
@@ -169,20 +170,20 @@ fn polypaint(digits: &[u8]) -> impl Iterator<Item = [u8; 4]> {
     digits.as_chunks::<8>().0.iter().map_while(of_vertex)
 }
 
-/// What follows the keyword on a line, which may hold spaces.
+/// The text after the keyword of a line; it may contain spaces.
 fn rest_of(line: &[u8], keyword: &[u8]) -> String {
     let rest = line.trim_ascii().strip_prefix(keyword).unwrap_or_default();
     String::from_utf8_lossy(rest.trim_ascii()).into_owned()
 }
 
 impl Lines {
-    /// `u` or `u v`.
+    /// Parses `u` or `u v`.
     fn place<'w>(&self, mut words: impl Iterator<Item = &'w [u8]>) -> Result<[f32; 2], Fault> {
         let (u, v) = (self.number(words.next())? as f32, words.next());
         Ok([u, if v.is_some() { self.number(v)? as f32 } else { 0.0 }])
     }
 
-    /// The number of the material of this name.
+    /// The index of the material with this name, which is added if it is new.
     fn number_of(&mut self, name: String) -> u32 {
         let next = self.materials.len() as u32;
         let number = *self.numbers.entry(name.clone()).or_insert(next);
@@ -198,7 +199,7 @@ impl Lines {
         parse_number(word).ok_or_else(|| Fault::Malformed(format!("line {line}: '{}' is not a number", shown(word))))
     }
 
-    /// `x y z`, then nothing, or a weight `w`, or `r g b`, or `r g b a`.
+    /// Parses `x y z`, then nothing, or a weight `w`, or `r g b`, or `r g b a`.
     fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), Fault> {
         let mut numbers = [0.0; 7];
         let mut count = 0;
@@ -226,7 +227,7 @@ impl Lines {
         }
         match color {
             Some([r, g, b, a]) => {
-                // Vertices before the first coloured one.
+                // Vertices before this one have no colour.
                 self.colors.resize(self.positions.len(), [f64::NAN; 4]);
                 self.colors.push([r, g, b, a].map(|share| if share.is_nan() { 0.0 } else { share }));
             }
@@ -237,10 +238,11 @@ impl Lines {
         Ok(())
     }
 
-    /// One colour for each position as the file has it, if any has one.
+    /// The colour of each position as it is in the file; None if no position has one.
     ///
-    /// No standard says what colours range over: most programs write shares of 1, some codes of 0
-    /// to 255. Where no vertex has one, those of lines `#MRGB`, in the vertices' order, count.
+    /// There is no standard for the range of colours: most programs write 0 to 1, some codes of 0
+    /// to 255. If no vertex has a colour, those of `#MRGB` lines are used, in the order of
+    /// vertices.
     pub(super) fn colors(&self, ignore_alpha: bool) -> Option<RawColors> {
         let of = |values, number, alpha| {
             let numbers = Numbers { values, kind: Kind::of(number), alpha };

@@ -1,4 +1,4 @@
-//! MTL: what the triangles of an OBJ file are made of.
+//! MTL: the materials of an OBJ file's triangles.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -14,19 +14,21 @@ use crate::io::textures::Images;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line, shown};
 use crate::io::{Material, Mesh};
 
-/// No material library is longer, in bytes.
+/// Longest material library, bytes; the rest is ignored.
 const LONGEST: u64 = 1 << 24;
 
-/// Gives `mesh`, whose triangles have the numbers of these `names`, their materials from the
-/// `libraries` that the OBJ file at `path` names, and moves texture coordinates as their images
-/// want it (`-s`, `-o`). What cannot be read is said in the mesh's notes; a material that no
-/// library defines is white, and where there is none at all, no triangle has any.
+/// Gives `mesh` its materials. Triangles have indices into `names`, and `libraries` are those that
+/// the OBJ file at `path` names. Texture coordinates are mapped as the options `-s` and `-o` of the
+/// images say.
+///
+/// Libraries and images that cannot be read are named in the notes of the mesh. A material that no
+/// library defines is white. If none is defined at all, no triangle has a material.
 ///
 /// `Kd` is linear light, as a reflectivity is; `d` is alpha; an image of `map_Kd` is sRGB.
 ///
 /// # Errors
 ///
-/// [`Error::Malformed`](crate::Error::Malformed) for images that together have too many pixels.
+/// [`Error::Malformed`](crate::Error::Malformed) if all images together have too many pixels.
 pub(super) fn give(mesh: &mut Mesh, path: &Path, libraries: &[String], names: Vec<String>) -> Result<()> {
     let mut beside = Beside::of(path);
     let defined = defined(&mut beside, libraries, &mut mesh.notes);
@@ -47,7 +49,7 @@ pub(super) fn give(mesh: &mut Mesh, path: &Path, libraries: &[String], names: Ve
         if texture.is_some() && diffuse[..3] == [0.0; 3] {
             let name = shown(name.as_bytes());
             mesh.notes.push(format!(
-                "the material {name} is black, as its image is multiplied by its colour Kd, which is 0 0 0: Kd 1 1 1 shows the image"
+                "the material {name} is black, as its image is multiplied by its colour Kd, which is 0 0 0: set Kd 1 1 1 to show the image"
             ));
         }
         maps.push(map.filter(|_| texture.is_some()));
@@ -62,7 +64,7 @@ fn diffuse(definition: &Definition) -> [f32; 4] {
     [r, g, b, finite(definition.dissolve.unwrap_or(1.0)).clamp(0.0, 1.0)]
 }
 
-/// Moves texture coordinates to the places in their materials' images.
+/// Maps texture coordinates to positions in the images of their materials.
 fn place(mesh: &mut Mesh, maps: &[Option<&ColorMap>]) {
     let (Some(places), Some(materials)) = (&mut mesh.texture, &mesh.material) else { return };
     for (places, material) in places.iter_mut().zip(materials) {
@@ -73,7 +75,7 @@ fn place(mesh: &mut Mesh, maps: &[Option<&ColorMap>]) {
     }
 }
 
-/// The materials of all libraries by their names, of which the first counts.
+/// The materials of all libraries by name; the first definition of a name counts.
 fn defined(beside: &mut Beside, libraries: &[String], notes: &mut Vec<String>) -> HashMap<String, Definition> {
     let mut defined = HashMap::new();
     for library in libraries.iter().flat_map(|line| names_in(beside, line)).collect::<Vec<_>>() {
@@ -91,7 +93,7 @@ fn defined(beside: &mut Beside, libraries: &[String], notes: &mut Vec<String>) -
     defined
 }
 
-/// The `libraries` that the OBJ file at `path` names, and the images that these name.
+/// The files of the `libraries` that the OBJ file at `path` names, and of their images.
 pub(super) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
     let mut beside = Beside::of(path);
     let mut files = Vec::new();
@@ -120,7 +122,7 @@ fn text_of(path: &Path) -> io::Result<String> {
     Ok(String::from_utf8_lossy(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes)).into_owned())
 }
 
-/// The files that follow `mtllib`: several between spaces, or one with spaces in its name.
+/// The file names after `mtllib`: several, separated by spaces, or one that contains spaces.
 fn names_in<'l>(beside: &mut Beside, line: &'l str) -> Vec<&'l str> {
     let mut exists = |name: &str| beside.file(name).exists();
     if !exists(line) && line.split_whitespace().any(&mut exists) {

@@ -1,4 +1,5 @@
-//! Wavefront OBJ: the vertices of a mesh as points, with normals and radii from its faces; or its triangles as they are.
+//! Wavefront OBJ: the vertices of a mesh as points with normals and radii from its faces, or the
+//! triangles themselves.
 
 mod encoding;
 mod faces;
@@ -18,26 +19,29 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-/// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
-/// the faces are in.
+/// Reads the vertices of an OBJ file, one point for each `v` line in their order, whatever groups
+/// and materials the faces have.
 ///
-/// - Normals: the mean of the `vn` that a vertex's face corners name, where every corner of the file names one; else
-///   the mean of its faces' normals, weighted by area. A vertex of no face has none (zero). A file without faces but
-///   with one `vn` for each `v` pairs them.
-/// - Radii: 1.1 times the smallest with which disks at a triangle's corners cover it, the largest over the vertex's
-///   triangles; polygons are made of triangles; a vertex of no triangle has none (zero).
-/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1] or in [0, 255], as all of them say
-///   ([`RawColors`]); a fourth is alpha. Where no vertex has any, those of ZBrush's lines `#MRGB`.
-/// - What its triangles look like, by materials and images, as [`read_mesh`] reads them.
+/// - Normals: if every face corner of the file names a `vn`, the mean of those at a vertex;
+///   otherwise the mean of the normals of its faces, weighted by area. A vertex without a face has
+///   none (zero). In a file without faces but with one `vn` for each `v`, they are paired.
+/// - Radii: 1.1 times the smallest radius with which disks at a triangle's corners cover it, the
+///   largest over the vertex's triangles. Polygons are cut into triangles. A vertex without a
+///   triangle has none (zero).
+/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded; the numbers of all
+///   vertices decide whether they range to 1 or to 255 ([`RawColors`]). A fourth is alpha. If no
+///   vertex has any, those of ZBrush's lines `#MRGB` are used.
+/// - Materials and images of its triangles, as [`read_mesh`] reads them.
 ///
-/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines,
-/// points and curves are passed over, and a missing MTL file or image is no error, but named in
-/// [`Points::notes`].
+/// Text may be in UTF-16 of either byte order, with a byte order mark. Up is y. Lines, points and
+/// curves are skipped. A missing MTL file or image is not an error, but named in [`Points::notes`].
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
-/// a number is none or a face names a vertex or normal that does not exist; where a file has no normal at all, none is missed.
+/// [`Error::Read`](crate::Error::Read) if the system cannot read,
+/// [`Error::Malformed`](crate::Error::Malformed) if a word is not a number, or a face names a
+/// vertex or normal that does not exist. Normals that faces name are ignored if the file has none
+/// at all.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let path = input.path.clone();
     let mut points = read_with(input, false, progress, |lines| points(lines, &path, options.ignore_alpha))?;
@@ -46,22 +50,24 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     Ok(points)
 }
 
-/// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
+/// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with a vertex
+/// for every `v` line.
 ///
-/// Polygons are made of triangles, concave ones too. Corners have the `vn` they name where every
-/// corner of the file names one, else the mesh is faceted; a triangle all of whose corners name a
-/// `vt` has those. Colours are read as by [`read`], and lines, points and curves are passed over
-/// too. A file without faces is a mesh without triangles, and no error here.
+/// Polygons are cut into triangles, concave ones correctly. If every corner of the file names a
+/// `vn`, corners have these normals; otherwise the mesh is faceted. A triangle has texture
+/// coordinates if all of its corners name a `vt`. Colours are as in [`read`]; lines, points and
+/// curves are skipped. A file without faces is a mesh without triangles, and no error here.
 ///
-/// From the MTL files beside it, whatever the case of names and keywords, the reader takes the
-/// diffuse colour `Kd` (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or
-/// TGA, sRGB; with `-s`, `-o` and `-clamp`). Files that cannot be read are left out and named
-/// in [`Mesh::notes`].
+/// From MTL files, whatever the case of their names and keywords, the reader takes the diffuse
+/// colour `Kd` (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or TGA, sRGB;
+/// with `-s`, `-o` and `-clamp`). Files that cannot be read are left out and named in
+/// [`Mesh::notes`].
 ///
 /// # Errors
 ///
-/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has
-/// some, or images together have more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
+/// As [`read`]; also if a face names texture coordinates that do not exist, in a file that has
+/// some, or if all images together have more pixels than
+/// [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
     read_with(input, true, progress, |lines| {
@@ -76,14 +82,14 @@ pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -
     })
 }
 
-/// The libraries that an OBJ file at `path` names, and the images that these name.
+/// The libraries that the OBJ file at `path` names, and the images that these name.
 pub(super) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
     let length = file.metadata().map_or(0, |there| there.len());
     let named = file.try_clone().and_then(|file| encoding::decoded(BufReader::with_capacity(1 << 18, file), length));
     named.map_or(Vec::new(), |(reader, _)| material::companions(path, &Lines::libraries(reader)))
 }
 
-/// Opens the file and makes of its lines and faces what is asked for.
+/// Reads the lines of a file and passes them to `make`.
 fn read_with<T>(input: Input, strict: bool, progress: &dyn Progress, make: impl Fn(Lines) -> Result<T>) -> Result<T> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
@@ -95,7 +101,7 @@ fn read_with<T>(input: Input, strict: bool, progress: &dyn Progress, make: impl 
     made
 }
 
-/// The vertices of the lines of the file at `path`, and what their triangles look like.
+/// The vertices of the file at `path`, and the materials of their triangles.
 fn points(lines: Lines, path: &Path, ignore_alpha: bool) -> Result<Points> {
     let raw = lines.colors(ignore_alpha).map(Box::new);
     let has_faces = !lines.faces.is_empty();
@@ -128,7 +134,7 @@ fn points(lines: Lines, path: &Path, ignore_alpha: bool) -> Result<Points> {
     })
 }
 
-/// The mesh without its colours and materials, the libraries they are in, and their names.
+/// The mesh without colours and materials, the names of its libraries, and those of its materials.
 fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
     let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());

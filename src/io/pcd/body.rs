@@ -1,4 +1,4 @@
-//! The points of a PCD file, in each of the three ways they are written.
+//! The points of a PCD file in its three encodings.
 
 use std::io::{self, BufRead, Read};
 
@@ -10,17 +10,19 @@ use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::{parse_number, shown};
 
-/// Bytes of points that are decoded together.
+/// The size in bytes of the blocks that are decoded at once.
 const BLOCK: u64 = 1 << 19;
 
-/// No line of text is longer.
+/// The longest line of text, in bytes.
 const LINE_LIMIT: u64 = 1 << 24;
 
 fn ends_early(header: &Header, rows: u64) -> Fault {
     Fault::Malformed(format!("the header promises {} points, the file ends after {rows}", header.points))
 }
 
-/// A point a line, its numbers between white space; `left` bytes follow the header, here and below.
+/// Reads `ascii` data: a point per line, with its numbers separated by white space.
+///
+/// Here and below, `left` is the number of bytes after the header.
 pub(super) fn ascii(
     mut reader: impl BufRead,
     (header, columns): (&Header, Columns),
@@ -31,7 +33,8 @@ pub(super) fn ascii(
     let mut wanted: Vec<_> =
         cells.map(|(index, cell)| (cell.field, cell.part, index, columns.is_packed(index))).collect();
     wanted.sort_unstable();
-    // Each number takes a digit and a separator at least.
+    // A point takes at least two bytes, a digit and a separator, which limits the memory to
+    // reserve.
     let mut values = vec![0.0; columns.cells.len()];
     let mut reading = Reading::with_capacity(columns, header, header.points.min(left / 2))?;
     let (mut line, mut number, mut unreported) = (Vec::new(), header.lines, 0);
@@ -74,11 +77,11 @@ fn too_few(line: u64) -> Fault {
     Fault::Malformed(format!("line {line}: it has fewer numbers than the header has fields"))
 }
 
-/// The bits of a colour that is written as a number of the given type.
+/// Parses a packed colour that is written as a number of the given type; returns its bits.
 fn packed_color(word: &[u8], scalar: Scalar) -> Option<f64> {
     let text = std::str::from_utf8(word).ok()?;
     let bits = match scalar {
-        // Bits that are written as an integer, though the type says otherwise.
+        // Some programs write the bits as an integer although the type is F.
         Scalar::Float if text.bytes().all(|byte| byte.is_ascii_digit()) => text.parse().ok()?,
         Scalar::Float => {
             text.parse::<i32>().map(i32::cast_unsigned).or_else(|_| text.parse().map(f32::to_bits)).ok()?
@@ -89,7 +92,7 @@ fn packed_color(word: &[u8], scalar: Scalar) -> Option<f64> {
     Some(bits.into())
 }
 
-/// A point after the other.
+/// Reads `binary` data: one point after the other.
 pub(super) fn binary(
     mut reader: impl Read,
     (header, columns): (&Header, Columns),
@@ -124,7 +127,10 @@ pub(super) fn binary(
     Ok(reading.into_points())
 }
 
-/// The lengths of what follows, packed and not; then, packed, the first field of all points, the second of all, and so on.
+/// Reads `binary_compressed` data.
+///
+/// Two u32 give the compressed and the decompressed length. The decompressed data has the first
+/// field of all points, then the second of all, and so on.
 pub(super) fn compressed(
     mut reader: impl Read,
     (header, columns): (&Header, Columns),
@@ -145,7 +151,7 @@ pub(super) fn compressed(
     if header.points.checked_mul(header.row) != Some(length) {
         let points = header.points;
         return Err(Fault::Malformed(format!(
-            "the header promises {points} points, but the data of {length} bytes is not theirs"
+            "the header promises {points} points, but the data of {length} bytes does not fit them"
         )));
     }
     if packed_length > left.saturating_sub(8) {
@@ -174,11 +180,12 @@ pub(super) fn compressed(
     Ok(reading.into_points())
 }
 
-/// Where each cell's numbers lie in bytes: its field, its place, and whether it is a packed colour.
+/// For each cell its field, the place of its numbers in the data, and whether it is a packed
+/// colour.
 struct Cells<'a>(Vec<(&'a Field, Place, bool)>);
 
 impl<'a> Cells<'a> {
-    /// The places of `columns`, of fields that lie at `places`.
+    /// The cells of `columns`, in data where the fields lie at `places`.
     fn of(header: &'a Header, columns: &Columns, places: &[Place]) -> Self {
         let of_cell = |(index, cell): (usize, &Cell)| {
             let (field, Place { start, stride }) = (&header.fields[cell.field], places[cell.field]);
@@ -188,7 +195,7 @@ impl<'a> Cells<'a> {
         Self(columns.cells.iter().enumerate().map(of_cell).collect())
     }
 
-    /// Takes `rows` points.
+    /// Appends `rows` points.
     fn extend(&self, reading: &mut Reading, bytes: &[u8], rows: usize) {
         reading.extend(rows, |cell, row| {
             let (field, Place { start, stride }, packed) = self.0[cell];

@@ -1,4 +1,4 @@
-//! The header of a PCD file: what each point has, how many there are, and how they are written.
+//! The header of a PCD file: the fields of a point, the number of points, and their encoding.
 
 use std::io::{BufRead, Read};
 use std::str::{FromStr, SplitAsciiWhitespace};
@@ -6,10 +6,10 @@ use std::str::{FromStr, SplitAsciiWhitespace};
 use crate::io::fault::Fault;
 use crate::io::values::{line_end, shown};
 
-/// No header line is longer.
+/// The longest header line, in bytes.
 const LINE_LIMIT: u64 = 1 << 16;
 
-/// How the points are written.
+/// The encoding of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Data {
     Ascii,
@@ -25,7 +25,7 @@ pub(super) enum Scalar {
     Float,
 }
 
-/// One field of a point: `count` numbers of `size` bytes.
+/// A field of a point: `count` numbers of `size` bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub(super) name: String,
@@ -34,7 +34,7 @@ pub(super) struct Field {
     pub(super) count: u64,
 }
 
-/// Everything before the points.
+/// The header of a PCD file.
 #[derive(Clone, Debug)]
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
@@ -42,16 +42,16 @@ pub(super) struct Header {
     /// Width and height of an organised cloud.
     pub(super) image: Option<[u64; 2]>,
     pub(super) data: Data,
-    /// Bytes of a point.
+    /// Bytes per point.
     pub(super) row: u64,
     /// Lines and bytes of the header.
     pub(super) lines: u64,
     pub(super) bytes: u64,
-    /// What lines end with.
+    /// The byte that ends a line: `\n` or `\r`.
     pub(super) line_end: u8,
 }
 
-/// Reads up to and including the line `DATA`.
+/// Reads the header up to and including the line `DATA`.
 pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let line_end = line_end(reader)?;
     let mut raw = Raw::default();
@@ -62,10 +62,10 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let complete = line.last() == Some(&line_end);
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
-        // Some programs write words in capitals, some in lower case.
+        // Keywords may be in any case.
         let keyword = words.next().map(str::to_ascii_uppercase);
         let keyword = keyword.as_deref();
-        // The last line of a file without points may lack its end.
+        // The last line of a file without points may lack its line end.
         if !complete && keyword != Some("DATA") {
             return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
                 format!("line {number} of the PCD header is longer than {LINE_LIMIT} bytes")
@@ -89,7 +89,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     Err(Fault::Malformed("the PCD header has no end".into()))
 }
 
-/// What the lines say.
+/// The values of the header lines.
 #[derive(Default)]
 struct Raw {
     names: Vec<String>,
@@ -106,7 +106,7 @@ impl Raw {
         self.names.is_empty() && self.sizes.is_empty() && self.scalars.is_empty()
     }
 
-    /// Takes a line; that of `DATA` ends the header.
+    /// Adds a header line. Returns the encoding for the line `DATA`, which ends the header.
     fn take(&mut self, keyword: Option<&str>, words: SplitAsciiWhitespace<'_>) -> Result<Option<Data>, String> {
         match keyword {
             None | Some("VERSION" | "VIEWPOINT") => {}
@@ -140,7 +140,7 @@ impl Raw {
         Ok(None)
     }
 
-    /// The fields and the number of points, which must agree with each other.
+    /// Checks that the header lines agree, and returns the fields and the number of points.
     fn finish(self) -> Result<(Vec<Field>, u64), String> {
         let count = self.names.len();
         let counts = self.counts.unwrap_or_else(|| vec![1; count]);
@@ -161,7 +161,7 @@ impl Raw {
         };
         if let Some(field) = fields.iter().find(|field| !sized(field)) {
             let name = shown(field.name.as_bytes());
-            return Err(format!("its field '{name}' has numbers of {} bytes, which cannot be", field.size));
+            return Err(format!("its field '{name}' has numbers of {} bytes, which its type forbids", field.size));
         }
         let area = match (self.width, self.height) {
             (Some(width), height) => Some(width.checked_mul(height.unwrap_or(1)).ok_or("its image is too large")?),
@@ -169,7 +169,7 @@ impl Raw {
         };
         match (self.points, area) {
             (Some(points), Some(area)) if points != area => {
-                Err(format!("its header says {points} points, but an image of {area}"))
+                Err(format!("its header gives {points} points, but WIDTH x HEIGHT is {area}"))
             }
             (Some(points), _) | (None, Some(points)) => Ok((fields, points)),
             (None, None) => Err("its header does not say how many points there are".into()),

@@ -1,13 +1,17 @@
-//! LZF (Lehmann's LibLZF), with which `binary_compressed` files are packed: runs of bytes as they are, and copies of earlier ones.
+//! LZF decompression (Lehmann's LibLZF) for `binary_compressed` files.
 
-/// No three bytes of a compressed stream become more.
+/// The longest copy that a token gives, 7 + 2 + 255 bytes: no input byte expands to more.
 pub(super) const MOST_GROWTH: u64 = 264;
 
-/// The `length` bytes that `packed` stands for; none if it stands for more or fewer, or copies from before the start.
+/// Decompresses `packed` to `length` bytes. None if the result has another length, or if a copy
+/// starts before the data.
 ///
-/// A token's upper three bits are the length of a copy, less 2; 0 stands for a run of bytes, whose number, less 1, is in the
-/// lower five; 7 for a length to which the next byte is added. Those five and a byte more are the distance of the copy, less 1.
-/// Copies may reach into themselves.
+/// The upper three bits of a token are n, the lower five are m, and b is the byte that follows.
+/// - n = 0: m + 1 literal bytes follow.
+/// - n = 1 to 6: a copy of n + 2 bytes from the distance 256 m + b + 1.
+/// - n = 7: the same, but a byte before b is added to the length.
+///
+/// A copy may overlap its own output.
 pub(super) fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     let mut out = Vec::new();
     out.try_reserve_exact(length).ok()?;
@@ -48,10 +52,10 @@ mod tests {
 
     #[test]
     fn runs_and_copies_are_unpacked() {
-        // A run of three, the last two of them four times over, and a run of one.
+        // A literal run of three bytes, a copy of 8 bytes from distance 2, a literal run of one.
         let packed = [2, b'a', b'b', b'c', (6 << 5), 1, 0, b'!'];
         assert_eq!(unpack(&packed, 12).as_deref(), Some(&b"abcbcbcbcbc!"[..]));
-        // A long copy: 7 + 2 + 255 of one byte.
+        // A long copy: 7 + 2 + 255 times the same byte.
         let packed = [0, b'x', 7 << 5, 255, 0];
         assert_eq!(unpack(&packed, 265), Some(vec![b'x'; 265]));
         assert_eq!(unpack(&[], 0), Some(vec![]));

@@ -1,4 +1,4 @@
-//! PCD, the format of the Point Cloud Library: version 0.7, and what older versions have of it.
+//! PCD, the format of the Point Cloud Library: version 0.7, and older versions where they agree.
 
 mod body;
 mod header;
@@ -16,21 +16,25 @@ use points::Columns;
 
 /// Reads the points of a PCD file: `ascii`, `binary` or `binary_compressed`.
 ///
-/// - `x y z` of any type become f64 positions; organised clouds mark missing points by coordinates that are not finite.
+/// - `x y z` of any type become f64 positions. Organised clouds mark missing points by non-finite
+///   coordinates.
 /// - `normal_x normal_y normal_z`, or one field of three numbers, become normals.
-/// - `rgb` or `rgba`, one number of 4 bytes whatever its type, become 8-bit sRGB codes: blue in the lowest byte, then green,
-///   red, and in `rgba` alpha, unless that is 0 in the whole file. Some programs write these codes as the value of a float.
-/// - `red green blue` with or without `alpha`, or one field of three numbers or four, become colours by what they range over.
-/// - `intensity` becomes grey where there are no colours, or all are zero.
+/// - `rgb` or `rgba`, one number of 4 bytes of any type, becomes an 8-bit sRGB code: blue in the
+///   lowest byte, then green, red, and in `rgba` alpha, unless alpha is 0 in the whole file. Some
+///   programs write this code as the value of a float.
+/// - `red green blue` with or without `alpha`, or one field of three or four numbers, become
+///   colours according to the range of their values.
+/// - `intensity` becomes grey if there are no colours, or all are zero.
 ///
-/// Names are those that programs write; other fields are skipped. Coordinates stay relative to the
-/// sensor whose pose the line `VIEWPOINT` gives, as most programs take them.
+/// Other common names of these fields are accepted; other fields are skipped. Coordinates stay
+/// relative to the sensor, whose pose the line `VIEWPOINT` gives: most programs ignore it too.
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the
-/// header is not PCD's, `x`, `y` or `z` is missing, the file ends before the points that its header promises, a number in text
-/// is none, or compressed data cannot be decoded.
+/// [`Error::Read`](crate::Error::Read) where the system cannot read.
+/// [`Error::Malformed`](crate::Error::Malformed) where the header is invalid, `x`, `y` or `z` is
+/// missing, the file ends before the number of points in its header, a number in text is invalid,
+/// or compressed data cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

@@ -1,4 +1,4 @@
-//! What the fields of a PCD file mean, and the points they become.
+//! The meaning of a PCD file's fields, and their conversion to points.
 
 use super::header::{Field, Header, Scalar};
 use crate::io::Points;
@@ -8,14 +8,14 @@ use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::finite;
 
-/// One number of a point: which field's, and which of the numbers of that.
+/// One number of a point: the index of its field, and its index within that field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
     pub(super) field: usize,
     pub(super) part: u64,
 }
 
-/// Which numbers are used: others are indices of these.
+/// The numbers of a point that are used. All other members are indices into `cells`.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
     pub(super) cells: Vec<Cell>,
@@ -25,12 +25,12 @@ pub(super) struct Columns {
     intensity: Option<usize>,
 }
 
-/// Where a colour is.
+/// The cells of a colour.
 #[derive(Clone, Copy, Debug)]
 enum Color {
-    /// In the four bytes of one number, of this type, and whether it has an alpha.
+    /// A cell whose four bytes are the colour, its type, and whether it has an alpha.
     Packed(usize, Scalar, bool),
-    /// In numbers of this type, alpha of that one.
+    /// Cells of red, green and blue, the cell of alpha, and the types of colour and alpha.
     Channels([usize; 3], Option<usize>, [Number; 2]),
 }
 
@@ -49,7 +49,7 @@ impl Field {
 impl Columns {
     pub(super) fn of(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
         let fields = &header.fields;
-        // A field of no numbers has no name that could be meant.
+        // A field with a count of 0 is ignored, whatever its name.
         let names = fields.iter().map(|field| if field.count > 0 { field.name.as_str() } else { "" });
         let named = |name: &str| find(&[name], names.clone());
         let mut cells = Vec::new();
@@ -91,12 +91,12 @@ impl Columns {
         Ok(Self { cells, position, normal, color, intensity })
     }
 
-    /// Whether a cell's four bytes are colours, whatever the type of its number.
+    /// Whether a cell's four bytes are a packed colour, whatever its type.
     pub(super) fn is_packed(&self, cell: usize) -> bool {
         matches!(self.color, Some(Color::Packed(packed, ..)) if packed == cell)
     }
 
-    /// The attributes of a point, and which of them are used.
+    /// The attributes of a point, and whether each is used.
     pub(super) fn attributes(&self, header: &Header) -> Vec<Attribute> {
         let colors: Vec<usize> = match self.color {
             Some(Color::Packed(cell, ..)) => vec![cell],
@@ -112,27 +112,28 @@ impl Columns {
             };
             Attribute::new(own.name.clone(), cell.is_some(), role)
         };
-        // Padding has the name of nothing.
+        // Padding has the name `_`.
         header.fields.iter().enumerate().filter(|(_, field)| field.name != "_").map(of_field).collect()
     }
 }
 
-/// The points of a file while they are being read.
+/// The points of a file while it is being read.
 pub(super) struct Reading {
     columns: Columns,
     positions: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
     codes: Vec<[u8; 4]>,
     floats: Vec<[f32; 4]>,
-    /// Intensities, as long as no colour says anything.
+    /// Intensities, stored until the first non-zero colour.
     shades: Vec<f32>,
     colored: bool,
-    /// The intensities are integers.
+    /// Whether the intensities are integers.
     integer: bool,
 }
 
 impl Reading {
-    /// Room for `rows`, which must be a number that the file's length allows.
+    /// Reserves memory for `rows` points; the caller has checked that number against the file's
+    /// length.
     pub(super) fn with_capacity(columns: Columns, header: &Header, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
         let of = |used: bool| if used { rows } else { 0 };
@@ -152,8 +153,8 @@ impl Reading {
         self.positions.len() as u64
     }
 
-    /// Takes `rows` points; `value` gives the number of a cell in each, of a packed colour its
-    /// bits.
+    /// Appends `rows` points. `value(cell, row)` is the number of a cell, or the bits of a packed
+    /// colour.
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let columns = &self.columns;
         self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
@@ -202,7 +203,7 @@ impl Reading {
                 Some(Numbers { values: Values::Bytes(self.codes), kind: Kind::of(Number::Byte), alpha })
             }
             Some(Color::Channels(_, alpha, [kind, alpha_kind])) => {
-                // Bytes are judged as what they are: codes.
+                // 8-bit numbers are stored as codes.
                 let is_byte = kind == Number::Byte && (alpha.is_none() || alpha_kind == Number::Byte);
                 let code = |[r, g, b, a]: &[f32; 4]| {
                     [*r as u8, *g as u8, *b as u8, if alpha.is_some() { *a as u8 } else { 255 }]
@@ -228,7 +229,8 @@ impl Reading {
     }
 }
 
-/// A number of a colour: signed ones are unsigned ones that a program took for signed.
+/// Converts a colour number to f32. Negative 8-bit and 16-bit numbers are unsigned ones that a
+/// program declared as signed.
 fn unsigned(value: f64, kind: Number) -> f32 {
     match kind {
         Number::Byte if value < 0.0 => (value + 256.0) as f32,
@@ -237,13 +239,16 @@ fn unsigned(value: f64, kind: Number) -> f32 {
     }
 }
 
-/// Some programs write a packed colour as the value of a float and not as its bits: then all of
-/// them are whole numbers of several magnitudes, which bits of colours hardly are.
+/// Converts packed colours that a program wrote as the value of a float, not as its bits.
+///
+/// Such floats are recognised because all of them are whole numbers and their upper bytes differ,
+/// which hardly happens to the bits of colours.
 fn unpack_values(codes: &mut [[u8; 4]]) {
     let value = |[red, green, blue, alpha]: [u8; 4]| f32::from_le_bytes([blue, green, red, alpha]);
     let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;
     let all_whole = codes.iter().all(|code| is_whole(value(*code)));
-    // Points of one colour whose fourth byte was never set, as in PCL's own sample, are whole too.
+    // Colours whose fourth byte was never set, as in PCL's own sample, may be whole numbers too. If
+    // all have the same upper byte, they are taken as bits.
     let one_exponent = codes.windows(2).all(|pair| pair[0][3] == pair[1][3]);
     if !all_whole || one_exponent {
         return;
@@ -254,7 +259,7 @@ fn unpack_values(codes: &mut [[u8; 4]]) {
     }
 }
 
-/// Where a field's numbers lie in bytes: the first, and how far each point's is from that of the one before.
+/// The place of a field's numbers in the data: the first point's offset, and the stride per point.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Place {
     pub(super) start: usize,
@@ -262,12 +267,12 @@ pub(super) struct Place {
 }
 
 impl Field {
-    /// The number at `at`, little-endian; of a packed colour its bits.
+    /// The little-endian number at the offset `at`; the bits of a packed colour.
     pub(super) fn number(&self, bytes: &[u8], at: usize, packed: bool) -> f64 {
         use Scalar::{Float, Signed, Unsigned};
         macro_rules! number {
             ($type:ty) => {
-                // Places lie within the bytes.
+                // Offsets lie within the data, as its length was checked.
                 bytes
                     .get(at..)
                     .and_then(|rest| rest.first_chunk().copied())

@@ -1,4 +1,4 @@
-//! PLY in text: words between white space, wherever lines end.
+//! ASCII PLY: words separated by white space; line ends have no meaning.
 
 use super::contents::{Contents, ends_early, negative_list};
 use super::faces::{Faces, Role, needed};
@@ -10,10 +10,10 @@ use crate::io::values::{parse_number, shown};
 use crate::io::{Points, Tree, TreeRow};
 use std::io::{self, BufRead};
 
-/// A number in text is shorter.
+/// Longest prefix of a word that is kept, bytes; any number that is written as text is shorter.
 const TOKEN_LIMIT: usize = 1 << 10;
 
-/// Reads vertices and faces; the reader is behind the header.
+/// Reads the needed elements; `reader` must stand just after the header.
 pub(super) fn read(
     reader: impl BufRead,
     header: &Header,
@@ -36,7 +36,7 @@ pub(super) fn read(
     Ok(contents)
 }
 
-/// Reads faces, and passes over what is none.
+/// Reads the rows of an element of faces, and skips those of any other element.
 fn others(tokens: &mut Tokens<impl BufRead>, element: &Element, faces: &mut Faces) -> Result<(), Fault> {
     let roles = faces.roles(element);
     for row in 0..if element.properties.is_empty() { 0 } else { element.count } {
@@ -66,7 +66,7 @@ fn vertices(
     progress: &dyn Progress,
 ) -> Result<(Points, Vec<TreeRow>), Fault> {
     let layout = Layout::of(vertex)?;
-    // Each number takes a digit and a separator at least.
+    // In text each number takes at least one digit and one separator.
     let possible = length / (2 * layout.scalars.len().max(1)) as u64;
     let mut vertices = Vertices::with_capacity(&layout, vertex.count.min(possible))?;
     let mut used = vec![None; layout.scalars.len()];
@@ -101,7 +101,7 @@ fn vertices(
     Ok(vertices.into_points())
 }
 
-/// The words of a text, with the line they are on.
+/// The words of a text, and the number of the current line.
 struct Tokens<R> {
     reader: R,
     line: u64,
@@ -110,7 +110,7 @@ struct Tokens<R> {
 }
 
 impl<R: BufRead> Tokens<R> {
-    /// Moves to the next word; `false` at the end of the file.
+    /// Reads the next word into `token`; returns `false` at the end of the file.
     fn advance(&mut self) -> Result<bool, Fault> {
         self.token.clear();
         loop {
@@ -139,7 +139,7 @@ impl<R: BufRead> Tokens<R> {
         }
     }
 
-    /// The next number; `None` at the end of the file.
+    /// Reads the next number; returns `None` at the end of the file.
     fn number(&mut self) -> Result<Option<f64>, Fault> {
         if !self.advance()? {
             return Ok(None);
@@ -150,7 +150,7 @@ impl<R: BufRead> Tokens<R> {
         }
     }
 
-    /// Passes over one property; `false` where the file ends in it.
+    /// Skips one property; returns `false` if the file ends inside it.
     fn skip(&mut self, element: &Element, row: u64, kind: Kind) -> Result<bool, Fault> {
         if matches!(kind, Kind::Scalar(_)) {
             return self.advance();
@@ -165,7 +165,7 @@ impl<R: BufRead> Tokens<R> {
         })
     }
 
-    /// Gives each number of a list to `take`; `false` where the file ends in it.
+    /// Passes each number of a list to `take`; returns `false` if the file ends inside the list.
     fn list(
         &mut self,
         element: &Element,
@@ -180,7 +180,7 @@ impl<R: BufRead> Tokens<R> {
         Ok(true)
     }
 
-    /// The length of a list; `None` at the end of the file.
+    /// Reads the length of a list; returns `None` at the end of the file.
     fn length(&mut self, element: &Element, row: u64) -> Result<Option<u64>, Fault> {
         let Some(items) = self.number()? else { return Ok(None) };
         if items < 0.0 {

@@ -1,4 +1,4 @@
-//! Binary PLY: blocks of rows, decoded column by column.
+//! Binary PLY: rows are read in blocks, and each block is decoded column by column.
 
 use super::contents::{Contents, ends_early, negative_list};
 use super::faces::{Faces, Role, needed};
@@ -10,10 +10,10 @@ use crate::io::fault::Fault;
 use crate::io::{Points, Tree, TreeRow};
 use std::io::{self, BufRead, Read};
 
-/// Bytes of rows, or of a list, that are decoded together.
+/// Size of a block of rows, or of a part of a list, that is decoded at once, bytes.
 const BLOCK: usize = 1 << 19;
 
-/// Reads vertices and faces; the reader is behind the header.
+/// Reads the needed elements; `reader` must stand just after the header.
 pub(super) fn read<const BIG: bool>(
     mut reader: impl BufRead,
     header: &Header,
@@ -43,7 +43,7 @@ pub(super) fn read<const BIG: bool>(
     Ok(contents)
 }
 
-/// The rows of an element with places, and of nodes what else they have.
+/// Reads the rows of an element with positions, and the [`TreeRow`]s if it is the nodes.
 pub(super) fn vertices<const BIG: bool>(
     mut reader: impl BufRead,
     vertex: &Element,
@@ -72,7 +72,7 @@ pub(super) fn vertices<const BIG: bool>(
     Ok(decoder.vertices.into_points())
 }
 
-/// The same of rows without lists that are in memory.
+/// Decodes `rows` that are in memory and have no lists, as [`vertices`] does.
 pub(super) fn vertices_in<const BIG: bool>(rows: &[u8], layout: &Layout) -> Result<(Points, Vec<TreeRow>), Fault> {
     let mut decoder = Decoder::new(layout, (rows.len() / layout.row_size) as u64)?;
     rows.chunks(layout.block_rows() * layout.row_size).for_each(|block| decoder.take::<BIG>(block));
@@ -80,17 +80,17 @@ pub(super) fn vertices_in<const BIG: bool>(rows: &[u8], layout: &Layout) -> Resu
 }
 
 impl Layout {
-    /// How many rows, which have a place at least, are decoded together.
+    /// Rows in a block; `row_size` is not 0, as every layout has a position.
     fn block_rows(&self) -> usize {
         (BLOCK / self.row_size).max(1)
     }
 }
 
-/// What is made of blocks of rows.
+/// Decodes blocks of rows into vertices.
 struct Decoder<'a> {
     layout: &'a Layout,
     vertices: Vertices<'a>,
-    /// The numbers of each column of a block.
+    /// The numbers of the current block, one vector for each column of the layout.
     columns: Vec<Vec<f64>>,
 }
 
@@ -100,7 +100,7 @@ impl<'a> Decoder<'a> {
         Ok(Self { layout, vertices, columns: vec![Vec::new(); layout.columns.len()] })
     }
 
-    /// Adds whole rows.
+    /// Decodes and adds a block of whole rows.
     fn take<const BIG: bool>(&mut self, block: &[u8]) {
         let Self { layout, vertices, columns } = self;
         for (values, column) in columns.iter_mut().zip(&layout.columns) {
@@ -110,10 +110,11 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// The numbers of one column of a block, in place of what `values` held.
+/// Decodes one column of a block into `values`, replacing its content.
 fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar: Scalar, values: &mut Vec<f64>) {
     fn strided<const N: usize>(block: &[u8], row_size: usize, offset: usize) -> impl Iterator<Item = [u8; N]> {
-        // Columns lie within their rows. `filter_map` has no exact size, by which `extend` makes room once.
+        // Columns lie within their rows, so the default is never used. `filter_map` would have no
+        // exact size, with which `extend` reserves its memory once.
         let number = move |row: &[u8]| row.get(offset..).and_then(|rest| rest.first_chunk().copied()).unwrap_or([0; N]);
         block.chunks_exact(row_size).map(number)
     }
@@ -137,7 +138,8 @@ fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar:
     }
 }
 
-/// Fills `block` with the scalar properties of up to `wanted` rows, skipping lists; how many rows were whole.
+/// Fills `block` with the scalar properties of up to `wanted` rows and skips lists. Returns the
+/// number of whole rows.
 fn compact_rows<const BIG: bool>(
     reader: &mut impl BufRead,
     element: &Element,
@@ -165,7 +167,7 @@ fn compact_rows<const BIG: bool>(
     Ok(wanted)
 }
 
-/// The length of a list; `None` where the file ends in it.
+/// Reads the length of a list; returns `None` if the file ends inside it.
 fn list_length<const BIG: bool>(
     reader: &mut impl BufRead,
     element: &Element,
@@ -183,7 +185,7 @@ fn list_length<const BIG: bool>(
     if items < 0.0 { Err(negative_list(element, row)) } else { Ok(Some(items as u64)) }
 }
 
-/// Skips one list; `false` where the file ends in it.
+/// Skips one list; returns `false` if the file ends inside it.
 fn skip_list<const BIG: bool>(
     reader: &mut impl BufRead,
     element: &Element,
@@ -196,7 +198,7 @@ fn skip_list<const BIG: bool>(
     Ok(skip_bytes(reader, size)? == size)
 }
 
-/// Gives each number of one list to `take`; `false` where the file ends in it.
+/// Passes each number of one list to `take`; returns `false` if the file ends inside the list.
 fn list<const BIG: bool>(
     reader: &mut impl BufRead,
     element: &Element,
@@ -276,7 +278,7 @@ fn skip_bytes(reader: &mut impl BufRead, count: u64) -> io::Result<u64> {
     io::copy(&mut reader.take(count), &mut io::sink())
 }
 
-/// Fills `bytes`; fewer only where the file ends.
+/// Fills `bytes` and returns their count, which is smaller only if the file ends.
 pub(super) fn read_until_end(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < bytes.len() {
@@ -298,7 +300,7 @@ mod tests {
     use super::*;
     use crate::io::ply::header;
 
-    /// In either order of bytes, and of more rows than a block has.
+    /// In both byte orders, and with more rows than one block holds.
     #[test]
     fn rows_in_memory_are_those_of_a_stream() {
         let text = "ply\nformat binary_little_endian 1.0\nelement vertex 90000\nproperty double x\nproperty float y\nproperty short z\n\

@@ -1,4 +1,4 @@
-//! What the values of a PLY file are read into, and what is wrong with them in text and in binary alike.
+//! The content of a PLY file, and the errors that text and binary files share.
 
 use super::faces::Faces;
 use super::header::Element;
@@ -7,7 +7,7 @@ use crate::io::values::shown;
 use crate::io::{Points, Tree};
 use crate::scene::Whole;
 
-/// What is read of a file.
+/// Everything that is read after the header.
 pub(super) struct Contents {
     pub(super) points: Points,
     pub(super) faces: Faces,
@@ -15,7 +15,7 @@ pub(super) struct Contents {
     pub(super) whole: Option<Whole>,
 }
 
-/// The file ended inside an element.
+/// The error of a file that ends inside `element`, after `rows` whole rows.
 pub(super) fn ends_early(element: &Element, rows: u64) -> Fault {
     let rows_of = match element.name.as_str() {
         "vertex" => "vertices".to_owned(),

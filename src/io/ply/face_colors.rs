@@ -1,10 +1,10 @@
-//! Colours of faces.
+//! Colours of faces: from the numbers in the file to linear light.
 
 use super::header::Scalar;
 use crate::io::values::finite;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 
-/// Names that programs give the channels of a colour: red, green, blue and alpha.
+/// Property names of the channels red, green, blue and alpha, as programs write them.
 const NAMES: [[&str; 3]; 4] = [
     ["red", "r", "diffuse_red"],
     ["green", "g", "diffuse_green"],
@@ -12,24 +12,24 @@ const NAMES: [[&str; 3]; 4] = [
     ["alpha", "a", "diffuse_alpha"],
 ];
 
-/// Which channel a property is.
+/// Index of the channel (0 to 3) that a property of this name holds.
 pub(super) fn channel(name: &str) -> Option<usize> {
     NAMES.iter().position(|names| names.contains(&name))
 }
 
-/// The number that stands for all of a channel.
+/// The value that means full intensity, and the encoding of the values below it.
 #[derive(Clone, Copy, PartialEq)]
 enum Full {
-    /// Linear light, 0 to 1.
+    /// Linear light; full is 1.
     Light,
-    /// sRGB codes up to this.
+    /// sRGB codes; full is this value.
     Code(f64),
 }
 
 impl Full {
-    /// The full number of a type of which `largest` is the largest: floats up to 1 are linear
-    /// light, all else are codes of 8 bits, or where they are larger of 16 bits, or of as many as
-    /// there are.
+    /// Chooses the full value of a channel by its type and the `largest` value in the file: floats
+    /// up to 1 are linear light; all others are codes whose full value is 255, 65535 or `largest`,
+    /// whichever is the first that no value exceeds.
     fn of(scalar: Scalar, largest: f32) -> Self {
         match scalar {
             Scalar::F32 | Scalar::F64 if largest <= 1.0 => Self::Light,
@@ -40,12 +40,12 @@ impl Full {
     }
 }
 
-/// Colours as the file has them, by the types of their channels, in linear light; those that are
-/// not numbers become the default.
+/// Converts colours of the file, whose channels have these types, to linear light with straight
+/// alpha. Colours whose red, green or blue is not finite become [`DEFAULT_COLOR`].
 pub(super) fn linear(mut colors: Vec<[f32; 4]>, channels: [Option<Scalar>; 4]) -> Vec<[f32; 4]> {
     let has_alpha = channels[3].is_some();
     for (channel, _) in channels.iter().enumerate().filter(|(_, scalar)| **scalar == Some(Scalar::I8)) {
-        // The codes of a signed byte go on below 0.
+        // Signed bytes hold unsigned codes: 128 to 255 are stored as -128 to -1.
         let codes = colors.iter_mut().map(|color| &mut color[channel]);
         codes.filter(|code| **code < 0.0).for_each(|code| *code += 256.0);
     }

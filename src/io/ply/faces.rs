@@ -1,4 +1,4 @@
-//! The triangles of a PLY file: polygons of the element `face`, strips of the element `tristrips`.
+//! The triangles of a PLY file: polygons of the element `face` and strips of `tristrips`.
 
 use super::face_colors;
 use super::header::{Element, Kind, Property, Scalar};
@@ -8,96 +8,99 @@ use crate::io::fault::Fault;
 use crate::io::polygon;
 use glam::DVec3;
 
-/// How a list of vertices becomes triangles.
+/// How a list of vertices is turned into triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
-    /// One polygon.
+    /// The list is the outline of one polygon.
     Polygon,
-    /// Each vertex makes a triangle with the two before it, every second one turned round; -1 begins another strip.
+    /// Each vertex forms a triangle with the two before it, of which every second one is reversed;
+    /// -1 starts a new strip.
     Strip,
 }
 
-/// What a property of a face is read for.
+/// How a property of a face is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// The list of its vertices.
+    /// The list of its vertex indices.
     Corners,
     /// The list of its texture coordinates: u and v of each corner, as MeshLab writes them.
     Texture,
-    /// The number of its texture.
+    /// The index of its texture.
     TextureNumber,
-    /// A channel of its colour: red, green, blue or alpha.
+    /// A colour channel: 0 to 3 for red, green, blue and alpha.
     Color(usize),
-    /// Nothing.
+    /// It is skipped.
     Unused,
 }
 
-/// Triangles while they are read, and the row that they are read from.
+/// Collects triangles row by row, with the state of the current row.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     triangles: Vec<[u32; 3]>,
-    /// The polygons of more than three corners: their first triangle, and how many.
+    /// Polygons of more than three corners: the index of their first triangle, and their count.
     polygons: Vec<(usize, usize)>,
-    /// Whether rows may have texture coordinates, and numbers of textures.
+    /// Whether rows of the current element have texture coordinates, and whether those of any
+    /// element have texture indices.
     placed: bool,
     numbered: bool,
-    /// The types of the channels of colours, of which those of alpha may be absent; none where rows
-    /// have no colours.
+    /// The types of the colour channels, alpha optional; None if rows have no colour.
     channels: Option<[Option<Scalar>; 4]>,
-    /// Colours of the triangles, one each, as the file has them; not a number for those without.
-    /// None if no row has any.
+    /// One colour per triangle, numbers as in the file, NaN if its row has none; empty if no
+    /// element of faces has colours.
     colors: Vec<[f32; 4]>,
-    /// Texture coordinates of the triangles, one each, or as many as there were before the first face without.
+    /// Texture coordinates of each triangle; they end at the first face that has none.
     texture: Vec<[[f32; 2]; 3]>,
-    /// Which of the file's textures each triangle has.
+    /// Index of each triangle's texture among the textures of the file.
     texture_numbers: Vec<u32>,
     shape: Option<Shape>,
-    /// Which corner of the row is next, and where its triangles begin.
+    /// Index of the row's next corner, and of the row's first triangle.
     corner: usize,
     first: usize,
-    /// The corners of each of the row's triangles, by their number in the row.
+    /// Corner indices within the row, for each triangle of the row.
     corners: Vec<[usize; 3]>,
-    /// The row's texture coordinates, and its texture.
+    /// The row's texture coordinates as a flat list, and its texture index.
     row_texture: Vec<f32>,
     row_number: u32,
     /// The row's colour.
     row_color: [f32; 4],
-    /// The last two vertices of a strip, or the first and the last one of a polygon, with their numbers in the row.
+    /// Two earlier corners for the next triangle, as vertex index and index within the row: the
+    /// last two of a strip, or the first and the last of a polygon.
     kept: [Option<(u32, usize)>; 2],
-    /// Whether the next triangle of the strip is turned round.
+    /// Whether the next triangle of the strip is reversed.
     odd: bool,
 }
 
-/// The elements up to the last one that is read, by some reader: what ends before it is told.
+/// The elements up to the last one that a reader uses. A file may end in the elements after it, but
+/// not in those before it.
 pub(super) fn needed(elements: &[Element]) -> &[Element] {
     let read =
         |element: &Element| element.name == "vertex" || is_tree(element) || is_whole(element) || Faces::are(element);
     &elements[..elements.iter().rposition(read).map_or(0, |last| last + 1)]
 }
 
-/// What the faces of a file are.
+/// The triangles of all faces of a file.
 #[derive(Debug, Default)]
 pub(super) struct Triangles {
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Texture coordinates of each corner, if every face has some.
+    /// Texture coordinates of each corner; None unless every face has some.
     pub(super) texture: Option<Vec<[[f32; 2]; 3]>>,
-    /// Which of the file's textures each triangle has; the first, if no row says it.
+    /// Index of each triangle's texture among the textures of the file; 0 if its row has none.
     pub(super) texture_numbers: Vec<u32>,
-    /// The linear colour of each triangle, straight alpha, if faces have any.
+    /// Colour of each triangle, linear light with straight alpha; None if no face has one.
     pub(super) colors: Option<Vec<[f32; 4]>>,
 }
 
 impl Faces {
-    /// Whether an element lists the vertices of faces.
+    /// Whether an element has a list of vertex indices, so that its rows are faces.
     pub(super) fn are(element: &Element) -> bool {
         element.properties.iter().any(|property| role(element, property) == Role::Corners)
     }
 
-    /// What each property of an element is read for.
+    /// How each property of an element is used; sets the state that depends on it.
     pub(super) fn roles(&mut self, element: &Element) -> Vec<Role> {
         let mut found = false;
         let mut role = |property: &Property| match role(element, property) {
-            // The first list of vertices is theirs.
+            // Only the first list of vertex indices is used.
             Role::Corners if std::mem::replace(&mut found, true) => Role::Unused,
             role => role,
         };
@@ -118,7 +121,7 @@ impl Faces {
         roles
     }
 
-    /// Begins a row.
+    /// Starts a row.
     pub(super) fn begin(&mut self, element: &Element) {
         self.shape = shape_of(element);
         (self.kept, self.odd) = ([None, None], false);
@@ -128,12 +131,12 @@ impl Faces {
         self.row_texture.clear();
     }
 
-    /// Takes the next number of a property that is read.
+    /// Takes the next number of a property with this role.
     pub(super) fn take(&mut self, element: &Element, row: u64, role: Role, number: f64) -> Result<(), Fault> {
         match role {
             Role::Corners => self.vertex(element, row, number)?,
             Role::Texture => self.row_texture.push(number as f32),
-            // A cast takes what is no number of a texture for that of none.
+            // The cast saturates at `u32::MAX`, which names no texture; NaN becomes 0.
             Role::TextureNumber => self.row_number = if number < 0.0 { u32::MAX } else { number as u32 },
             Role::Color(channel) => self.row_color[channel] = number as f32,
             Role::Unused => {}
@@ -150,7 +153,7 @@ impl Faces {
         if f64::from(vertex) != number {
             let (row, name) = (row + 1, &element.name);
             return Err(Fault::Malformed(format!(
-                "row {row} of element '{name}' names the vertex {number}, which cannot be"
+                "row {row} of element '{name}' names the vertex {number}, which is not a vertex index"
             )));
         }
         let third = (vertex, self.corner);
@@ -162,7 +165,7 @@ impl Faces {
             (Some(first), Some(second)) => {
                 let turned = self.shape == Some(Shape::Strip) && self.odd;
                 let triangle = if turned { [second, first, third] } else { [first, second, third] };
-                // Strips turn corners by triangles without area.
+                // Strips contain triangles without area wherever they turn a corner.
                 if first.0 != second.0 && second.0 != vertex && vertex != first.0 {
                     self.triangles.push(triangle.map(|(vertex, _)| vertex));
                     if self.placed {
@@ -177,10 +180,11 @@ impl Faces {
         Ok(())
     }
 
-    /// Ends a row: its triangles get their texture coordinates, in whichever order the row gave the two.
+    /// Ends a row. Its triangles get their colours and texture coordinates only here, as the order
+    /// of properties in a row is free.
     pub(super) fn end(&mut self) {
         let made = self.triangles.len() - self.first;
-        // Of one that names a vertex twice, triangles are missing.
+        // A polygon that names a vertex twice lacks triangles of its fan; it is not cut again.
         if self.shape == Some(Shape::Polygon) && made > 1 && made + 2 == self.corner {
             self.polygons.push((self.first, made));
         }
@@ -201,7 +205,8 @@ impl Faces {
         }
     }
 
-    /// The triangles of a file with these vertices.
+    /// Completes the triangles, with the vertices at `positions`: checks their indices and cuts
+    /// polygons into triangles again, so that concave ones are right.
     pub(super) fn finish(self, positions: &[[f64; 3]]) -> Result<Triangles, Fault> {
         let Self { mut triangles, mut texture, mut texture_numbers, polygons, mut colors, channels, .. } = self;
         let vertices = positions.len();
@@ -224,12 +229,12 @@ impl Faces {
     }
 }
 
-/// What the corners of a polygon have, of which its fan is made.
+/// The attribute of each corner of a polygon, taken from its triangle fan.
 fn corners_of<T: Copy>(fan: &[[T; 3]]) -> Vec<T> {
     fan.iter().take(1).flat_map(|&[a, b, _]| [a, b]).chain(fan.iter().map(|&[.., c]| c)).collect()
 }
 
-/// Makes of a fan the triangles of the same polygon that are named by its corners.
+/// Replaces a polygon's fan by other triangles of it, `parts`, given by corner indices.
 fn remake<T: Copy>(fan: &mut [[T; 3]], parts: &[[usize; 3]]) {
     let corners = corners_of(fan);
     fan.iter_mut().zip(parts).for_each(|(triangle, part)| *triangle = part.map(|corner| corners[corner]));

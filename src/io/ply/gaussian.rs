@@ -1,16 +1,18 @@
-//! The vertices of files of Gaussians: 2D Gaussian splatting's (Huang et al. 2024), and those of 3D Gaussian splatting (Kerbl et al. 2023) that
-//! are flat.
+//! Vertices that are Gaussians: 2D Gaussian splatting (Huang et al. 2024), and 3D Gaussian
+//! splatting (Kerbl et al. 2023) where its Gaussians are flat.
 //!
-//! Numbers are as they are trained: logarithms of standard deviations `scale_0`, `scale_1` and, in three dimensions, `scale_2`; a quaternion
-//! `rot_0` (w) to `rot_3` of any length; `opacity` before the logistic function; `f_dc_0` to `f_dc_2` and `f_rest_0` on, the coefficients of
-//! spherical harmonics, red, green and blue one after the other. Normals `nx ny nz`, if there are any, are zeros.
+//! The file holds the parameters as they are trained. `scale_0`, `scale_1` and, in three
+//! dimensions, `scale_2` are logarithms of standard deviations. `rot_0` (w) to `rot_3` are a
+//! quaternion of any length. `opacity` is the argument of the logistic function. `f_dc_0` to
+//! `f_dc_2` and `f_rest_0`, `f_rest_1` and so on are coefficients of spherical harmonics: all of
+//! red, then green, then blue. Normals `nx ny nz`, if present, are zeros and ignored.
 //!
-//! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: codes of sRGB, 0 to
-//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` they are not used, as in the method's own
+//! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: sRGB codes of 0 to
+//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` these are ignored, as in the method's own
 //! viewer.
 //!
-//! `filter_3D` is the filter's standard deviation f (Mip-Splatting, Yu et al. 2024). Each standard
-//! deviation s becomes `sqrt(s^2 + f^2)`, and the opacity is multiplied by
+//! `filter_3D` is the standard deviation f of a filter (Mip-Splatting, Yu et al. 2024). Each
+//! standard deviation s becomes `sqrt(s^2 + f^2)`, and the opacity is multiplied by
 //! `sqrt(det s^2 / det(s^2 + f^2))`.
 
 use glam::{DQuat, DVec3};
@@ -23,36 +25,37 @@ use crate::scene::gaussian::EXTENT;
 use crate::scene::harmonics::{MOST_DEGREE, terms_of};
 use crate::scene::{Colors, Harmonics};
 
-/// A Gaussian is flat whose shortest half-axis is at most this part of the middle one.
+/// A Gaussian counts as flat if its shortest half-axis is at most this fraction of the middle one.
 const FLAT: f64 = 0.1;
 
-/// The part of a file's Gaussians that need not be.
+/// Largest fraction of a file's Gaussians that may be thicker than that.
 const MOST_THICK: f64 = 0.01;
 
-/// The factor of the constant harmonic.
+/// The constant spherical harmonic, `1 / (2 sqrt(pi))`.
 pub(super) const CONSTANT: f64 = 0.282_094_791_773_878_14;
 
-/// Where the properties of a Gaussian are: each number an index into the columns of the vertices' layout.
+/// Where the properties of a Gaussian are: each number is an index into the columns of the vertex
+/// layout.
 #[derive(Clone, Debug)]
 pub(super) struct GaussianLayout {
-    /// Two or three.
+    /// Two or three columns.
     pub(super) scales: Vec<usize>,
     pub(super) rotation: [usize; 4],
     pub(super) opacity: usize,
     pub(super) base: Base,
     pub(super) degree: u32,
-    /// Channel by channel.
+    /// Coefficients beyond the constant one: all of red, then green, then blue.
     pub(super) rest: Vec<usize>,
-    /// The standard deviation of the filter.
+    /// The standard deviation of the filter of Mip-Splatting.
     pub(super) filter: Option<usize>,
 }
 
-/// Where the colour is that does not change with the view.
+/// The part of the colour that does not depend on the view.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Base {
     /// Coefficients of the constant harmonic.
     Constant([usize; 3]),
-    /// Codes of sRGB, and the largest value of each.
+    /// sRGB codes: the column and the full value of each channel.
     Codes([(usize, f64); 3]),
 }
 
@@ -78,7 +81,7 @@ impl Base {
         Ok(Self::Codes(codes))
     }
 
-    /// Codes of sRGB, of which 1 is the largest.
+    /// The colour in sRGB codes from 0 to 1.
     fn color(&self, value: &impl Fn(usize) -> f64) -> [f64; 3] {
         match self {
             Self::Constant(base) => base.map(|column| 0.5 + CONSTANT * value(column)),
@@ -87,7 +90,7 @@ impl Base {
     }
 }
 
-/// The code of a whole channel: that of 8 bits, but for 16-bit integers and numbers with a point.
+/// The full value of a colour code: 65535 for `ushort`, 1 for floats, 255 for all other types.
 fn most_code(scalar: Scalar) -> f64 {
     match scalar {
         Scalar::U16 => 65535.0,
@@ -97,7 +100,8 @@ fn most_code(scalar: Scalar) -> f64 {
 }
 
 impl GaussianLayout {
-    /// None if the vertices, whose properties `has` knows and `column` gives places, are no Gaussians.
+    /// Finds the columns of a Gaussian; `has` says whether a property exists, `column` adds its
+    /// column. Returns None if the vertices are not Gaussians.
     pub(super) fn of(
         has: impl Fn(&str) -> bool,
         mut column: impl FnMut(&str) -> Option<(usize, Scalar)>,
@@ -136,19 +140,19 @@ impl GaussianLayout {
     }
 }
 
-/// The Gaussians of a file while they are being read.
+/// Collects the Gaussians of a file row by row.
 #[derive(Debug)]
 pub(super) struct Gaussians<'a> {
     layout: &'a GaussianLayout,
     axes: Vec<[[f32; 3]; 2]>,
     colors: Vec<[f32; 4]>,
     terms: Vec<f32>,
-    /// Shortest half-axis over the middle one, for each ellipsoid that can be drawn.
+    /// Shortest half-axis over the middle one, of each ellipsoid that can be drawn.
     ratios: Vec<f32>,
 }
 
 impl<'a> Gaussians<'a> {
-    /// Room for `rows`.
+    /// Reserves memory for `rows` Gaussians.
     pub(super) fn with_capacity(layout: &'a GaussianLayout, rows: u64) -> Result<Self, Fault> {
         let (mut axes, mut colors, mut terms, mut ratios) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         reserve(&mut axes, rows)?;
@@ -158,11 +162,11 @@ impl<'a> Gaussians<'a> {
         Ok(Self { layout, axes, colors, terms, ratios })
     }
 
-    /// The values of a row, by columns, and where it is.
+    /// Adds a Gaussian at `position`; `value(column)` gives its numbers.
     pub(super) fn push(&mut self, position: [f64; 3], value: impl Fn(usize) -> f64) {
         let layout = self.layout;
         let [w, x, y, z] = layout.rotation.map(&value);
-        // A rotation of no length becomes one of no number, and so do its half-axes.
+        // A zero quaternion gives NaN half-axes.
         let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
         let mut opacity = 1.0 / (1.0 + (-value(layout.opacity)).exp());
         let mut deviations: Vec<f64> = layout.scales.iter().map(|column| value(*column).exp()).collect();
@@ -173,8 +177,8 @@ impl<'a> Gaussians<'a> {
         let mut axes: Vec<(f64, DVec3)> = deviations.into_iter().zip(units).collect();
         let mut ratio = None;
         if axes.len() == 3 {
-            // Equal ones stay in the file's order.
-            // One that is no number comes first, so that none is left.
+            // The other two deviations keep the file's order. A NaN counts as the shortest and is
+            // handed on to a remaining half-axis, so that the Gaussian is not drawn.
             let shortest =
                 (0..3).fold(2, |least, k| if axes[k].0 < axes[least].0 || axes[k].0.is_nan() { k } else { least });
             let (thickness, _) = axes.remove(shortest);
@@ -187,7 +191,7 @@ impl<'a> Gaussians<'a> {
         let axes = [half_axis(axes[0]), half_axis(axes[1])];
         let [r, g, b] = layout.base.color(&value);
         let color = [r, g, b, opacity].map(|value| value as f32);
-        // Postshot leaves rows of zeros, which have no rotation: they do not count as thick.
+        // Postshot leaves rows of zeros, which have no rotation: they must not count as thick.
         let numbers = axes.as_flattened().iter().chain(&color);
         let is_drawn = numbers.into_iter().all(|x| x.is_finite()) && position.iter().all(|x| x.is_finite());
         self.ratios.extend(ratio.filter(|ratio| is_drawn && !ratio.is_nan()));
@@ -198,16 +202,16 @@ impl<'a> Gaussians<'a> {
         self.terms.extend((0..terms).flat_map(of_term));
     }
 
-    /// Puts them into `points`, of which nothing but the positions is there.
+    /// Moves the Gaussians into `points`, which holds nothing but their positions so far.
     pub(super) fn finish(self, points: &mut Points) {
         points.encoded = true;
         points.axes = Some(self.axes);
         let changes = self.terms.iter().any(|term| *term != 0.0);
         points.colors = match self.layout.degree {
-            // Harmonics of nothing are a colour.
+            // Harmonics whose coefficients are all zero are a plain colour.
             degree if degree > 0 && changes => Harmonics::new(self.colors, degree, self.terms).map(Colors::Harmonics),
             _ => {
-                // What is no number stays none.
+                // Not `max`, as NaN must stay NaN.
                 let seen = |c: f32| if c < 0.0 { 0.0 } else { c };
                 let colors = self.colors.into_iter().map(|[r, g, b, a]| [seen(r), seen(g), seen(b), a]);
                 Some(Colors::Linear(colors.collect()))
@@ -217,19 +221,19 @@ impl<'a> Gaussians<'a> {
     }
 }
 
-/// Widens the standard deviations by the filter's, and gives the factor on the opacity.
+/// Adds the filter's variance to each standard deviation; returns the factor on the opacity.
 fn widened(deviations: &mut [f64], filter: f64) -> f64 {
     let mut left = 1.0;
     for deviation in deviations {
         let wider = deviation.hypot(filter);
-        // Without a filter a width of 0 gives 1 and not 0 / 0.
+        // Without a filter, a deviation of 0 gives the factor 1 and not 0 / 0.
         left *= if filter == 0.0 { 1.0 } else { *deviation / wider };
         *deviation = wider;
     }
     left
 }
 
-/// What becomes of ellipsoids of these ratios; None if there are none.
+/// Counts the thick ones among these ratios and finds their median; None if there are none.
 fn flattened(mut ratios: Vec<f32>) -> Option<Flattened> {
     if ratios.is_empty() {
         return None;
@@ -241,13 +245,13 @@ fn flattened(mut ratios: Vec<f32>) -> Option<Flattened> {
     Some(Flattened { count: ratios.len() as u64, thick, ratio })
 }
 
-/// Fails for ellipsoids that are no surfels, unless they shall `become` some.
+/// Refuses a file with too many thick ellipsoids, unless the user asked to flatten them.
 pub(super) fn check(points: &Points, become_flat: bool) -> Result<(), Fault> {
     match points.flattened {
         Some(Flattened { count, thick, ratio }) if !become_flat && thick as f64 > MOST_THICK * count as f64 => {
             Err(Fault::Malformed(format!(
-                "{thick} of its {count} Gaussians are ellipsoids thicker than a tenth of their width (half of all than {ratio:.2} of it) \
-                 and no surfels: --flatten leaves their shortest axis out"
+                "{thick} of its {count} Gaussians are ellipsoids thicker than a tenth of their width (median: {ratio:.2}), \
+                 not surfels: use --flatten to leave their shortest axis out"
             )))
         }
         _ => Ok(()),

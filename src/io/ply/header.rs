@@ -6,10 +6,10 @@ use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
 use std::io::{BufRead, Read};
 
-/// No header line is longer; a comment may hold a processing history.
+/// Longest line of a header, bytes. Comments can be long: some hold a processing history.
 const LINE_LIMIT: u64 = 1 << 16;
 
-/// How the values after the header are written.
+/// The encoding of the values after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -17,7 +17,7 @@ pub(super) enum Encoding {
     BigEndian,
 }
 
-/// The type of one number.
+/// The type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scalar {
     I8,
@@ -31,7 +31,7 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    /// Both naming styles: the format's own, and that of later writers.
+    /// Parses a type name: those of the original format (`uchar`), and those with sizes (`uint8`).
     fn parse(name: &str) -> Option<Self> {
         Some(match name {
             "char" | "int8" => Self::I8,
@@ -46,7 +46,7 @@ impl Scalar {
         })
     }
 
-    /// Bytes in a binary file.
+    /// Size in a binary file, bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -61,21 +61,21 @@ impl Scalar {
     }
 }
 
-/// The type of a property.
+/// The type of a property: one number, or a list with a length in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Scalar(Scalar),
     List { count: Scalar, item: Scalar },
 }
 
-/// One property of an element.
+/// A property of an element.
 #[derive(Clone, Debug)]
 pub(super) struct Property {
     pub(super) name: String,
     pub(super) kind: Kind,
 }
 
-/// One element: so many rows, each with all properties.
+/// An element: `count` rows with the same properties.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
     pub(super) name: String,
@@ -84,43 +84,43 @@ pub(super) struct Element {
     pub(super) tints: Tints,
 }
 
-/// How the colours of rows are read.
+/// How the colours of rows are interpreted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tints {
-    /// As epsplat writes them: what floats range over is known.
+    /// The file is epsplat's, so floats are known to be linear light.
     pub(super) own: bool,
-    /// Without alphas.
+    /// Alphas are ignored.
     pub(super) ignore_alpha: bool,
 }
 
-/// Everything before the values.
+/// A parsed header.
 #[derive(Clone, Debug)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
     pub(super) comments: Comments,
-    /// Lines, `end_header` included: the first value of an ASCII file is on the next.
+    /// Lines up to and including `end_header`; an ASCII file's first value is on the next one.
     pub(super) lines: u64,
-    /// What lines end with.
+    /// The byte that ends a line.
     pub(super) line_end: u8,
 }
 
-/// What comments say that means something to a reader.
+/// Comments that readers act on. All but `textures` are epsplat's own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Comments {
-    /// Images that MeshLab names.
+    /// `TextureFile NAME`, which MeshLab writes: images of the mesh.
     pub(super) textures: Vec<String>,
-    /// Which way is up, as epsplat says.
+    /// `up y` or `up z`: the axis that points up.
     pub(super) up: Option<Up>,
-    /// The file of the triangles that surfels are drawn beside, as it says too.
+    /// `triangles NAME`: the mesh file that the surfels are drawn beside.
     pub(super) beside: Option<String>,
-    /// The surfels cover a closed surface, as it says too.
+    /// `closed`: the surfels cover a closed surface.
     pub(super) closed: bool,
-    /// Normals tell no sides, as it says too.
+    /// `unsided`: normals do not tell the two sides of a surface apart.
     pub(super) unsided: bool,
-    /// It is the mesh that `epsplat hybrid` writes beside surfels, as it says too.
+    /// `hybrid`: the file is a mesh that `epsplat hybrid` writes beside surfels.
     pub(super) hybrid: bool,
-    /// It is epsplat's.
+    /// `epsplat VERSION`: epsplat wrote the file.
     own: bool,
 }
 
@@ -133,13 +133,13 @@ impl Comments {
         self.unsided |= comment == "unsided";
         self.own |= comment.starts_with("epsplat ");
         self.hybrid |= self.own && comment == "hybrid";
-        // Others may mean something else by it.
+        // Other programs may use the same comment for something else.
         let named = comment.strip_prefix("triangles ").filter(|_| self.own);
         self.beside = named.map(|name| name.trim().to_owned()).or(self.beside.take());
     }
 }
 
-/// Reads up to and including the line `end_header`.
+/// Reads a header up to and including the line `end_header`.
 pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let line_end = line_end(reader)?;
     let mut line = Vec::new();
@@ -159,7 +159,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
         let keyword = words.next();
-        // The last line of a file without values may lack its end.
+        // If no values follow, the last line may lack its end.
         if !complete && keyword != Some("end_header") {
             return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
                 format!("line {number} of the PLY header is longer than {LINE_LIMIT} bytes")
@@ -175,7 +175,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                 comments.hear(text.trim().strip_prefix("comment").unwrap_or_default().trim());
             }
             Some("format") => {
-                let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";
+                let unread = "not a supported PLY format (ascii, binary_little_endian or binary_big_endian 1.0)";
                 encoding = Some(format(words).ok_or_else(|| malformed(unread))?);
             }
             Some("element") => {
@@ -207,7 +207,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     Err(Fault::Malformed("the PLY header has no end".into()))
 }
 
-/// `ENCODING VERSION`; the version may be left out.
+/// Parses `ENCODING VERSION`; the version may be missing.
 fn format<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Encoding> {
     let encoding = match words.next()? {
         "ascii" => Encoding::Ascii,
@@ -218,7 +218,7 @@ fn format<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Encoding> {
     words.next().is_none_or(|version| version == "1.0").then_some(encoding)
 }
 
-/// `TYPE NAME` or `list COUNT ITEM NAME`.
+/// Parses `TYPE NAME` or `list COUNT ITEM NAME`.
 fn property<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Property> {
     let kind = match words.next()? {
         "list" => {
@@ -227,7 +227,7 @@ fn property<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Property> {
         }
         scalar => Kind::Scalar(Scalar::parse(scalar)?),
     };
-    // A name has no spaces, but a scalar field's name, which programs make properties of, may.
+    // The format has no spaces in names, but programs write scalar fields under names with spaces.
     let name = words.collect::<Vec<_>>().join(" ");
     (!name.is_empty()).then_some(Property { name, kind })
 }

@@ -1,4 +1,4 @@
-//! Nodes of levels of detail in a file without a name, until all are known.
+//! Nodes of levels of detail, kept in an unnamed temporary file until all have been built.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -10,41 +10,42 @@ use crate::scene::hierarchy::{Node, NodeAndLow};
 use crate::scene::{Cap, Surfel};
 use crate::{Error, Result};
 
-/// Words of a node.
+/// Size of a node, words of 32 bits.
 const WORDS: usize = 24;
 
-/// Bytes of a node.
+/// Size of a node, bytes.
 const BYTES: u64 = 4 * WORDS as u64;
 
-/// Nodes, by their numbers.
+/// A growing array of nodes in a temporary file.
 pub struct KeptNodes {
     file: Mutex<File>,
-    /// What errors call the file.
+    /// The name of the file in error messages.
     path: PathBuf,
     count: u64,
 }
 
 impl KeptNodes {
-    /// None yet, in a file in `folder`, which goes with this; errors call it `path`.
+    /// Creates an empty array in an unnamed file in `folder`, which the system deletes when this is
+    /// dropped; errors name it `path`.
     ///
     /// # Errors
     ///
-    /// [`Error::Write`] where the system has no room for it.
+    /// [`Error::Write`] if the system cannot create the file.
     pub fn new(folder: &Path, path: &Path) -> Result<Self> {
         let file = tempfile::tempfile_in(folder).map_err(|error| Error::write(path, error))?;
         Ok(Self { file: Mutex::new(file), path: path.to_owned(), count: 0 })
     }
 
-    /// How many there are.
+    /// The number of nodes.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// Adds nodes after all others.
+    /// Appends nodes.
     ///
     /// # Errors
     ///
-    /// [`Error::Write`] where the system cannot write.
+    /// [`Error::Write`] if the system cannot write.
     pub fn append(&mut self, nodes: &[NodeAndLow]) -> Result<()> {
         let mut bytes = Vec::new();
         for nodes in nodes.chunks(1 << 14) {
@@ -59,11 +60,11 @@ impl KeptNodes {
         Ok(())
     }
 
-    /// The nodes with these numbers.
+    /// Reads the nodes with these indices.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read.
+    /// [`Error::Read`] if the system cannot read, or there are fewer nodes.
     pub fn read(&self, numbers: Range<u64>) -> Result<Vec<NodeAndLow>> {
         let mut bytes = vec![0; ((numbers.end - numbers.start) * BYTES) as usize];
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
@@ -131,7 +132,7 @@ mod tests {
         assert_eq!(kept.count(), 40_000);
         assert!(kept.read(16_000..33_000).unwrap() == all[16_000..33_000]);
         assert!(kept.read(39_990..40_001).is_err());
-        // Nobody sees the file.
+        // The folder shows no file.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

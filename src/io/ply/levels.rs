@@ -1,4 +1,4 @@
-//! PLY files with levels of detail, of which a picture reads the nodes and points that it takes.
+//! PLY files with levels of detail, of which a picture reads only the nodes and points it needs.
 
 use super::binary;
 use super::header::{self, Element, Encoding, Kind};
@@ -15,53 +15,56 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Rows that lie nearer to each other, bytes, are read together with what is between them.
+/// Pieces with a smaller gap between them, bytes, are read in one go, the gap included.
 const GAP: u64 = 1 << 14;
 
-/// What is read at once, bytes, where it is more than one piece.
+/// Longest read that covers more than one piece, bytes.
 const SPAN: u64 = 1 << 20;
 
 /// Rows that a thread decodes at once.
 const TOGETHER: usize = 1 << 12;
 
-/// Numbers of places and ranges are no larger.
+/// Largest magnitude that a number of the element `scene` may have.
 const LARGEST: f64 = 1e30;
 
-/// A file that `epsplat lod` wrote, of which any nodes and points can be read.
+/// A file that `epsplat lod` wrote, open for reading any of its nodes and points.
 ///
-/// When it is opened, where everything lies is checked against its length. Nodes and points are checked as they are read.
+/// When it is opened, the extents of its elements are checked against the length of the file. Nodes
+/// and points are checked as they are read.
 pub struct Levels {
-    /// Who reads from it moves to where it reads.
+    /// Every reader seeks before it reads.
     file: Mutex<File>,
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
-    /// What it says of all points together.
+    /// The facts of all its points together, from the element `scene`.
     pub whole: Whole,
-    /// Which way it says is up.
+    /// The axis that points up, if the file says so.
     pub up: Option<Up>,
     /// Its surfels cover a closed surface.
     pub closed: bool,
-    /// Its normals tell no sides.
+    /// Its normals do not tell the two sides of a surface apart.
     pub unsided: bool,
 }
 
-/// Where the rows of an element lie.
+/// Where the rows of an element are in the file.
 struct Stretch {
     element: Element,
-    /// Bytes from the file's start.
+    /// Offset from the start of the file, bytes.
     start: u64,
-    /// Bytes of each.
+    /// Size of a row, bytes.
     size: u64,
 }
 
 impl Levels {
-    /// Opens an input that is a binary PLY file with levels of detail and with what a reader of a part must know; None if it is another one, or is
-    /// drawn beside a mesh.
+    /// Opens a binary little-endian PLY file with levels of detail and the element `scene`. Returns
+    /// None for any other file, and for one that is drawn beside a mesh.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where what the file says of all points is no number.
+    /// [`Error::Read`](crate::Error::Read) if the system cannot read,
+    /// [`Error::Malformed`](crate::Error::Malformed) if the header is malformed or a number of the
+    /// element `scene` is invalid.
     pub fn open(input: Input) -> Result<Option<Self>> {
         let Input { file, length, path, format, .. } = input;
         if format != Format::Ply {
@@ -70,49 +73,53 @@ impl Levels {
         opened(file, length, &path).map_err(|fault| fault.of(&path))
     }
 
-    /// Bytes of so many points and nodes.
+    /// Size of this many points and nodes in the file, bytes.
     pub fn bytes(&self, points: u64, nodes: u64) -> u64 {
         points * self.vertex.size + nodes * self.node.size
     }
 
-    /// Its name.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the file is found to be.
+    /// The error that this file is malformed, for the reason `what`.
     pub fn malformed(&self, what: impl Into<String>) -> crate::Error {
         Fault::Malformed(what.into()).of(&self.path)
     }
 
-    /// Reads the rows of the nodes of these ranges of numbers, which ascend, in place of those that are there.
+    /// Reads nodes into `rows`, replacing its content; the ranges of node indices must ascend.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where the ranges are no nodes.
+    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) if
+    /// there are no nodes with these indices.
     pub fn read_nodes(&self, numbers: &[Range<u32>], rows: &mut Vec<u8>) -> Result<()> {
         self.read(numbers, &self.node, rows)
     }
 
-    /// What `of` makes of the nodes of rows, in parts.
+    /// Decodes `rows` of nodes in parallel parts; returns what `of` makes of each part, in order.
     ///
     /// # Errors
     ///
-    /// [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent.
+    /// [`Error::Malformed`](crate::Error::Malformed) if a node has an invalid position,
+    /// extent or colour.
     pub fn nodes<T: Send>(&self, rows: &[u8], of: impl Fn(Hierarchy) -> T + Sync) -> Result<Vec<T>> {
         let origin = self.whole.origin;
         let made = |points: Points, rows: Vec<TreeRow>| {
             let nodes = Tree { nodes: Box::new(points), rows }.hierarchy(origin);
-            nodes.map(&of).ok_or("a node of its levels of detail has no place, no extent or no colour")
+            nodes.map(&of).ok_or("a node of its levels of detail has no valid position, extent or colour")
         };
         self.made(rows, &self.node, made)
     }
 
-    /// What `of` makes of the points of these ranges of numbers, which ascend, in parts, or what is wrong with these.
+    /// Reads points and decodes them in parallel parts; returns what `of` makes of each part, in
+    /// order. The ranges of point indices must ascend.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where something is wrong, or the ranges are no points.
+    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) if
+    /// there are no points with these indices, or `of` returns the reason why some are invalid.
     pub fn points<T: Send>(
         &self,
         numbers: &[Range<u32>],
@@ -123,18 +130,18 @@ impl Levels {
         self.made(&rows, &self.vertex, |points, _| of(points))
     }
 
-    /// Colours as points have them, of none.
+    /// Empty colours, of the kind that the file's points have.
     pub fn no_colors(&self) -> Colors {
         let none = binary::vertices::<false>(&[][..], &Element { count: 0, ..self.vertex.element.clone() }, 0, &());
         none.ok().and_then(|(points, _)| points.colors).unwrap_or_default()
     }
 
-    /// Reads the rows of these numbers.
+    /// Reads the rows with these indices.
     fn read(&self, numbers: &[Range<u32>], stretch: &Stretch, rows: &mut Vec<u8>) -> Result<()> {
         let Stretch { element, start, size } = stretch;
         let inside = numbers.iter().all(|range| range.start <= range.end && u64::from(range.end) <= element.count);
         if !inside {
-            return Err(self.malformed("a node of its levels of detail names what does not exist"));
+            return Err(self.malformed("a node of its levels of detail refers to nodes or points that do not exist"));
         }
         let bytes = |range: &Range<u32>| u64::from(range.end - range.start) * size;
         let pieces = numbers.iter().map(|range| (start + u64::from(range.start) * size, bytes(range)));
@@ -143,7 +150,7 @@ impl Levels {
             .map_err(|error| Fault::Io(error).of(&self.path))
     }
 
-    /// What all threads make of rows.
+    /// Decodes `rows` on all threads and passes each part to `of`.
     fn made<T: Send>(
         &self,
         rows: &[u8],
@@ -174,10 +181,10 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
             Kind::Scalar(scalar) => Some(scalar.size() as u64),
             Kind::List { .. } => None,
         });
-        // Where rows differ in length, what is behind them lies nobody knows where.
+        // Rows with lists differ in length, so the offset of the next element is unknown.
         let Some(size) = scalars.sum::<Option<u64>>() else { return Ok(None) };
         let bytes = element.count.checked_mul(size).and_then(|bytes| bytes.checked_add(start));
-        // What ends early is told by who reads all of it.
+        // A file that ends early is reported by the reader of the whole file.
         let Some(end) = bytes.filter(|end| *end <= length) else { return Ok(None) };
         let into = match element.name.as_str() {
             "vertex" => &mut vertex,
@@ -197,10 +204,10 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
     file.read_exact(&mut row)?;
     let (words, _) = row.as_chunks::<8>();
     if !words.iter().all(|word| f64::from_le_bytes(*word).abs() <= LARGEST) {
-        return Err(Fault::Malformed("what its element 'scene' says is no number, or too large".into()));
+        return Err(Fault::Malformed("its element 'scene' has a value that is not a number or is too large".into()));
     }
     let whole = whole::parse(&row, surfels, nodes);
-    // Who reads all of it passes over that, too.
+    // The reader of the whole file ignores such a row, too.
     if !whole.is_near() {
         return Ok(None);
     }
@@ -209,7 +216,7 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
     Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
 }
 
-/// Reads pieces of a file, each of which starts where it says and has so many bytes, one after the other `into` as many.
+/// Reads pieces of a file, given as offset and size, into consecutive parts of `into`.
 fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
     let mut together: Vec<(u64, u64)> = Vec::new();
     let mut span = Vec::new();
@@ -217,7 +224,7 @@ fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut in
         let (Some(&(start, _)), Some(&(last, bytes))) = (together.first(), together.last()) else { return Ok(()) };
         file.seek(SeekFrom::Start(start))?;
         if let [_] = together[..] {
-            // Most of what is read lies in few pieces, which need no copy.
+            // Most bytes are in a few long pieces, which are read without a copy.
             file.read_exact(next_of(&mut into, bytes)?)?;
         } else {
             span.resize((last + bytes - start) as usize, 0);
@@ -241,7 +248,7 @@ fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut in
     read(&mut together)
 }
 
-/// The next so many bytes of what is written into.
+/// Splits the next `bytes` bytes off the buffer.
 fn next_of<'a>(into: &mut &'a mut [u8], bytes: u64) -> io::Result<&'a mut [u8]> {
     into.split_off_mut(..bytes as usize).ok_or_else(|| io::Error::from(io::ErrorKind::WriteZero))
 }
@@ -253,7 +260,7 @@ mod tests {
 
     use super::*;
 
-    /// However near to each other pieces lie, and however long they are.
+    /// Whatever the gaps between pieces and their lengths are.
     #[test]
     fn pieces_are_read_as_they_lie() {
         let all: Vec<u8> = (0..6 * SPAN as u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();

@@ -1,33 +1,47 @@
-//! PLY: a streaming reader for clouds of tens of millions of vertices and for meshes, and a writer of surfels.
+//! PLY: a streaming reader for meshes and clouds of tens of millions of vertices, and writers.
 //!
-//! Written files are binary little-endian; each vertex has those of these properties that are known, in this order:
+//! Written files are binary little-endian. A vertex has those of these properties that are known,
+//! in this order:
 //!
-//! | properties | type | what |
+//! | properties | type | content |
 //! |---|---|---|
 //! | `x y z` | `float`, or `double` where an f32 would lose digits | centre p, world units |
 //! | `nx ny nz` | `float` | normal, outward |
-//! | `radius` | `float` | radius of the disk, world units; of an ellipse its longer half-axis |
-//! | `sx sy sz tx ty tz` | `float` | half-axes s and t of the ellipse p + u s + v t, u² + v² <= 1, world units; its normal is s x t |
+//! | `radius` | `float` | radius, or longer half-axis of an ellipse, world units |
+//! | `sx sy sz tx ty tz` | `float` | half-axes s and t, world units |
+//! | `clip1_u` to `clip2_w` | `float` | lines that cut the disk ([`Clip`](crate::scene::Clip)) |
+//! | `cap_uu cap_uv cap_vv` | `float` | curvature, world units ([`Cap`](crate::scene::Cap)) |
 //! | `red green blue` | `uchar`: 8-bit sRGB; `float`: linear light | colour |
 //! | `alpha` | as the colour | opacity, straight |
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
-//! | `texnumber` | `int` | which of several textures these coordinates are in, -1 of none |
-//! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
+//! | `texnumber` | `int` | index of the texture, or -1 for none |
+//! | `texture_u_x` to `texture_v_z` | `float` | change of u and v per world unit along x, y, z |
 //!
-//! Levels of detail are another element `node` after the vertices, which are in the order of the tree: `x y z`, `radius` of a sphere around what is
-//! below, larger where that does not lie on the node's cap, half-axes, caps and colour as above, `cone`, the smallest cosine of the angle between a
-//! normal below and its own (-1: normals have no side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)). A third
-//! element `scene` says of all vertices together what one who reads a part must know: origin, bounds, ranges ([`Whole`](crate::scene::Whole)).
+//! The ellipse is p + u s + v t with u² + v² <= 1, and its normal is s x t.
 //!
-//! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`
-//! for those that are drawn beside a mesh in the same folder, which has the comment `hybrid`: no
-//! other program says it in a PLY file, and none stumbles over it.
+//! Levels of detail are an element `node` after the vertices, which are in the order of the tree. A
+//! node has `x y z`, `radius`, half-axes, cap and colour as above, and `cone first count leaf`:
 //!
-//! Files of Gaussians, whose vertices have other names, are read too ([`read`]), and SuperSplat's
-//! compressed ones.
+//! - `radius` is that of a sphere around everything below the node; it is larger where that does
+//!   not lie on the node's cap.
+//! - `cone` is the smallest cosine of the angle between the node's normal and a normal below it; -1
+//!   where normals have no side.
+//! - `first` and `count` are the range of its children, or of the vertices of a leaf; `leaf` says
+//!   which ([`Hierarchy`](crate::scene::Hierarchy)).
 //!
-//! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
-//! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.
+//! An element `scene` then holds facts of all vertices together, for readers of a part: origin,
+//! bounds and ranges ([`Whole`](crate::scene::Whole)).
+//!
+//! The header may have these comments, which no other program writes or reads: `up y` or `up z`;
+//! `closed` for surfels that cover a closed surface; `unsided` where normals have no side;
+//! `triangles NAME` for surfels that are drawn beside a mesh in the same folder, and `hybrid` in
+//! that mesh.
+//!
+//! Files of Gaussians, whose vertices have other names, are read too ([`read`]), and so are
+//! SuperSplat's compressed ones.
+//!
+//! Normals, colours and texture coordinates have MeshLab's names. MeshLab, CloudCompare and Open3D
+//! ignore the half-axes: to them such a file is a cloud with normals and colours.
 
 mod ascii;
 mod binary;

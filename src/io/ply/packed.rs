@@ -1,13 +1,14 @@
-//! SuperSplat's compressed Gaussians: four words each, in the ranges of their chunk of 256.
+//! SuperSplat's compressed Gaussians: four words each, quantised in the ranges of a chunk of 256.
 //!
-//! | property | bits, the highest first | what |
+//! | property | bits, highest first | content |
 //! |---|---|---|
-//! | `packed_position` | 11, 10, 11 | x, y, z in `min_x` to `max_x` and so on |
-//! | `packed_rotation` | 2, 10, 10, 10 | index of the largest of `rot_0` to `rot_3`; the others times √2 |
-//! | `packed_scale` | 11, 10, 11 | `scale_0` to `scale_2` in `min_scale_x` to `max_scale_x` and so on |
-//! | `packed_color` | 8, 8, 8, 8 | colour in `min_r` to `max_r` and so on, or else 0 to 1; opacity |
+//! | `packed_position` | 11, 10, 11 | x, y, z from `min_x` to `max_x` and so on |
+//! | `packed_rotation` | 2, 10, 10, 10 | index of the largest `rot_0` to `rot_3`; others times √2 |
+//! | `packed_scale` | 11, 10, 11 | `scale_0` to `scale_2` from `min_scale_x` to `max_scale_x` ... |
+//! | `packed_color` | 8, 8, 8, 8 | red, green, blue from `min_r` to `max_r` ..., opacity |
 //!
-//! An element `sh` has a byte for each of `f_rest_0` on, which stand for -4 to 4.
+//! Without `min_r` and so on, colours range from 0 to 1. An element `sh` has one byte for each of
+//! `f_rest_0`, `f_rest_1` and so on, which range from -4 to 4.
 
 use std::io::BufRead;
 
@@ -23,25 +24,25 @@ use crate::scene::harmonics::{MOST_DEGREE, terms_of};
 /// Gaussians in a chunk.
 const CHUNK: usize = 256;
 
-/// Bytes of rows that are read together.
+/// Size of one read of rows, bytes.
 const BLOCK: usize = 1 << 20;
 
-/// Words of a row.
+/// The four words of a Gaussian.
 pub(super) const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
-/// Smallest and largest values of a chunk: positions, scales, and colours, which may be missing.
+/// The smallest and largest values of a chunk: positions, scales and colours, which may be missing.
 const RANGES: [[[&str; 3]; 2]; 3] = [
     [["min_x", "min_y", "min_z"], ["max_x", "max_y", "max_z"]],
     [["min_scale_x", "min_scale_y", "min_scale_z"], ["max_scale_x", "max_scale_y", "max_scale_z"]],
     [["min_r", "min_g", "min_b"], ["max_r", "max_g", "max_b"]],
 ];
 
-/// Whether a file is such a one.
+/// Whether a file holds compressed Gaussians.
 pub(super) fn is_packed(header: &Header) -> bool {
     header.elements.iter().any(|element| element.name == "vertex" && offset_of(element, WORDS[0], None).is_some())
 }
 
-/// Reads its Gaussians; the reader is behind the header.
+/// Reads the Gaussians; `reader` must stand just after the header.
 pub(super) fn read(
     mut reader: impl BufRead,
     header: &Header,
@@ -50,7 +51,7 @@ pub(super) fn read(
 ) -> Result<Points, Fault> {
     if header.encoding != Encoding::LittleEndian {
         return Err(Fault::Malformed(
-            "its Gaussians are packed, which is read of binary_little_endian files alone".into(),
+            "its Gaussians are packed, which can be read from binary_little_endian files alone".into(),
         ));
     }
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
@@ -62,7 +63,7 @@ pub(super) fn read(
     if chunks.count < vertices.count.div_ceil(CHUNK as u64) {
         let (count, of) = (chunks.count, vertices.count);
         return Err(Fault::Malformed(format!(
-            "its {of} packed Gaussians need a chunk each {CHUNK}, and there are {count}"
+            "its {of} packed Gaussians need one chunk for each {CHUNK}, but there are {count}"
         )));
     }
     let words = places(vertices, WORDS, Scalar::U32)?;
@@ -81,7 +82,7 @@ pub(super) fn read(
     let sizes = [vertices, chunks].map(row_size);
     let rest_size = element("sh").map_or(1, row_size);
     if !rest.is_empty() && rest_rows.len() / rest_size != rows.len() / sizes[0] {
-        return Err(Fault::Malformed("its packed Gaussians and their harmonics (element sh) are not as many".into()));
+        return Err(Fault::Malformed("its element 'sh' does not have one row for each of its packed Gaussians".into()));
     }
     let layout = layout(rest.len());
     let mut gaussians = Gaussians::with_capacity(&layout, vertices.count)?;
@@ -104,7 +105,8 @@ pub(super) fn read(
     Ok(points)
 }
 
-/// Columns of what is unpacked: scales, rotation, opacity, the constant harmonic, and the others.
+/// The columns of an unpacked Gaussian: scales, rotation, opacity, the constant harmonic, and
+/// `rest` coefficients of the others.
 fn layout(rest: usize) -> GaussianLayout {
     let degree = (0..=MOST_DEGREE).find(|degree| 3 * terms_of(*degree) == rest).unwrap_or(0);
     GaussianLayout {
@@ -118,7 +120,7 @@ fn layout(rest: usize) -> GaussianLayout {
     }
 }
 
-/// A Gaussian's place, and its values in the order of [`layout`].
+/// Unpacks the words of a Gaussian: its position, and its values in the order of [`layout`].
 fn unpacked(
     [position, rotation, scale, color]: [u32; 4],
     [places, scales, colors]: &[Option<[[usize; 3]; 2]>; 3],
@@ -127,7 +129,7 @@ fn unpacked(
     let within = |range: &Option<[[usize; 3]; 2]>, parts: [f64; 3]| match range {
         Some([least, most]) => std::array::from_fn(|k| {
             let [least, most] = [least[k], most[k]].map(|place| f64::from(f32::from_bits(word(chunk, place))));
-            // As f32 has it, which is what others make of it.
+            // Rounded to f32, as other programs compute it.
             f64::from((least * (1.0 - parts[k]) + most * parts[k]) as f32)
         }),
         None => parts,
@@ -151,13 +153,13 @@ fn unpacked(
     (within(places, three(position)), values)
 }
 
-/// The lowest `bits` of a word, from 0 to 1.
+/// The lowest `bits` bits of a word, mapped to [0, 1].
 fn part(word: u32, bits: u32) -> f64 {
     let most = (1 << bits) - 1;
     f64::from(word & most) / f64::from(most)
 }
 
-/// The coefficient that a byte stands for.
+/// The coefficient of a spherical harmonic that a byte encodes.
 fn coefficient(byte: u8) -> f64 {
     let part = match byte {
         0 => 0.0,
@@ -167,7 +169,8 @@ fn coefficient(byte: u8) -> f64 {
     (part - 0.5) * 8.0
 }
 
-/// Where the ranges of positions, scales and, if there are some, colours are in a chunk's row.
+/// Offsets within a chunk's row of the ranges of positions, scales and colours, bytes; None for
+/// colours that are missing.
 fn ranges(chunks: &Element) -> Result<[Option<[[usize; 3]; 2]>; 3], Fault> {
     let mut all = [None; 3];
     for (k, names) in RANGES.into_iter().enumerate() {
@@ -179,7 +182,7 @@ fn ranges(chunks: &Element) -> Result<[Option<[[usize; 3]; 2]>; 3], Fault> {
     Ok(all)
 }
 
-/// Where the bytes of harmonics are in a row.
+/// Offsets of the bytes of harmonics within a row.
 fn rest(element: &Element) -> Result<Vec<usize>, Fault> {
     let place = |k: usize| offset_of(element, &format!("f_rest_{k}"), Some(Scalar::U8));
     let found: Vec<usize> = (0..element.properties.len()).map_while(place).collect();
@@ -192,7 +195,7 @@ fn rest(element: &Element) -> Result<Vec<usize>, Fault> {
     }
 }
 
-/// Where properties of a type are in a row.
+/// Offsets of these properties within a row, bytes; an error unless all have the type `scalar`.
 fn places<const N: usize>(element: &Element, names: [&str; N], scalar: Scalar) -> Result<[usize; N], Fault> {
     let mut found = [0; N];
     for (place, name) in found.iter_mut().zip(names) {
@@ -207,7 +210,7 @@ fn places<const N: usize>(element: &Element, names: [&str; N], scalar: Scalar) -
     Ok(found)
 }
 
-/// Where a property is in a row, if it is there and of this type.
+/// Offset of a property in a row, bytes; None if it is missing, behind a list or of another type.
 fn offset_of(element: &Element, name: &str, of: Option<Scalar>) -> Option<usize> {
     let mut offset = 0;
     for property in &element.properties {
@@ -220,18 +223,18 @@ fn offset_of(element: &Element, name: &str, of: Option<Scalar>) -> Option<usize>
     None
 }
 
-/// Bytes of a row without lists.
+/// Size of a row without lists, bytes; at least 1, as it is a divisor.
 fn row_size(element: &Element) -> usize {
     let size = |kind: Kind| if let Kind::Scalar(scalar) = kind { scalar.size() } else { 0 };
     element.properties.iter().map(|property| size(property.kind)).sum::<usize>().max(1)
 }
 
-/// All rows of an element, which fit a file of this length.
+/// Reads all rows of an element. Memory for them is reserved up to the `length` of the file.
 fn table_of(reader: &mut impl BufRead, element: &Element, length: u64) -> Result<Vec<u8>, Fault> {
     if element.properties.iter().any(|property| matches!(property.kind, Kind::List { .. })) {
         let name = &element.name;
         return Err(Fault::Malformed(format!(
-            "its Gaussians are packed, and its element '{name}' has lists, which such files have not"
+            "its Gaussians are packed, but its element '{name}' has lists, which such files cannot have"
         )));
     }
     let size = if element.properties.is_empty() { 0 } else { row_size(element) as u64 };
@@ -249,7 +252,7 @@ fn table_of(reader: &mut impl BufRead, element: &Element, length: u64) -> Result
     Ok(rows)
 }
 
-/// A little-endian word of a row.
+/// The little-endian word at `place` bytes in a row; 0 past its end.
 fn word(row: &[u8], place: usize) -> u32 {
     row.get(place..).and_then(|rest| rest.first_chunk()).map_or(0, |bytes| u32::from_le_bytes(*bytes))
 }

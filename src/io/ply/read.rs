@@ -1,4 +1,4 @@
-//! From a PLY file to points or a mesh, in one pass and with one small buffer.
+//! Reads a PLY file as points or as a mesh, in one pass and with one small buffer.
 
 use super::contents::Contents;
 use super::faces::{Faces, Triangles};
@@ -22,36 +22,41 @@ use std::path::{Component, Path, PathBuf};
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
 /// - `x y z` of any scalar type become f64 positions.
-/// - `nx ny nz` become normals, `radius` (or else `scale`) radii in world units, by these and other names that programs write.
-/// - `sx sy sz` and `tx ty tz`, all six, become half-axes in world units.
+/// - `nx ny nz` become normals, and `radius` (or else `scale`) radii in world units; other names
+///   that programs write are known, too.
+/// - `sx sy sz` and `tx ty tz`, if all six exist, become half-axes in world units.
 /// - `texture_u texture_v` (also `texcoord_u texcoord_v`, `s t`, `u v`) become texture coordinates.
-/// - `red green blue` (also `r g b`, `diffuse_red ...`) with optional `alpha`: `uchar` are 8-bit sRGB codes and stay so;
-///   what other types range over, all numbers of a scene tell together ([`RawColors`](crate::io::RawColors)): `float` and
-///   `double` of 0 to 1 are linear light as they are. Alpha is straight and linear in each case.
-/// - `intensity` (also `scalar_Intensity ...`) becomes grey where there are no colours, or all are zero.
+/// - `red green blue` (also `r g b`, `diffuse_red ...`) with optional `alpha` become colours.
+///   `uchar` are 8-bit sRGB codes and stay so. The range of other types is found from all numbers
+///   of a scene ([`RawColors`](crate::io::RawColors)); `float` and `double` from 0 to 1 are linear
+///   light. Alpha is always straight and linear.
+/// - `intensity` (also `scalar_Intensity ...`) becomes grey if colours are missing or all zero.
 ///
-/// In a mesh, a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips`,
-/// vertices without normals and radii get them from the triangles around them, as in an OBJ file:
-/// normals weighted by area, and radii with which disks cover the triangles. What triangles look
-/// like, by colours of their own and by images, is read as [`read_mesh`] reads it.
+/// A file with a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips` is a
+/// mesh. Its vertices without normals or radii get them from their triangles, as in an OBJ file:
+/// normals weighted by area, and radii with which disks cover the triangles. The colours and images
+/// of triangles are read as by [`read_mesh`].
 ///
-/// Vertices with `scale_0` and `rot_0` are Gaussians, as 2D Gaussian splatting writes them, or flat ones of 3D Gaussian splatting: they get
-/// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
-/// change with the view if the file says so. SuperSplat's compressed files are read too.
-/// With `flatten` ellipsoids lose their shortest axis, however thick they are.
+/// Vertices with `scale_0` and `rot_0` are Gaussians, of 2D Gaussian splatting or flat ones of 3D
+/// Gaussian splatting. Their half-axes are [`EXTENT`](crate::scene::gaussian::EXTENT) standard
+/// deviations, beyond which nothing shows, and their colours have alpha and depend on the view if
+/// the file says so. SuperSplat's compressed files are read too. With [`ReadOptions::flatten`],
+/// ellipsoids of any thickness lose their shortest axis.
 ///
-/// A comment `up y` or `up z` in the header says which way is up, `closed` that surfels cover a closed surface, and `triangles NAME` which
-/// mesh in the same folder they are drawn beside.
+/// Comments in the header: `up y` or `up z` names the axis that points up; `closed` says that
+/// surfels cover a closed surface; `triangles NAME` names a mesh in the same folder to draw beside
+/// them.
 ///
-/// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
-/// shape, those after it without being looked at. Zero vertices are no error here.
+/// Other properties and elements are skipped; elements after the last one that is used are not even
+/// parsed. A file without vertices is valid.
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
-/// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
-/// promises, a number in text is none, a list has a negative length, a face names a vertex that
-/// does not exist, or the mesh that it is drawn beside is no regular file in its folder.
+/// [`Error::Read`](crate::Error::Read) if the system cannot read,
+/// [`Error::Malformed`](crate::Error::Malformed) if the header is not a PLY header, `x`, `y` or `z`
+/// is missing, the file ends before the vertices or faces that its header promises, a word of an
+/// ASCII file is not a number, a list has a negative length, a face names a vertex that does not
+/// exist, or the mesh to draw beside it is not a regular file in the same folder.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let path = input.path.clone();
     let (mut points, mut faces, textures) = contents(input, options, progress)?;
@@ -68,7 +73,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     points.normals.get_or_insert(normals);
     points.of_mesh = points.radii.is_none() && points.axes.is_none();
     points.radii.get_or_insert(radii);
-    // Places of vertices alone are those of points, which any image may paint.
+    // If vertices alone have texture coordinates, these stay with the points, for any image.
     let is_painted = !textures.is_empty() || faces.texture.is_some() || faces.colors.is_some();
     let of_vertices = points.texture.as_ref().filter(|_| is_painted).map(|texture| corners(&faces.triangles, texture));
     let mut mesh = Mesh {
@@ -86,20 +91,24 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     Ok(points)
 }
 
-/// Reads the triangles of a PLY file: the polygons of the element `face`, concave ones too, and the strips of the element `tristrips`.
+/// Reads the triangles of a PLY file: polygons of the element `face`, concave ones too, and strips
+/// of `tristrips`.
 ///
-/// Corners have what their vertices have: normals, colours, texture coordinates; the last from the
-/// list `texcoord` of the faces instead, as MeshLab writes it, where every face has one. Triangles
-/// have the colours of their faces, `red green blue` with or without `alpha`, if those of vertices
-/// do not hide them: integers are codes of sRGB, of 8 bits, or of 16 if there are larger ones than
-/// 255, and floats linear light up to 1, or such codes. What comments `TextureFile` name, PNG,
-/// JPEG, BMP or TGA beside the file, are the materials, of which a face's `texnumber` is one, or
-/// else the first; those that cannot be read are left out and named in [`Mesh::notes`]. A file
-/// without faces is a mesh without triangles, and no error here.
+/// Corners have the normals, colours and texture coordinates of their vertices. If every face has a
+/// list `texcoord`, as MeshLab writes it, texture coordinates are taken from there.
+///
+/// Faces may have colours, `red green blue` with or without `alpha`; those of vertices take
+/// precedence unless they are all the same. Integers are sRGB codes of 8 bits, or of 16 if some
+/// exceed 255. Floats are linear light if none exceeds 1, or else such codes.
+///
+/// The images (PNG, JPEG, BMP or TGA beside the file) that comments `TextureFile` name are the
+/// materials. `texnumber` of a face is the index of its material, 0 if absent. Images that cannot
+/// be read are left out and named in [`Mesh::notes`]. A file without faces is a mesh without
+/// triangles.
 ///
 /// # Errors
 ///
-/// As [`read`], and where images together have more pixels than
+/// As [`read`], and if all images together have more pixels than
 /// [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
@@ -124,13 +133,13 @@ pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -
     Ok(mesh)
 }
 
-/// An attribute of vertices, for each corner of the triangles.
+/// The attribute of the vertex at each corner of the triangles.
 fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
     triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
 }
 
-/// Leaves the colours of vertices or those of faces: of vertices those count, as they are finer,
-/// unless all are one colour, which programs write without being asked.
+/// Keeps either the colours of vertices or those of faces: those of vertices, as they are finer,
+/// unless they are all the same, as programs write such ones unasked.
 fn choose_colors(points: &mut Points, faces: &mut Triangles) {
     if faces.colors.is_none() {
         return;
@@ -146,12 +155,12 @@ fn choose_colors(points: &mut Points, faces: &mut Triangles) {
         (points.colors, points.raw) = (None, None);
     } else {
         faces.colors = None;
-        points.notes.push("faces have colours too, which those of vertices hide".into());
+        points.notes.push("faces have colours too, which are ignored, as vertices have some".into());
     }
 }
 
-/// Gives a mesh the images of these `names` beside the file at `path` as materials, of which each
-/// triangle has one by its number.
+/// Gives a mesh the images `names` beside the file at `path` as materials; `numbers` are the
+/// indices of the triangles' materials.
 fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) -> Result<()> {
     let (mut beside, mut images) = (Beside::of(path), Images::default());
     let mut materials = Vec::new();
@@ -160,14 +169,14 @@ fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) ->
         let texture = images.read(&path, false, &mut mesh.notes)?;
         materials.push(Material { image: texture.is_some().then_some(path), name, diffuse: [1.0; 4], texture });
     }
-    // Where an image is missing the colours of the vertices are what is left.
+    // Without any image, the colours of the vertices show.
     let painted = mesh.texture.is_some() && materials.iter().any(|material| material.texture.is_some());
     mesh.material = painted.then_some(numbers);
     mesh.materials = materials;
     Ok(())
 }
 
-/// The file's description of itself.
+/// The description of the file: its format and attributes.
 fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
     let encoding = match header.encoding {
         Encoding::Ascii => "text",
@@ -181,7 +190,7 @@ fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
     Ok(About { format: format!("PLY, {encoding}"), attributes, ..About::default() })
 }
 
-/// The textures, and the mesh, that a PLY file at `path` names.
+/// The textures and the mesh that the header of the PLY file at `path` names.
 pub(in crate::io) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let Ok(header) = header::read(&mut BufReader::new(file)) else { return Vec::new() };
@@ -190,7 +199,7 @@ pub(in crate::io) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
     images.chain(header.comments.beside.map(|name| beside(folder, &name))).collect()
 }
 
-/// The textures of the mesh at `path` if `epsplat hybrid` wrote it; None of any other file.
+/// The textures of the mesh at `path` if `epsplat hybrid` wrote it, else None.
 pub fn textures_of_hybrid(path: &Path) -> Option<Vec<PathBuf>> {
     check_regular(path).ok()?;
     let comments = header::read(&mut BufReader::new(File::open(path).ok()?)).ok()?.comments;
@@ -198,25 +207,25 @@ pub fn textures_of_hybrid(path: &Path) -> Option<Vec<PathBuf>> {
     comments.hybrid.then(|| comments.textures.iter().map(|name| beside(folder, name)).collect())
 }
 
-/// A file that is named in the one at `path`, as Windows may write it.
+/// The path of a file that a header names, with the separators of Windows or others.
 fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
 }
 
-/// The mesh that the header of the file at `path` names, which lies in the same folder: a file may
-/// come from anywhere, and must not say what else of the machine is read. Whether the mesh exists
-/// is told when it is read.
+/// The path of the mesh that the header of the file at `path` names. Only a regular file in the
+/// same folder is accepted, as a file may come from anywhere and must not choose what else is read.
+/// A mesh that does not exist is an error only when it is read.
 fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
     let refused = |what: &str| {
         let name = shown(name.as_bytes());
         Err(Fault::Malformed(format!(
-            "its header names the triangles of '{name}', {what}: only a file in its own folder is drawn beside it; --triangles names any"
+            "its header names the mesh '{name}' to draw beside it, {what}: only a file in its own folder is accepted; use --triangles for others"
         )))
     };
     let mut parts = Path::new(name).components();
     let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name);
     if !plain || name.contains(['/', '\\', '\0']) {
-        return refused("which is a path and no name");
+        return refused("which is a path, not a name");
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mesh = path.parent().unwrap_or(Path::new("")).join(name);
@@ -224,7 +233,7 @@ fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
         return Ok(mesh);
     }
     if check_regular(&mesh).is_err() {
-        return refused("which is no file");
+        return refused("which is not a regular file");
     }
     match (mesh.canonicalize(), folder.canonicalize()) {
         (Ok(end), Ok(folder)) if end.parent() == Some(&folder) => Ok(mesh),
@@ -232,8 +241,8 @@ fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
     }
 }
 
-/// The vertices, the triangles, which name vertices that exist, and the names of textures. Colours
-/// of vertices are as the file has them.
+/// Reads the vertices, the triangles, whose vertex indices are valid, and the names of textures.
+/// Colours of vertices stay as they are in the file.
 fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

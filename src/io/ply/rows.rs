@@ -1,4 +1,5 @@
-//! Rows of surfels that all have the same length, in a file, of which any threads read any: those of a binary PLY file, or of one that nobody sees.
+//! Surfel rows of equal length in a file, readable from any thread and at any index: those of a
+//! binary PLY file, or of an unnamed temporary file.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -22,33 +23,37 @@ use crate::{Error, Progress, Result};
 /// Rows that are copied at once.
 const TOGETHER: u64 = 1 << 16;
 
-/// Rows of one element of a file.
+/// The rows of one element of a file.
 pub struct Rows {
-    /// None of an input, which is opened where it is read: there may be more of them than a program may have open.
+    /// None for an input, which is opened for each read: a process may not be able to hold all of
+    /// its inputs open.
     file: Option<Mutex<File>>,
-    /// What errors call the file, and an input's place.
+    /// The name of the file in error messages, and the path of an input.
     path: PathBuf,
     element: Element,
     layout: Layout,
-    /// Bytes of the file before the first.
+    /// Offset of the first row, bytes.
     start: u64,
-    /// Bytes of each.
+    /// Size of a row, bytes.
     size: u64,
     big: bool,
-    /// How they are written, if they are.
+    /// The properties of rows that are written; None for an input.
     written: Option<Properties>,
     comments: Comments,
-    /// The meaning of colours' numbers.
+    /// The meaning of the numbers of colours.
     rules: ColorRules,
 }
 
 impl Rows {
-    /// Those of the points of a binary PLY file; None of another file, and where points are not all that there is: of meshes, Gaussians, places in textures, files
-    /// with levels of detail, without normals or radii.
+    /// Opens the vertex rows of a binary PLY file. Returns None for any other file, and where a
+    /// vertex is more or less than a disk: for meshes, Gaussians, texture coordinates, files with
+    /// levels of detail or drawn beside a mesh, and vertices without half-axes that lack normals or
+    /// radii.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's, or promises more points than there are.
+    /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the header is not a PLY
+    /// header or promises more vertices than the file holds.
     pub fn open(input: Input, ignore_alpha: bool) -> Result<Option<Self>> {
         let Input { file, length, path, format, .. } = input;
         if format != Format::Ply {
@@ -96,11 +101,12 @@ impl Rows {
         }))
     }
 
-    /// No rows yet, with what `properties` name, in a file without a name in `folder`, which goes with this; errors call it `path`.
+    /// Creates an empty array of rows with these properties in an unnamed file in `folder`, which
+    /// the system deletes when this is dropped; errors name it `path`.
     ///
     /// # Errors
     ///
-    /// [`Error::Write`] where the system has no room for it.
+    /// [`Error::Write`] if the system cannot create the file.
     pub fn temporary(folder: &Path, properties: Properties, path: &Path) -> Result<Self> {
         let file = tempfile::tempfile_in(folder).map_err(|error| Error::write(path, error))?;
         let mut text = Vec::new();
@@ -115,7 +121,7 @@ impl Rows {
         Ok(Self { file, path, element, layout, start: 0, size, big: false, written, comments, rules })
     }
 
-    /// How many there are.
+    /// The number of rows.
     pub fn count(&self) -> u64 {
         self.element.count
     }
@@ -125,32 +131,32 @@ impl Rows {
         self.comments.closed
     }
 
-    /// Bytes of each.
+    /// Size of a row, bytes.
     pub fn size(&self) -> usize {
         self.size as usize
     }
 
-    /// The file's name.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the file is found to be.
+    /// The error that this file is malformed, for the reason `what`.
     pub fn malformed(&self, what: impl Into<String>) -> Error {
         Error::malformed(&self.path, what)
     }
 
-    /// Numbers in pieces of `piece`.
+    /// The row indices in ranges of `piece`, of which the last may be shorter.
     pub fn pieces(&self, piece: u64) -> Vec<Range<u64>> {
         let starts = (0..self.count()).step_by(piece.max(1) as usize);
         starts.map(|start| start..self.count().min(start + piece)).collect()
     }
 
-    /// The bytes of these rows.
+    /// Reads the bytes of these rows.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read.
+    /// [`Error::Read`] if the system cannot read.
     pub fn bytes(&self, numbers: Range<u64>) -> Result<Vec<u8>> {
         let mut bytes = vec![0; ((numbers.end - numbers.start) * self.size) as usize];
         let start = self.start + numbers.start * self.size;
@@ -162,21 +168,21 @@ impl Rows {
         read.map(|()| bytes).map_err(|error| Error::read(&self.path, error))
     }
 
-    /// The points of the bytes of some rows.
+    /// Decodes the bytes of whole rows as points.
     ///
     /// # Errors
     ///
-    /// [`Error::Malformed`] if these are none.
+    /// [`Error::Malformed`] if the rows cannot be decoded.
     pub fn points(&self, bytes: &[u8]) -> Result<Points> {
         let mut points = self.raw(bytes)?;
-        // A piece may be odd where the whole is not.
+        // Notes are dropped: a piece may look odd where the whole file does not.
         self.rules.clone().settle(std::slice::from_mut(&mut points));
         points.notes.clear();
         let Comments { up, closed, unsided, .. } = self.comments;
         Ok(Points { up, closed, unsided, ..points })
     }
 
-    /// The same with colours as the file has them.
+    /// Decodes rows, with colours as they are in the file.
     fn raw(&self, bytes: &[u8]) -> Result<Points> {
         let read = match self.big {
             true => binary::vertices_in::<true>(bytes, &self.layout),
@@ -185,12 +191,12 @@ impl Rows {
         read.map(|(points, _)| points).map_err(|fault| fault.of(&self.path))
     }
 
-    /// Settles what the colours of files mean that are one scene, by all rows where not each tells
-    /// it for itself.
+    /// Decides what the numbers of colours mean in the files of one scene, together. Reads all rows
+    /// of the files whose layout leaves it open.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where rows are none.
+    /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if rows cannot be decoded.
     pub fn settle_colors(files: &mut [Self]) -> Result<()> {
         let (mut survey, mut rules) = (Survey::default(), ColorRules::default());
         for file in files.iter_mut().filter(|file| file.layout.is_judged_whole()) {
@@ -206,7 +212,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Settles whether colours show, or intensities where all of them are zero.
+    /// Chooses colours, or intensities if all colours of the file are zero.
     fn settle_looks(&mut self) -> Result<()> {
         if self.layout.color.is_none() || self.layout.intensity.is_none() {
             return Ok(());
@@ -222,7 +228,7 @@ impl Rows {
         Ok(())
     }
 
-    /// The bytes of some surfels of `scene`, as rows that are written.
+    /// The bytes of these surfels of `scene`, as rows to append.
     pub fn encoded(&self, scene: &Scene, surfels: Range<usize>) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(surfels.len() * self.size());
         let properties = self.written.unwrap_or_default();
@@ -230,11 +236,11 @@ impl Rows {
         bytes
     }
 
-    /// Adds the bytes of rows that are written after all others.
+    /// Appends rows, given as bytes.
     ///
     /// # Errors
     ///
-    /// [`Error::Write`] where the system cannot write.
+    /// [`Error::Write`] if the system cannot write.
     pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
         let end = self.start + self.count() * self.size;
         let written = self.file.as_ref().map_or(Ok(()), |file| {
@@ -245,7 +251,7 @@ impl Rows {
         written.map_err(|error| Error::write(&self.path, error))
     }
 
-    /// Writes all of them to `out`, and tells how many.
+    /// Writes all rows to `out` and reports the progress.
     pub(super) fn copy(&self, out: &mut impl Write, progress: &dyn Progress) -> Result<()> {
         for piece in self.pieces(TOGETHER) {
             let count = piece.end - piece.start;
@@ -256,12 +262,12 @@ impl Rows {
     }
 }
 
-/// Whoever reads or writes says where.
+/// A poisoned lock is no problem: each access seeks first.
 fn lock(file: &Mutex<File>) -> MutexGuard<'_, File> {
     file.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The position of a row that is written with coordinates in f64.
+/// The position of a row whose coordinates are f64.
 pub fn position(row: &[u8]) -> [f64; 3] {
     let (words, _) = row.as_chunks::<8>();
     [0, 1, 2].map(|k| words.get(k).map_or(f64::NAN, |word| f64::from_le_bytes(*word)))

@@ -1,10 +1,10 @@
-//! The kinds of numbers of a PLY vertex's colour.
+//! The number types of a PLY vertex's colour, and what they mean.
 
 use super::header::Scalar;
 use crate::io::color_range::Number;
 use crate::io::values::finite;
 
-/// The kinds of numbers of a colour.
+/// How the colour channels of vertices are encoded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Tint {
     /// 8-bit sRGB codes.
@@ -12,7 +12,8 @@ pub(super) enum Tint {
     Codes,
     /// Linear light, as epsplat writes it.
     Light,
-    /// Numbers of this type, and alphas of that one: all of them tell what they range over.
+    /// Colours of the first type and alphas of the second, whose range is found from all numbers of
+    /// the scene.
     Numbers(Number, Number),
 }
 
@@ -32,7 +33,7 @@ impl Tint {
             return Self::Codes;
         }
         let widest = color.into_iter().max_by_key(|scalar| (scalar.is_float(), scalar.size()));
-        // Bytes beside wider numbers are judged as these are.
+        // Byte channels beside wider ones are judged with these.
         let of_color = match widest.map_or(Number::Byte, number) {
             Number::Byte => Number::WORD,
             wider => wider,
@@ -41,13 +42,14 @@ impl Tint {
     }
 }
 
-/// An 8-bit code: signed ones are unsigned ones that a program took for signed.
+/// An 8-bit code. A negative number is a code above 127 that was stored as a signed byte.
 pub(super) fn code(value: f64) -> u8 {
-    // A cast takes what is beyond the range for its end.
+    // The casts saturate at the ends of the range.
     if value < 0.0 { (value as i8).cast_unsigned() } else { value as u8 }
 }
 
-/// A number of a colour that is no code yet; of signed 16-bit ones as of bytes.
+/// A number of a colour whose range is not known yet. Negative numbers of signed bytes and 16-bit
+/// integers are codes that were stored as signed.
 pub(super) fn number(value: f64, scalar: Scalar) -> f32 {
     match scalar {
         Scalar::I8 if value < 0.0 => (value + 256.0) as f32,

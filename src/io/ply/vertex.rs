@@ -1,4 +1,4 @@
-//! What the properties of a PLY vertex mean, and the points they become.
+//! Maps the properties of a PLY vertex to attributes, and collects vertices as points.
 
 use super::gaussian::{GaussianLayout, Gaussians};
 use super::header::{self, Element, Scalar, Tints};
@@ -10,23 +10,23 @@ use crate::io::fault::{Fault, reserve};
 use crate::io::{Points, TreeRow};
 use crate::scene::{Cap, Clip, Colors};
 
-/// A property that is used, by where it lies among the row's numbers.
+/// A property that is used, and where it is in a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Column {
-    /// Which of the row's scalar properties.
+    /// Index among the row's scalar properties.
     pub(super) slot: usize,
-    /// Bytes from the start of a binary row; lists do not count.
+    /// Offset in a binary row, bytes; lists do not count.
     pub(super) offset: usize,
     pub(super) scalar: Scalar,
 }
 
-/// Where a row's attributes are: each number an index into `columns`.
+/// Where the attributes are in a row: each number is an index into `columns`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub(super) columns: Vec<Column>,
-    /// All scalar properties of a row, used or not, in order.
+    /// The types of all scalar properties of a row, used or not, in order.
     pub(super) scalars: Vec<Scalar>,
-    /// Bytes of a binary row's scalar properties.
+    /// Size of a binary row's scalar properties, bytes.
     pub(super) row_size: usize,
     position: [usize; 3],
     normal: Option<[usize; 3]>,
@@ -38,43 +38,43 @@ pub(super) struct Layout {
     alpha: Option<usize>,
     tint: Tint,
     pub(super) intensity: Option<usize>,
-    /// Colours are what they are, whatever other files have.
+    /// epsplat wrote the file, so the range of its colours is known without those of other files.
     own: bool,
     texture: Option<[usize; 2]>,
     texture_number: Option<usize>,
     texture_slopes: Option<[[usize; 3]; 2]>,
     gaussian: Option<GaussianLayout>,
-    /// Cone, first, count and leaf of a node.
+    /// The columns `cone`, `first`, `count` and `leaf` of a node.
     node: Option<[usize; 4]>,
 }
 
-/// What a node has beside an ellipse and a colour ([`TreeRow`]).
+/// Properties of a node beside its ellipse and its colour ([`TreeRow`]).
 pub(super) const NODE_NAMES: [&str; 4] = ["cone", "first", "count", "leaf"];
 
-/// Whether an element has levels of detail: other programs may call something else a node.
+/// Whether an element is the nodes of levels of detail: other programs may have another `node`.
 pub(super) fn is_tree(element: &Element) -> bool {
     let has = |name: &str| element.properties.iter().any(|property| property.name == name);
     element.name == "node" && ["x", "y", "z", "sx", "tz", "radius"].into_iter().chain(NODE_NAMES).all(has)
 }
 
-/// The lines at which an ellipse ends ([`Clip`]), in units of its half-axes.
+/// The lines that cut an ellipse ([`Clip`]), in units of its half-axes.
 pub(super) const CLIP_NAMES: [&str; 6] = ["clip1_u", "clip1_v", "clip1_w", "clip2_u", "clip2_v", "clip2_w"];
 
-/// How an ellipse curves ([`Cap`]), world units.
+/// The curvature of an ellipse ([`Cap`]), world units.
 pub(super) const CAP_NAMES: [&str; 3] = ["cap_uu", "cap_uv", "cap_vv"];
 
-/// What texture coordinates gain for a world unit along each axis.
+/// Gradients of u and v along x, y and z, per world unit.
 pub(super) const SLOPE_NAMES: [[&str; 3]; 2] =
     [["texture_u_x", "texture_u_y", "texture_u_z"], ["texture_v_x", "texture_v_y", "texture_v_z"]];
 
-/// Which texture they are in; a negative one means none. MeshLab's faces have it too.
+/// Index of the texture; negative means none. MeshLab's faces have the same property.
 pub(super) const NUMBER_NAME: &str = "texnumber";
 
-/// What programs call texture coordinates, the most telling names first.
+/// Names of texture coordinates that programs write, the most specific first.
 const TEXTURE_NAMES: [[&str; 2]; 5] =
     [["texture_u", "texture_v"], ["texcoord_u", "texcoord_v"], ["s", "t"], ["u", "v"], ["texcoord_s", "texcoord_t"]];
 
-/// The scalar properties of a row, by name, where each one is.
+/// The names of a row's scalar properties, and where they are.
 fn scalars_of(element: &Element) -> Vec<(&str, Column)> {
     let mut places: Vec<(&str, Column)> = Vec::new();
     let mut offset = 0;
@@ -167,23 +167,23 @@ impl Layout {
         })
     }
 
-    /// Whether all that a row is, is an ellipse with what belongs to it: neither a Gaussian nor a place in a texture.
+    /// Whether a row is an ellipse with half-axes and nothing else: not a Gaussian, not textured.
     pub(super) fn has_axes_alone(&self) -> bool {
         self.axes.is_some() && self.gaussian.is_none() && self.texture.is_none()
     }
 
-    /// Whether a row is a disk: neither a Gaussian nor a place in a texture.
+    /// Whether a row is a disk, by half-axes or by normal and radius: not a Gaussian, not textured.
     pub(super) fn is_disk(&self) -> bool {
         let round = self.normal.is_some() && self.radius.is_some();
         (self.axes.is_some() || round) && self.gaussian.is_none() && self.texture.is_none()
     }
 
-    /// Whether all rows of the file tell what colours are, and not each for itself.
+    /// Whether the meaning of colours depends on all rows of the file.
     pub(super) fn is_judged_whole(&self) -> bool {
         self.gaussian.is_none() && !self.own && (self.intensity.is_some() || matches!(self.tint, Tint::Numbers(..)))
     }
 
-    /// Lets either colours or intensities show of all rows, where a row has both.
+    /// Makes all rows show either their colours or their intensities, where they have both.
     pub(super) fn show(&mut self, colors: bool) {
         if colors {
             self.intensity = None;
@@ -210,12 +210,12 @@ impl Layout {
     }
 }
 
-/// All three, if there are three.
+/// All three indices, or None if one is missing.
 fn each([a, b, c]: [Option<usize>; 3]) -> Option<[usize; 3]> {
     Some([a?, b?, c?])
 }
 
-/// The points of a file while they are being read.
+/// Collects the points of a file block by block.
 #[derive(Debug)]
 pub(super) struct Vertices<'a> {
     layout: &'a Layout,
@@ -229,9 +229,9 @@ pub(super) struct Vertices<'a> {
     texture_numbers: Vec<u32>,
     texture_slopes: Vec<[[f32; 3]; 2]>,
     srgb8: Vec<[u8; 4]>,
-    /// Linear light, or other numbers.
+    /// Colours that are not 8-bit codes: linear light, or numbers whose range is not known yet.
     floats: Vec<[f32; 4]>,
-    /// Intensities, as long as no colour says anything.
+    /// Intensities, collected until a colour that is not zero occurs.
     shades: Vec<f32>,
     /// Some colour is not zero.
     colored: bool,
@@ -240,7 +240,7 @@ pub(super) struct Vertices<'a> {
 }
 
 impl<'a> Vertices<'a> {
-    /// Room for `rows`, which must be a number that the file's length allows.
+    /// Reserves memory for `rows` points; the caller limits them by the length of the file.
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
         let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -290,7 +290,8 @@ impl<'a> Vertices<'a> {
         self.positions.len() as u64
     }
 
-    /// One row: `rows` values of each column, in the order of [`Layout::columns`].
+    /// Adds `rows` points; `value(column, row)` gives their numbers, where `column` is an index
+    /// into [`Layout::columns`].
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let layout = self.layout;
         let [x, y, z] = layout.position;
@@ -321,7 +322,7 @@ impl<'a> Vertices<'a> {
             self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
         }
         if let Some(column) = layout.texture_number {
-            // A cast takes what is no number for 0.
+            // The cast turns NaN into 0.
             let number = |number: f64| if number < 0.0 { u32::MAX } else { number as u32 };
             self.texture_numbers.extend((0..rows).map(|row| number(value(column, row))));
         }
@@ -330,7 +331,7 @@ impl<'a> Vertices<'a> {
             self.texture_slopes.extend((0..rows).map(slopes));
         }
         if let Some([cone, first, count, leaf]) = layout.node {
-            // A cast takes what is no such number for another one, which makes no tree.
+            // The casts turn invalid numbers into other ones, with which the tree fails its check.
             self.rows.extend((0..rows).map(|row| TreeRow {
                 cone: value(cone, row) as f32,
                 first: value(first, row) as u32,
@@ -341,7 +342,7 @@ impl<'a> Vertices<'a> {
         self.extend_colors(rows, &value);
     }
 
-    /// The colours and intensities of rows.
+    /// Adds the colours and intensities of `rows` points.
     fn extend_colors(&mut self, rows: usize, value: &impl Fn(usize, usize) -> f64) {
         let layout = self.layout;
         if let Some(color) = layout.color {
@@ -367,7 +368,7 @@ impl<'a> Vertices<'a> {
         }
     }
 
-    /// The points, and of nodes what else they have.
+    /// The points, and the [`TreeRow`]s if they are nodes.
     pub(super) fn into_points(self) -> (Points, Vec<TreeRow>) {
         let layout = self.layout;
         let count = self.positions.len();

@@ -1,14 +1,14 @@
-//! What a PLY file with levels of detail says of all its points together: one row of an element `scene`, numbers all.
+//! The element `scene` of a file with levels of detail: one row of facts of all its points.
 
 use super::header::{Element, Kind, Property, Scalar};
 use crate::scene::Bounds;
 use crate::scene::whole::{Has, LevelFacts, Whole};
 use glam::DVec3;
 
-/// The element.
+/// The name of the element.
 pub(super) const ELEMENT: &str = "scene";
 
-/// Its properties, doubles: boxes and colours from the smallest to the largest, flags last.
+/// Its properties, all `double`: boxes and colours as minimum and maximum, flags last.
 const NAMES: [&str; 44] = [
     "origin_x",
     "origin_y",
@@ -56,16 +56,16 @@ const NAMES: [&str; 44] = [
     "own_normals",
 ];
 
-/// Bytes of its row.
+/// Size of the row, bytes.
 pub(super) const BYTES: usize = 8 * NAMES.len();
 
-/// Its lines in a header.
+/// The lines of the element in a header.
 pub(super) fn lines() -> String {
     let properties: String = NAMES.iter().map(|name| format!("property double {name}\n")).collect();
     format!("element {ELEMENT} 1\n{properties}")
 }
 
-/// Whether an element is that.
+/// Whether an element is exactly this one.
 pub(super) fn is_whole(element: &Element) -> bool {
     let is = |(property, name): (&Property, &str)| property.name == name && property.kind == Kind::Scalar(Scalar::F64);
     element.name == ELEMENT
@@ -74,7 +74,7 @@ pub(super) fn is_whole(element: &Element) -> bool {
         && element.properties.iter().zip(NAMES).all(is)
 }
 
-/// Its row, little-endian.
+/// Encodes the row, little-endian.
 pub(super) fn bytes(whole: &Whole) -> Vec<u8> {
     let Whole { origin, bounds, body, core, framed, color: (low, high), levels, has, .. } = whole;
     let boxes = [bounds, body, core, framed].into_iter().flat_map(|bounds| [bounds.min, bounds.max]);
@@ -86,7 +86,7 @@ pub(super) fn bytes(whole: &Whole) -> Vec<u8> {
     numbers.flat_map(f64::to_le_bytes).collect()
 }
 
-/// What a row says of so many surfels and nodes.
+/// Decodes the row of a file with this many surfels and nodes.
 pub(super) fn parse(row: &[u8; BYTES], surfels: u32, nodes: u32) -> Whole {
     let (words, _) = row.as_chunks::<8>();
     let number = |at: usize| f64::from_le_bytes(words[at]);

@@ -1,4 +1,4 @@
-//! From surfels to PLY bytes.
+//! Writes surfels and points as PLY.
 
 use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
@@ -11,32 +11,32 @@ use rayon::prelude::*;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// One surfel as a PLY vertex. What a file's [`Properties`] do not name is not written.
+/// One surfel as a PLY vertex. Fields that the [`Properties`] of the file lack are not written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vertex {
     /// World coordinates.
     pub position: [f64; 3],
-    /// The normal, as it shall stand in the file.
+    /// The normal, written as it is.
     pub normal: [f32; 3],
-    /// The disk's radius, world units; of an ellipse the longer half-axis.
+    /// The disk's radius, or the longer half-axis of an ellipse, world units.
     pub radius: f32,
     /// Half-axes s and t, world units.
     pub axes: [[f32; 3]; 2],
-    /// Where their ellipse ends before its rim.
+    /// The lines that cut the ellipse.
     pub clip: Clip,
-    /// How it curves.
+    /// The curvature of the ellipse.
     pub cap: Cap,
-    /// Where colours are written, a surfel without one gets [`DEFAULT_COLOR`].
+    /// The colour; None is written as [`DEFAULT_COLOR`] if the file has colours.
     pub color: Option<Color>,
     /// Texture coordinates (u, v), origin bottom left.
     pub texture: [f32; 2],
-    /// Which texture they are in; a negative one means none.
+    /// Index of the texture; negative means none.
     pub texture_number: i32,
-    /// What they gain for a world unit along x, y and z.
+    /// Gradients of u and v along x, y and z, per world unit.
     pub texture_slopes: [[f32; 3]; 2],
 }
 
-/// The colour of a vertex, alpha straight: 1 is opaque.
+/// The colour of a vertex. Alpha is straight: 1 is opaque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Color {
     /// 8-bit sRGB and linear alpha.
@@ -46,7 +46,7 @@ pub enum Color {
 }
 
 impl Color {
-    /// 8-bit sRGB; linear light outside [0, 1] is clamped.
+    /// The colour as 8-bit sRGB; linear light is clamped to [0, 1].
     fn srgb8(self) -> [u8; 4] {
         match self {
             Self::Srgb8(codes) => codes,
@@ -65,24 +65,24 @@ impl Color {
     }
 }
 
-/// How the colours of a file are coded.
+/// The encoding of a file's colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorProperties {
-    /// None are written.
+    /// No colours.
     #[default]
     Absent,
     /// `uchar red green blue`: 8-bit sRGB.
     Srgb8,
-    /// The same with `uchar alpha`.
+    /// `uchar red green blue alpha`: 8-bit sRGB and linear alpha.
     Srgb8Alpha,
-    /// `float red green blue alpha`: linear light, of any size.
+    /// `float red green blue alpha`: linear light, unclamped.
     Linear,
 }
 
-/// Which types and properties a written file has; the order is that of these fields.
+/// The properties of a file and their types, in the order in which they are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Properties {
-    /// Coordinates are `double`, not `float`: for coordinates whose last digits an f32 would lose.
+    /// Coordinates are `double` instead of `float`: some need more digits than an f32 has.
     pub double_coordinates: bool,
     /// `float nx ny nz` are written.
     pub normals: bool,
@@ -102,17 +102,18 @@ pub struct Properties {
     pub texture_number: bool,
     /// `float texture_u_x` to `texture_v_z` are written.
     pub texture_slopes: bool,
-    /// `comment up y` or `comment up z` says which way is up.
+    /// `comment up y` or `comment up z` names the axis that points up.
     pub up: Option<Up>,
-    /// `comment unsided` says that normals tell no sides.
+    /// `comment unsided` says that normals do not tell the two sides of a surface apart.
     pub unsided: bool,
-    /// `comment closed` says that the surfels cover a closed surface, from outside.
+    /// `comment closed` says that the surfels cover a closed surface and face outward.
     pub closed: bool,
 }
 
 impl Properties {
-    /// What `points` need so that nothing of them is lost: `double` where a coordinate is not an f32, `alpha` where it is
-    /// not 1 everywhere. Half-axes bring normals and radii along, for programs that know only those.
+    /// The properties with which `points` are written without loss: `double` if a coordinate is not
+    /// an f32, `alpha` if one is not 1. With half-axes, normals and radii are written too, for
+    /// programs that know only those.
     pub fn of(points: &Points) -> Self {
         Self {
             double_coordinates: points.positions.iter().flatten().any(|c| f64::from(*c as f32) != *c && !c.is_nan()),
@@ -152,7 +153,7 @@ impl Properties {
         self.write_properties(out)
     }
 
-    /// The lines of an element's properties.
+    /// Writes the header lines of an element's properties.
     pub(super) fn write_properties(self, out: &mut impl Write) -> io::Result<()> {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
@@ -186,7 +187,7 @@ impl Properties {
         Ok(())
     }
 
-    /// Appends the bytes of `vertex`.
+    /// Appends the bytes of `vertex` to `row`.
     pub(super) fn encode(self, vertex: &Vertex, row: &mut Vec<u8>) {
         for coordinate in vertex.position {
             if self.double_coordinates {
@@ -232,12 +233,13 @@ impl Properties {
 
 /// Writes `count` vertices as binary little-endian PLY, in the format of [this module](super).
 ///
-/// The vertices are written as they come, so that they never lie in memory together; the file appears whole or not at
-/// all.
+/// Vertices are written one by one and never held in memory together. The file appears whole or not
+/// at all.
 ///
 /// # Errors
 ///
-/// [`Error::Write`](crate::Error::Write) where the system cannot write, or `vertices` are not `count` many.
+/// [`Error::Write`](crate::Error::Write) if the system cannot write, or if `vertices` does not
+/// yield `count` vertices.
 pub fn write(
     path: &Path,
     properties: Properties,
@@ -262,13 +264,15 @@ pub fn write(
     })
 }
 
-/// Writes all that `points` hold but levels of detail, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
+/// Writes `points`, without levels of detail, so that [`read`](super::read) returns them unchanged.
+/// Gaussians are written as 2D Gaussian splatting does, in f32.
 ///
-/// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
+/// If there are half-axes, a missing normal is written as s x t normalised, and a missing radius as
+/// the longer half-axis.
 ///
 /// # Errors
 ///
-/// [`Error::Write`](crate::Error::Write) where the system cannot write.
+/// [`Error::Write`](crate::Error::Write) if the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
     if points.encoded {
         return write_gaussians::write(path, points, progress);
@@ -286,7 +290,8 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     written
 }
 
-/// Writes `count` rows, which `encode` appends the bytes of: some blocks at a time by all threads, while those before are written.
+/// Writes `count` rows, of which `encode` appends the bytes. All threads encode some blocks while
+/// those before them are written.
 pub(super) fn write_rows(
     out: &mut (impl Write + Send),
     count: usize,
@@ -313,7 +318,7 @@ pub(super) fn write_rows(
     blocks.iter().try_for_each(|rows| out.write_all(rows))
 }
 
-/// What is written of a point.
+/// The vertex to write for a point.
 fn vertex(points: &Points, index: usize) -> Vertex {
     let axes = of(&points.axes, index);
     Vertex {
@@ -337,7 +342,7 @@ fn vertex(points: &Points, index: usize) -> Vertex {
     }
 }
 
-/// Whether the path is one of a PLY file, by its extension.
+/// Checks that the extension of `path` is that of a PLY file.
 ///
 /// # Errors
 ///
@@ -354,9 +359,9 @@ fn of<T: Copy>(all: &Option<Vec<T>>, index: usize) -> Option<T> {
     all.as_ref()?.get(index).copied()
 }
 
-/// The unit normal of a disk with these half-axes, zero where they span none.
+/// The unit normal of a disk with these half-axes; zero if they span no plane.
 pub(super) fn normal([s, t]: [[f32; 3]; 2]) -> [f32; 3] {
-    // In f64 the product of f32 numbers neither overflows nor underflows.
+    // In f64, products of f32 numbers neither overflow nor underflow.
     let [s, t] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
     s.cross(t).normalize_or_zero().as_vec3().to_array()
 }

@@ -1,4 +1,5 @@
-//! From Gaussians to the bytes of a file of 2D Gaussian splatting, whose numbers are as they are trained ([`gaussian`](super::gaussian)).
+//! Writes Gaussians as 2D Gaussian splatting does: with its trained parameters
+//! ([`gaussian`](super::gaussian)).
 
 use std::f64::consts::PI;
 use std::io::{self, Write};
@@ -13,13 +14,13 @@ use crate::scene::harmonics::terms_of;
 use crate::scene::{Colors, Harmonics};
 use crate::{Progress, Result};
 
-/// An opacity this near to 0 or 1 is written as if it were so far from it: the logistic function has no place for it.
+/// Opacities are clamped to this distance from 0 and 1, where the inverse logistic is infinite.
 const NEAREST: f64 = 1e-9;
 
-/// Rows between two words about progress.
+/// Rows between two reports of progress.
 const TOLD: usize = 1 << 16;
 
-/// Writes `points`, which are Gaussians, so that [`read`](super::read) gives them back but for rounding.
+/// Writes `points`, which are Gaussians; [`read`](super::read) returns them up to rounding.
 pub(super) fn write(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
     let count = points.positions.len();
     progress.begin("writing Gaussians", count as u64);
@@ -62,7 +63,7 @@ fn header(out: &mut Output<'_>, points: &Points) -> io::Result<()> {
     out.write_all(b"end_header\n")
 }
 
-/// Appends the numbers of the Gaussian `index`.
+/// Appends the numbers of the Gaussian at `index`.
 fn encode(points: &Points, index: usize, row: &mut Vec<f32>) {
     row.extend(points.positions[index].map(|c| c as f32));
     row.extend([0.0; 3]);

@@ -1,4 +1,4 @@
-//! From triangles to PLY bytes, as MeshLab writes them: texture coordinates by the corners of faces, images in comments.
+//! Writes triangles as PLY, as MeshLab does: texture coordinates in faces, images in comments.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -12,20 +12,24 @@ use crate::io::Mesh;
 use crate::io::atomic::write_whole;
 use crate::progress::Progress;
 
-/// A vertex is one wherever all that is written of it is the same.
+/// Corners that agree in all of position, normal and colour, to the bit, share a vertex.
 type Key = ([u64; 3], [u32; 3], [u32; 4]);
 
-/// Writes the triangles of `mesh`, whose parts fit each other ([`Mesh::check`]), so that [`read_mesh`](super::read_mesh) gives them back:
-/// with normals, and with colours in linear light, those of materials too. Materials with an image have those that `images` name, one each
-/// in the order of the mesh's materials, beside the file, times what an image is multiplied with ([`Material::painted`](crate::io::Material)).
-/// By a comment [`textures_of_hybrid`](super::textures_of_hybrid) knows the file again.
+/// Writes the triangles of `mesh`, whose arrays must be consistent ([`Mesh::check`]), so that
+/// [`read_mesh`](super::read_mesh) returns them: with normals, and with colours in linear light,
+/// including those of materials.
+///
+/// `images` are names of files beside the written one, one for each material that has an image, in
+/// the order of materials. Each must hold the image times the diffuse colour
+/// ([`Material::painted`](crate::io::Material)). A comment marks the file for
+/// [`textures_of_hybrid`](super::textures_of_hybrid).
 ///
 /// # Errors
 ///
-/// [`Error::Write`](crate::Error::Write) where the system cannot write.
+/// [`Error::Write`](crate::Error::Write) if the system cannot write.
 pub fn write_mesh(path: &Path, mesh: &Mesh, images: &[String], progress: &dyn Progress) -> Result<()> {
     progress.begin("writing triangles", 0);
-    // The number of each material's image.
+    // The index of each material's image.
     let mut image = 0;
     let numbers: Vec<Option<i32>> = mesh
         .materials
@@ -73,7 +77,7 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, images: &[String], progress: &dyn Pr
             if let Some(places) = mesh.texture.as_ref().and_then(|all| all.get(triangle)) {
                 row.push(6);
                 places.as_flattened().iter().for_each(|value| row.extend(value.to_le_bytes()));
-                // One past the last is none.
+                // An index past the last image means none.
                 row.extend(number(triangle).unwrap_or(images.len() as i32).to_le_bytes());
             }
             out.write_all(&row)?;
@@ -84,7 +88,7 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, images: &[String], progress: &dyn Pr
     written
 }
 
-/// The vertices, and those of each triangle. What an image paints is white.
+/// The vertices, and the vertex indices of each triangle. Corners under an image are white.
 fn vertices(mesh: &Mesh, colored: bool, has_image: impl Fn(usize) -> bool) -> (Vec<Vertex>, Vec<[u32; 3]>) {
     let (mut known, mut all): (HashMap<Key, u32>, Vec<Vertex>) = (HashMap::new(), Vec::new());
     let mut corner = |triangle: usize, k: usize| {

@@ -1,4 +1,4 @@
-//! From the surfels of a scene, and their levels of detail, to PLY bytes: no copy of them is made.
+//! Writes the surfels of a scene and their levels of detail as PLY, without a copy of them.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,11 +16,12 @@ use crate::scene::hierarchy::{Node, NodeAndLow};
 use crate::scene::{Colors, Hierarchy, Scene, Whole};
 use crate::{Progress, Result};
 
-/// Writes the surfels of `scene`, and their levels of detail, so that [`read`](super::read) gives them back, drawn `beside` a mesh or not.
+/// Writes the surfels of `scene` and their levels of detail, so that [`read`](super::read) returns
+/// them; `beside` is a mesh that they are drawn beside.
 ///
 /// # Errors
 ///
-/// [`Error::Write`](crate::Error::Write) where the system cannot write.
+/// [`Error::Write`](crate::Error::Write) if the system cannot write.
 pub fn write_scene(path: &Path, scene: &Scene, beside: Option<&Path>, progress: &dyn Progress) -> Result<()> {
     let (count, whole) = (scene.surfels.len(), Whole::of(scene));
     let levels = scene.hierarchy.as_deref().map(|hierarchy| (hierarchy, Nodes::of(hierarchy, scene)));
@@ -50,11 +51,12 @@ pub fn write_scene(path: &Path, scene: &Scene, beside: Option<&Path>, progress: 
     written
 }
 
-/// Writes surfels that are kept in a file with these properties, and nodes of this kind, which come level by level, as [`write_scene`] would.
+/// Writes the same file as [`write_scene`], from surfels in a temporary file and from nodes that
+/// arrive level by level.
 ///
 /// # Errors
 ///
-/// [`Error::Write`](crate::Error::Write) where the system cannot write, or nodes cannot be read.
+/// [`Error::Write`](crate::Error::Write) if the system cannot write, or nodes cannot be read.
 pub(crate) fn write_kept(
     path: &Path,
     (properties, surfels): (Properties, &Rows),
@@ -76,13 +78,13 @@ pub(crate) fn write_kept(
     })
 }
 
-/// What comes before the rows.
+/// The content of the header.
 pub(super) struct Head<'a> {
     pub properties: Properties,
     pub count: u64,
     /// A mesh that the surfels are drawn beside.
     pub beside: Option<&'a Path>,
-    /// Of nodes, and how many there are.
+    /// The properties of nodes, and their number.
     pub nodes: Option<(Properties, u64)>,
     pub whole: Option<&'a Whole>,
 }
@@ -108,7 +110,8 @@ impl Head<'_> {
 }
 
 impl Properties {
-    /// What the surfels of `scene` need so that nothing of them is lost, as [`Properties::of`] points.
+    /// The properties with which the surfels of `scene` are written without loss, as
+    /// [`Properties::of`] has them for points.
     pub(super) fn of_scene(scene: &Scene) -> Self {
         let position = |index| (scene.origin + scene.center(index)).to_array();
         Self {
@@ -137,7 +140,7 @@ pub(crate) fn needs_double(position: [f64; 3]) -> bool {
     position.iter().any(|c| f64::from(*c as f32) != *c)
 }
 
-/// What is written of a surfel.
+/// The vertex to write for a surfel.
 pub(super) fn vertex(scene: &Scene, index: usize) -> Vertex {
     let surfel = &scene.surfels[index];
     let axes = [surfel.s, surfel.t];
@@ -156,11 +159,11 @@ pub(super) fn vertex(scene: &Scene, index: usize) -> Vertex {
     }
 }
 
-/// What nodes are written with.
+/// How nodes are written: the properties that all of them together need.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nodes {
     origin: DVec3,
-    /// Colours are codes of 8 bits, as those of surfels are.
+    /// Colours are 8-bit codes, as those of surfels are.
     coded: bool,
     double: bool,
     caps: bool,
@@ -168,7 +171,7 @@ pub(crate) struct Nodes {
 }
 
 impl Nodes {
-    /// Of no nodes.
+    /// The smallest set of properties, before any node is known.
     pub fn none(origin: DVec3, coded: bool) -> Self {
         Self { origin, coded, double: false, caps: false, opaque: true }
     }
@@ -180,18 +183,18 @@ impl Nodes {
         nodes.fold(|| none, |all, (index, node)| all.with(node, low(index))).reduce(|| none, Self::both)
     }
 
-    /// What these need, and another node.
+    /// The same with the properties that another node needs.
     pub fn with(self, node: &Node, low: [f32; 3]) -> Self {
         Self {
             double: self.double || needs_double(self.position(node, low)),
             caps: self.caps || !node.cap.is_flat(),
-            // A code of less than 255.
+            // Alpha below 1 needs a code below 255.
             opaque: self.opaque && node.color[3] >= 1.0,
             ..self
         }
     }
 
-    /// What these need, and others.
+    /// The same with the properties that other nodes need.
     pub fn both(self, other: Self) -> Self {
         Self {
             double: self.double || other.double,
@@ -201,7 +204,7 @@ impl Nodes {
         }
     }
 
-    /// A node has no normal but its half-axes', and a radius that is its sphere's.
+    /// The properties of nodes: no normal, as it is s x t; `radius` is that of the bounding sphere.
     pub fn properties(&self) -> Properties {
         Properties {
             double_coordinates: self.double,
@@ -222,7 +225,7 @@ impl Nodes {
         (self.origin + (center + low)).to_array()
     }
 
-    /// Appends the bytes of a node, of which the f32 centre leaves `low` out.
+    /// Appends the bytes of a node; `low` is its centre less the one in f32, world units.
     pub fn encode(&self, node: &Node, low: [f32; 3], rows: &mut Vec<u8>) {
         let color = if self.coded { Color::Srgb8(srgb8(node.color)) } else { Color::Linear(node.color) };
         let vertex = Vertex {

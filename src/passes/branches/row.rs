@@ -1,4 +1,5 @@
-//! Rows of branches: what they hold of nodes, and as the device sees them.
+//! Rows of branches: the data that they store per node, and their conversion to the device's
+//! layout.
 
 use glam::DVec3;
 
@@ -6,22 +7,23 @@ use super::Branch;
 use crate::gpu::layout::{KIND_SHIFT, LEAF, TreeNode};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
-/// The bits of [`TreeNode::below`] that say how many surfels or children there are.
+/// The bits of [`TreeNode::below`] that hold the number of surfels or children.
 pub(super) const COUNT_MASK: u32 = (1 << KIND_SHIFT) - 1;
 
-/// What is below a row of a branch.
+/// The contents of a row of a branch: the surfels or children of its node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// [`TreeNode::first`].
     pub(super) first: u32,
     /// [`TreeNode::below`].
     pub(super) below: u32,
-    /// Its node's children are in this branch, so that they may be judged together ([`TreeNode::children`]).
+    /// Whether all children of its node are in this branch, so that they may be judged together
+    /// ([`TreeNode::children`]).
     pub(super) together: bool,
 }
 
 impl Branch {
-    /// A row as the device sees it, of a branch of `tree`.
+    /// The device's layout of a row. `tree` is the tree of this branch.
     pub fn row(&self, tree: &Hierarchy, index: usize) -> TreeNode {
         let (Row { first, below, together }, number) = (self.nodes[index], self.numbers[index]);
         let Node { surfel, radius, cone, .. } = tree.nodes[number as usize];
@@ -29,18 +31,18 @@ impl Branch {
         TreeNode { center: surfel.center, radius, first, below, children, cone }
     }
 
-    /// The place in the scene of the surfel that is all of a row's node, if it is a leaf of one.
+    /// The place in the scene of the only surfel of a row's node, if that is a leaf of one surfel.
     pub fn only_surfel(&self, row: usize) -> Option<u32> {
         let Row { first, below, .. } = self.nodes[row];
         (below == LEAF << KIND_SHIFT | 1).then(|| self.surfels.start + first)
     }
 }
 
-/// Of a node whose children are judged one by one ([`TreeNode::children`]).
+/// The value of [`TreeNode::children`] for a node whose children are judged one by one.
 pub(super) const ONE_BY_ONE: f32 = -1.0;
 
-/// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel. Of another
-/// one its children are judged one by one.
+/// The largest radius of an inner node's children, except leaves of one surfel, if the node's ball
+/// holds all their centres. Otherwise the children are judged one by one.
 fn children_of(tree: &Hierarchy, number: u32) -> f32 {
     let node = &tree.nodes[number as usize];
     let center = |number: u32| {
@@ -68,7 +70,7 @@ mod tests {
     use super::*;
     use crate::scene::{Cap, Surfel};
 
-    /// Of a file that somebody else wrote.
+    /// The tree of a file that other software wrote.
     #[test]
     fn children_outside_their_parents_ball_are_judged_one_by_one() {
         let node = |x: f32, radius: f32, (first, count): (u32, u32), leaf: bool| Node {
@@ -87,7 +89,7 @@ mod tests {
             let tree = Hierarchy { nodes, low };
             children_of(&tree, 0)
         };
-        // Large balls may stand out, centres may not.
+        // Children's balls may stick out, their centres may not.
         assert_eq!(of(1.0, 0.0), 9.0);
         assert_eq!(of(1.0, 1e-9), ONE_BY_ONE);
         assert_eq!(of(-1.1, 0.0), ONE_BY_ONE);

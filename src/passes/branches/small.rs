@@ -1,32 +1,37 @@
-//! Levels of branches that are small, which one workgroup judges and spreads in one dispatch (`select_top` in `wgsl/select.wgsl`).
+//! The small levels of a branch, which one workgroup judges and spreads in one dispatch
+//! (`select_top` in `wgsl/select.wgsl`).
 
 use super::MOST_OF_LEAF;
 use super::row::{COUNT_MASK, Row};
 use crate::gpu::layout::{JUDGED, WORKGROUP};
 
-/// Rounds of all its loops after which llvmpipe ends an invocation, whatever is left to do.
+/// The rounds of all its loops after which llvmpipe ends an invocation, whatever is left to do.
 pub(super) const MOST_ROUNDS: u64 = 65_535;
 
-/// The most rounds in which an invocation judges and spreads its nodes of a level, of which none has more than so many surfels or children: of each node
-/// one for each of these, and no more than nine in which it is come to, loops end, and sums are made.
+/// The most rounds in which an invocation judges and spreads its nodes of a level, if none has more
+/// than `below` surfels or children.
+///
+/// Each node takes one round for each of these, and at most nine for reaching it, the ends of
+/// loops, and sums.
 pub(super) const fn rounds_of(below: u32) -> u64 {
     JUDGED as u64 * (below as u64 + 9)
 }
 
 const _: () = assert!(rounds_of(MOST_OF_LEAF) < MOST_ROUNDS);
 
-/// The first levels of a branch that are small ([`Branch::small_levels`]).
+/// Counts the top levels of a branch that are small
+/// ([`Branch::small_levels`](super::Branch::small_levels)).
 pub(super) struct Small {
-    /// How many there are.
+    /// The number of small levels so far.
     pub levels: u32,
-    /// In which an invocation goes through them.
+    /// The most rounds in which an invocation processes them.
     rounds: u64,
-    /// The next one is none of them.
+    /// Whether the next level is not small.
     ended: bool,
 }
 
 impl Small {
-    /// Of a branch with so many roots, to which one invocation comes.
+    /// Starts with a branch of so many roots, which one invocation visits.
     pub fn of(roots: u64) -> Self {
         Self { levels: 0, rounds: roots, ended: false }
     }

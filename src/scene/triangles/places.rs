@@ -1,20 +1,21 @@
-//! The numbers that a triangle's corner is kept as: three f32, or two each where rounding shows.
+//! Stored positions of triangle corners: three f32, or pairs of f32 where the rounding of one is
+//! visible.
 
 use glam::DVec3;
 
-/// The numbers that a place is kept as, which tell it from others.
+/// A stored position, whose bits are compared for equality and order.
 pub(super) trait Place: Copy + Ord + Send + Sync {
-    /// The place.
+    /// The position in f64.
     fn exact(self) -> DVec3;
 
-    /// The nearest f32.
+    /// The position rounded to f32.
     fn high(self) -> [f32; 3];
 
-    /// The rest after rounding, if it is kept.
+    /// The part beyond f32, if it is stored.
     fn low(self) -> Option<[f32; 3]>;
 }
 
-/// Bits of f32.
+/// The bits of three f32 coordinates.
 type Bits = [u32; 3];
 
 impl Place for Bits {
@@ -45,30 +46,32 @@ impl Place for [Bits; 2] {
     }
 }
 
-/// A place as f32. Adding +0 makes the two zeros one.
+/// Rounds a position to f32. Adding +0 turns -0 into +0.
 pub(super) fn single(place: [f64; 3]) -> Bits {
     place.map(|x| (x as f32 + 0.0).to_bits())
 }
 
-/// A place as two f32 each.
+/// Splits a position into two f32 per coordinate.
 pub(super) fn doubled(place: [f64; 3]) -> [Bits; 2] {
     let high = single(place);
     let low = DVec3::from_array(place) - high.exact();
     [high, single(low.to_array())]
 }
 
-/// Rounding that is less than this part of a triangle's width does not show, as with surfels.
+/// A rounding error below this fraction of a triangle's width is invisible, as for surfels.
 const LEAST_PART: f64 = 1.0 / 256.0;
 
-/// A triangle narrower than this part of its coordinates may be a line whose corners are rounded.
+/// A triangle narrower than this fraction of its coordinates may be a line with rounded corners.
 pub(super) const LEAST_WIDTH: f64 = 1.0 / (1u64 << 50) as f64;
 
-/// Rounding is not reported for triangles narrower than this part of their coordinates: most were
-/// meant to be lines.
+/// Rounding is not reported for triangles narrower than this fraction of their coordinates: most of
+/// them were meant to be lines.
 pub(super) const LEAST_TOLD: f64 = 1.0 / (1u64 << 46) as f64;
 
-/// The largest error of a corner's coordinate as it is kept, if it may show at the triangle's width
-/// and the triangle is wider than the part `narrowest` of its coordinates.
+/// The largest rounding error of a corner's coordinate; None if it is invisible at the triangle's
+/// width.
+///
+/// None also if the triangle is not wider than the fraction `narrowest` of its coordinates.
 pub(super) fn shown_error<P: Place>(corners: [[f64; 3]; 3], stored: fn([f64; 3]) -> P, narrowest: f64) -> Option<f64> {
     let places = corners.map(DVec3::from_array);
     let error = corners.map(|corner| (DVec3::from_array(corner) - stored(corner).exact()).abs().max_element());
@@ -83,7 +86,8 @@ pub(super) fn shown_error<P: Place>(corners: [[f64; 3]; 3], stored: fn([f64; 3])
     (width > narrowest * size && error > LEAST_PART * width).then_some(error)
 }
 
-/// Whether the corners are no line: along some axis, the area exceeds the rounding of its products.
+/// Whether the corners are not collinear: along some axis, the area exceeds the rounding error of
+/// its products.
 pub(super) fn has_area(corners: [DVec3; 3]) -> bool {
     let [a, b, c] = corners;
     let (ab, ac) = (b - a, c - a);

@@ -1,4 +1,4 @@
-//! What is below a node, wherever it is kept.
+//! The part of the tree below a node, in memory or in files.
 
 use glam::DVec3;
 
@@ -11,27 +11,27 @@ use crate::scene::{Cap, Scene, Surfel};
 #[derive(Clone, Copy)]
 pub(super) struct Disk {
     pub surfel: Surfel,
-    /// With all its digits.
+    /// The centre of the surfel in f64, with its part beyond f32.
     pub center: DVec3,
     pub cap: Cap,
 }
 
 impl Disk {
-    /// One of a scene.
+    /// Surfel `index` of `scene`.
     pub fn of(scene: &Scene, index: usize) -> Self {
         let cap = scene.caps.get(index).copied().unwrap_or_default();
         Self { surfel: scene.surfels[index], center: scene.center(index), cap }
     }
 }
 
-/// What is known of all surfels of a scene.
+/// Facts about all surfels of a scene.
 #[derive(Clone, Copy)]
 pub(super) struct Known {
     /// [`Scene::origin`].
     pub origin: DVec3,
     /// [`Scene::oriented`].
     pub oriented: bool,
-    /// Centres have trailing parts.
+    /// Whether centres have parts beyond f32 ([`Scene::low`]).
     pub low: bool,
     pub scales: Scales,
 }
@@ -43,33 +43,36 @@ impl Known {
     }
 }
 
-/// A node below another one.
+/// A child node.
 pub(super) struct Child<'a, Key> {
     pub key: Key,
     pub node: &'a Node,
-    /// What its f32 centre leaves out.
+    /// The part of its centre beyond f32.
     pub low: [f32; 3],
-    /// The surfels below it; of a node that does not come right below one that is being made it may be 0.
+    /// The number of surfels below it. It may be 0 unless the child is right below the node that is
+    /// being computed.
     pub surfels: u64,
 }
 
-/// A tree whose nodes are known below some that are being made.
+/// A tree in which all nodes below those that are being computed are known.
 pub(super) trait Below: Sync {
-    /// What tells its nodes apart.
+    /// Identifies a node.
     type Key: Copy + Send + Sync;
 
-    /// Whether a node has surfels and no children.
+    /// Whether a node has surfels instead of children.
     fn is_leaf(&self, of: Self::Key) -> bool;
 
-    /// Its children.
+    /// Calls `see` with each child of a node.
     fn children(&self, of: Self::Key, see: impl FnMut(Child<'_, Self::Key>));
 
-    /// The surfels of a leaf.
+    /// Calls `see` with each surfel of a leaf.
     fn disks(&self, of: Self::Key, see: impl FnMut(Disk));
 }
 
-/// How a node is stored while the tree is made: with what its f32 centre leaves out, or without where that is nothing.
+/// A node as it is stored while the tree is built: with the part of its centre beyond f32, or
+/// without it where no centre has one.
 pub(super) trait Stored: Copy + Send + Sync + From<NodeAndLow> {
+    /// The node, and the part of its centre beyond f32.
     fn told(&self) -> (&Node, [f32; 3]);
 }
 
@@ -91,12 +94,12 @@ impl From<NodeAndLow> for Node {
     }
 }
 
-/// A tree in memory, of which the nodes below a level are known.
+/// A tree in memory whose nodes below some level are known.
 #[derive(Clone, Copy)]
 pub(super) struct InMemory<'a, N> {
     pub scene: &'a Scene,
     pub tree: &'a Octree,
-    /// Those from the first one on that is known.
+    /// The index of the first known node; `nodes` starts with it.
     pub first: usize,
     pub nodes: &'a [N],
 }
@@ -108,7 +111,7 @@ impl<N> InMemory<'_, N> {
 }
 
 impl<N: Stored> Below for InMemory<'_, N> {
-    /// The number of its set.
+    /// The index of its set.
     type Key = u32;
 
     fn is_leaf(&self, of: u32) -> bool {

@@ -1,5 +1,6 @@
-//! What a node shows and holds: its ellipse, its sphere and its cone of normals (Pajarola 2003, sections 3.2 and 3.4). The sphere, by which a cut measures, is
-//! larger than what it holds where that does not lie on the node's cap.
+//! The ellipse, the bounding sphere and the cone of normals of a node (Pajarola 2003, sections 3.2
+//! and 3.4). The sphere, by which cuts measure nodes, is larger than necessary where the surfels
+//! lie off the node's cap.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,18 +14,23 @@ use super::sums::Sums;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Scene, Surfel};
 
-/// Surfels of a node whose bounds are made by all threads.
+/// A node of more surfels than this is bounded by all threads.
 const MANY: u64 = 1 << 16;
 
-/// By so many times how far its points lie from a node's cap, root mean square, does a node count as larger than the ball around it, in quadrature: what lies off its cap
-/// is what its picture errs by. For as many splats the Dragon's, igea's and autzen's points come nearer to all surfels by 1.1, 0.8 and 0.2 dB with 10, 1.5, 1.2 and 0.0 with
-/// this, and 1.9, 2.0 and -0.4 with 30: it is about the largest by which none gets farther.
+/// Weight of the root mean square distance of a node's points from its cap, which is added in
+/// quadrature to the radius of its sphere: points off the cap are the error of the node's picture.
+///
+/// For equal numbers of splats, the pictures of the Dragon, igea and autzen come nearer to those of
+/// all surfels by 1.1, 0.8 and 0.2 dB with a weight of 10, by 1.5, 1.2 and 0.0 dB with 16, and by
+/// 1.9, 2.0 and -0.4 dB with 30: 16 is about the largest weight that makes none of them worse.
 const OFF_CAP: f64 = 16.0;
 
-/// The most that a node may count as larger than the ball around it, by which it is found to be out of view, too: it is divided a level sooner at most.
+/// The largest factor by which points off the cap enlarge a node's sphere. It is limited as the
+/// sphere also decides whether the node is out of view: a node is divided at most one level sooner.
 const MOST_LARGER: f64 = 2.0;
 
-/// The node of one surfel of `scene`, with its sums; what its f32 centre leaves out comes second.
+/// Returns the node of surfel `index` of `scene`, which has the sums `sums`, and the part of its
+/// centre beyond f32.
 pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) -> Made {
     let Disk { surfel, cap, .. } = Disk::of(scene, index);
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -41,22 +47,26 @@ pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) ->
     (node, scene.low.get(index).copied().unwrap_or_default())
 }
 
-/// The node of more surfels with these sums on `lattice`, which are below `of`; what its f32 centre leaves out comes second. What is right below it is not told yet.
+/// Returns the node of the surfels below `of`, which have these sums on `lattice`, and the part of
+/// its centre beyond f32.
+///
+/// The caller sets its `first`, `count` and `leaf`.
 pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: &B, known: &Known) -> Made {
     let Known { origin, oriented, scales, .. } = known;
     let (normal, sided) = sums.normal(*oriented);
     let covariance = sums.covariance(lattice, scales);
     let shape = Shape::of(covariance, normal);
-    // As what is stored has it.
+    // The normal of the half-axes as they are stored, rounded.
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
     let mean = lattice.position(sums.moments.mean());
     let curves = sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
     let heights = if curves { curvature::heights(of, below, mean, plane) } else { curvature::FLAT };
-    // A paraboloid with its top at the mean would lie off the surface by the mean height: that much to the other side it does not.
+    // A paraboloid with its apex at the mean would lie off the surface by its mean height, so the
+    // apex is shifted by as much to the other side.
     let centers = sums.covariance_of_centers(lattice);
     let top = mean - stored * curvature::mean_height(heights, centers, plane);
-    // As a file in world coordinates has it, so that what is read back is the same.
+    // Round as a file in world coordinates does, so that reading it gives the same centre.
     let top = (origin + top) - origin;
     let rounded = ((origin + top.as_vec3().as_dvec3()) - origin).as_vec3();
     let low = if known.low { top - rounded.as_dvec3() } else { DVec3::ZERO }.as_vec3();
@@ -84,30 +94,30 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     (node, low.to_array())
 }
 
-/// What bounds all `surfels` below a node: those that could change it are looked at, and what is below a node that could not is passed over. What comes
-/// out is what looking at all would, whatever is passed over.
+/// Bounds all `surfels` below a node. Nodes that cannot change the result are skipped, so it equals
+/// the bounds over all surfels.
 fn bound<B: Below>(of: &Bounding, (key, surfels): (B::Key, u64), below: &B, sided: bool) -> Bound {
     if below.is_leaf(key) || surfels <= MANY {
         return bound_from(of, key, below, sided);
     }
-    // By all threads, what is below one node each.
+    // In parallel over the children.
     let mut children = Vec::new();
     below.children(key, |child| children.push((child.key, child.surfels)));
     let one = |child: (B::Key, u64)| bound(of, child, below, sided);
     children.into_par_iter().map(one).reduce(|| Bound::NOTHING, Bound::both)
 }
 
-/// That of a set, by one thread.
+/// As [`bound`], by one thread.
 fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> Bound {
     let mut all = Bound::NOTHING;
     let mut open: Vec<(Bound, B::Key)> = Vec::new();
     let push = |key: B::Key, open: &mut Vec<(Bound, B::Key)>| {
         let first = open.len();
         below.children(key, |child| open.push((of.of_node(child.node, child.low), child.key)));
-        // What reaches farthest comes first.
+        // The child with the largest rim is last, as `open` is a stack.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
-    // What lies farthest away comes first: then most of the others are of no matter.
+    // The farthest disk comes first: after it most of the others cannot change the bounds.
     let mut disks: Vec<(f64, Disk)> = Vec::new();
     let mut look = |key: B::Key, most: &Bound, all: &mut Bound| {
         if most.rim <= all.rim {
@@ -120,7 +130,7 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
         }
         disks.iter().for_each(|(_, disk)| *all = all.both(of.of(disk, all, most)));
     };
-    // Where normals tell no sides nobody asks how far they turn.
+    // Without sides a node's cone is -1, so cosines are not needed.
     let asked = |most: Bound| if sided { most } else { Bound { cosine: 1.0, ..most } };
     if below.is_leaf(key) {
         look(key, &asked(Bound::ALL), &mut all)

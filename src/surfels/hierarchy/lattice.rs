@@ -1,23 +1,24 @@
-//! Positions as whole numbers, of which sums are exact and take no notice of order.
+//! Positions as whole numbers, whose sums are exact and do not depend on the order.
 
 use glam::DVec3;
 
 use crate::scene::Bounds;
 use crate::surfels::{exponent, power_of_two};
 
-/// Bits of a coordinate's size. With them the sum of 2^32 coordinates fits an i64, and their second moments times that number an i128.
+/// Bits of a coordinate's magnitude. The sum of 2^32 coordinates fits an i64, and 2^32 times the
+/// sum of 2^32 products of two coordinates fits an i128.
 pub(super) const BITS: i32 = 30;
 
 /// A grid over a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Lattice {
     origin: DVec3,
-    /// Steps of the grid for a world unit: a power of two.
+    /// Grid steps per world unit: a power of two.
     pub steps: f64,
 }
 
 impl Lattice {
-    /// The finest over `bounds` whose coordinates are no larger than 2^[`BITS`].
+    /// The finest lattice over `bounds` whose coordinates have magnitudes of at most 2^[`BITS`].
     pub fn over(bounds: &Bounds) -> Self {
         let half = 0.5 * bounds.extent().max_element();
         let steps = if half > 0.0 { power_of_two((BITS - 1 - exponent(half)).min(1000)) } else { 1.0 };
@@ -27,11 +28,11 @@ impl Lattice {
     /// The nearest grid point.
     pub fn place(&self, position: DVec3) -> [i32; 3] {
         let most = f64::from(1 << BITS);
-        // Rounding of the box's middle may take a corner past the last step.
+        // Rounding of the box's centre may move a corner past the last step.
         ((position - self.origin) * self.steps).to_array().map(|c| c.round().clamp(-most, most) as i32)
     }
 
-    /// The position of what lies at these steps.
+    /// The position of a point that is given in grid steps.
     pub fn position(&self, steps: DVec3) -> DVec3 {
         self.origin + steps / self.steps
     }

@@ -1,8 +1,11 @@
-//! Levels of detail of a scene: a point-octree whose nodes are surfels (Pajarola 2003, section 3; [`Hierarchy`]).
+//! Builds levels of detail: a point-octree whose nodes are surfels (Pajarola 2003, section 3;
+//! [`Hierarchy`]).
 //!
-//! Sets of points are divided at their mean (`octree`); of what is below it each node has sums that are whole numbers (`sums`, `moments`), from which its
-//! centre, normal, colour and shape follow, and then the least ellipse of that shape that bounds all surfels below (`bounds`, `rims`).
-//! Everything is a sum of whole numbers, a minimum or a maximum, so a tree depends on the set of surfels alone, and not on their order or on the number of threads.
+//! Sets of points are divided at their mean (`octree`). Each node has whole-number sums over the
+//! surfels below it (`sums`, `moments`), which determine its centre, normal, colour and shape. Its
+//! ellipse is the smallest of that shape that bounds all surfels below (`bounds`, `rims`). All
+//! results are sums of whole numbers, minima or maxima, so a tree depends on the set of surfels
+//! alone, not on their order or on the number of threads.
 
 mod below;
 mod bounds;
@@ -28,11 +31,13 @@ use crate::scene::hierarchy::NodeAndLow as Made;
 use crate::scene::{Colors, Hierarchy, Scene, by_content};
 use crate::{Error, Progress, Result};
 
-/// The scene with levels of detail, which are told too, and its surfels in the order of the tree.
+/// Builds the levels of detail of `scene`. Returns the scene, with its surfels in the order of the
+/// tree, and its hierarchy.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a scene without surfels, with 2^32 or more, of Gaussians, or painted by textures.
+/// [`Error::Usage`] if the scene has no surfels, 2^32 or more, Gaussians, or surfels that are
+/// painted by textures.
 pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierarchy>)> {
     let Ok(count) = u32::try_from(scene.surfels.len()) else {
         return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {}", scene.surfels.len())));
@@ -42,7 +47,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     }
     if scene.encoded || matches!(scene.colors, Colors::Textured(_) | Colors::Harmonics(_)) {
         return Err(Error::Usage(
-            "levels of detail are of surfels with a colour each: Gaussians, and surfels that a texture paints, have none yet".into(),
+            "levels of detail need a colour for each surfel: Gaussians and textured surfels are not supported".into(),
         ));
     }
     let scene = scene_as_in_a_file(scene);
@@ -62,7 +67,8 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))
 }
 
-/// The scene in the order of the tree, of which these are the points, and their places.
+/// Puts the scene in the order of the tree, whose points are `points`. Returns it with the places
+/// of the points.
 fn sorted(tree: &Octree, mut points: Vec<Element>, scene: Scene) -> (Scene, Vec<i32>) {
     in_order(tree, &mut points, &scene);
     let order: Vec<u32> = points.par_iter().map(|element| element.index).collect();
@@ -70,18 +76,18 @@ fn sorted(tree: &Octree, mut points: Vec<Element>, scene: Scene) -> (Scene, Vec<
     (scene.into_order(&order), places)
 }
 
-/// A centre in f32, and what it leaves out.
+/// Splits a centre into its f32 value and the remainder.
 fn split(center: DVec3) -> [[f32; 3]; 2] {
     let short = center.as_vec3();
     [short, (center - short.as_dvec3()).as_vec3()].map(|part| part.to_array())
 }
 
-/// The centre that a file in world coordinates gives back.
+/// The centre after a round trip through world coordinates, as in a file.
 fn as_in_a_file(origin: DVec3, center: DVec3) -> DVec3 {
     (origin + center) - origin
 }
 
-/// The scene with the centres that a file gives back.
+/// The scene after a round trip of its centres through world coordinates, as in a file.
 fn scene_as_in_a_file(mut scene: Scene) -> Scene {
     let origin = scene.origin;
     let places = (0..scene.surfels.len()).into_par_iter().map(|index| split(as_in_a_file(origin, scene.center(index))));
@@ -91,7 +97,8 @@ fn scene_as_in_a_file(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Puts the points of each leaf in an order of their own.
+/// Sorts the points of each leaf by place and content, so that their order does not depend on that
+/// of the scene.
 fn in_order(tree: &Octree, points: &mut [Element], scene: &Scene) {
     let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
     leaves.par_sort_unstable_by_key(|set| set.first);
@@ -103,7 +110,7 @@ fn in_order(tree: &Octree, points: &mut [Element], scene: &Scene) {
         rest = after;
     }
     slices.into_par_iter().for_each(|own| {
-        // What compares as equal is the same, and then any order is.
+        // Surfels that compare as equal are identical, so their order does not show.
         let content = |a: &Element, b: &Element| by_content(scene, a.index as usize, b.index as usize);
         own.sort_unstable_by(|a, b| a.place.cmp(&b.place).then_with(|| content(a, b)));
     });

@@ -1,16 +1,16 @@
-//! The generic homogeneous covariance (Pajarola 2003, section 3.3): sums that add up the tree, from which the mean and the covariance of a node
-//! follow for any centre and axes.
+//! The generic homogeneous covariance (Pajarola 2003, section 3.3): sums that add up along the
+//! tree, from which the mean and the covariance of a node follow for any centre and axes.
 
 use glam::DVec3;
 
 use crate::surfels::eigen::Symmetric3;
 
-/// The matrix M̄ = Σ p' p'ᵀ of EQ 1, p' = (p, 1), in steps of a lattice: ten whole numbers, exact.
+/// The matrix M̄ = Σ p' p'ᵀ of EQ 1, p' = (p, 1), in lattice steps: ten exact whole numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Moments {
     pub count: u64,
     pub sum: [i64; 3],
-    /// xx, yy, zz, xy, xz, yz.
+    /// Sums of the products xx, yy, zz, xy, xz, yz.
     pub squares: [i128; 6],
 }
 
@@ -18,7 +18,7 @@ pub(super) struct Moments {
 const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]];
 
 impl Moments {
-    /// Those of some places.
+    /// The moments of `places`.
     pub fn of(places: impl Iterator<Item = [i32; 3]>) -> Self {
         let mut all = Self::default();
         for place in places {
@@ -30,19 +30,20 @@ impl Moments {
         all
     }
 
-    /// EQ 4.
+    /// Adds the moments of another set of places (EQ 4).
     pub fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.sum.iter_mut().zip(other.sum).for_each(|(sum, other)| *sum += other);
         self.squares.iter_mut().zip(other.squares).for_each(|(sum, other)| *sum += other);
     }
 
-    /// The mean place, steps.
+    /// The mean place, lattice steps.
     pub fn mean(&self) -> DVec3 {
         DVec3::from_array(self.sum.map(|sum| sum as f64)) / self.count as f64
     }
 
-    /// The covariance about the mean, square steps: EQ 2 with T for the mean, `(n Σ q_i q_j - Σ q_i Σ q_j) / n²`, whose numerator is exact.
+    /// The covariance about the mean, square steps: EQ 2 with the mean for T,
+    /// `(n Σ q_i q_j - Σ q_i Σ q_j) / n²`, whose numerator is exact.
     pub fn covariance(&self) -> Symmetric3 {
         let count = i128::from(self.count);
         let squared = (self.count as f64).powi(2);
@@ -73,12 +74,12 @@ mod tests {
         assert_eq!(whole, parts);
         let near = Moments::of(places.iter().map(|place| place.map(|c| c - far)));
         assert_eq!(whole.covariance(), near.covariance());
-        // By its definition, EQ 1 about the mean.
+        // By definition: EQ 1 about the mean.
         let mean = near.mean();
         let offset = |place: &[i32; 3]| DVec3::from_array(place.map(|c| f64::from(c - far))) - mean;
         let direct = places.iter().map(|place| offset(place).x * offset(place).y).sum::<f64>() / 1000.0;
         assert!((near.covariance().xy - direct).abs() < 1e-9 * near.covariance().xx, "{direct}");
-        // The most that fits.
+        // The largest sums that fit.
         let most = Moments { count: 1 << 32, sum: [1 << 62; 3], squares: [1 << 92; 6] };
         assert_eq!(most.covariance().xx, 0.0);
     }

@@ -1,4 +1,4 @@
-//! From sets of points to nodes, from the deepest level up.
+//! Computes the nodes of sets of points, from the deepest level up.
 
 use rayon::prelude::*;
 
@@ -11,7 +11,7 @@ use crate::Progress;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Cap, Scene, Surfel};
 
-/// A node that is not made yet.
+/// A placeholder for a node that is not computed yet.
 const NOTHING: Node = Node {
     surfel: Surfel { center: [0.0; 3], s: [0.0; 3], t: [0.0; 3] },
     cap: Cap::FLAT,
@@ -23,7 +23,8 @@ const NOTHING: Node = Node {
     leaf: true,
 };
 
-/// The nodes of a tree, whose points are at these places in the order of `scene`, and the sums of its root.
+/// Computes the nodes of a tree, and the sums of its root. `places` has three coordinates for each
+/// point, in the order of `scene`.
 pub(super) fn nodes<N: Stored>(
     (tree, places): (&Octree, &[i32]),
     scene: &Scene,
@@ -36,7 +37,7 @@ pub(super) fn nodes<N: Stored>(
         return (vec![sets.leaf(0, &root)], root);
     }
     let mut all: Vec<N> = vec![(NOTHING, [0.0; 3]).into(); tree.sets.len()];
-    // Those of the sets of the level below that are divided.
+    // Sums of the divided sets of the level below.
     let mut sums: Vec<Sums> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);
     for level in tree.levels.windows(2).rev() {
@@ -44,7 +45,7 @@ pub(super) fn nodes<N: Stored>(
         let divided: Vec<u32> =
             (level[0] as u32..).zip(own).filter(|(_, set)| !set.is_leaf()).map(|(n, _)| n).collect();
         let (here, lower) = all.split_at_mut(level[1]);
-        // The children of the sets of a level follow each other.
+        // The children of a level's sets are contiguous.
         let mut children: Vec<(&mut [N], &[Sums])> = Vec::with_capacity(divided.len());
         let (mut rest, mut below) = (&mut *lower, &sums[..]);
         for &number in &divided {
@@ -66,7 +67,7 @@ pub(super) fn nodes<N: Stored>(
     (all, sums.first().copied().unwrap_or_default())
 }
 
-/// What nodes are made of.
+/// The inputs from which nodes are computed.
 struct Sets<'a> {
     tree: &'a Octree,
     places: &'a [[i32; 3]],
@@ -75,7 +76,7 @@ struct Sets<'a> {
 }
 
 impl Sets<'_> {
-    /// The sets that a set is divided into.
+    /// The child sets of a set.
     fn children(&self, number: u32) -> std::slice::Iter<'_, Set> {
         let set = &self.tree.sets[number as usize];
         self.tree.sets[set.first_child as usize..][..set.children as usize].iter()
@@ -86,14 +87,14 @@ impl Sets<'_> {
         Sums::of(&self.places[set.range()], self.scene, set.first as usize, &self.known.scales)
     }
 
-    /// The node of a set, where those from number `nodes.0` on are known.
+    /// Computes the node of set `number`; `nodes` holds the known nodes from index `first` on.
     fn made<N: Stored>(&self, number: u32, sums: &Sums, (first, nodes): (usize, &[N])) -> Made {
         let lattice = &self.tree.lattices[self.tree.sets[number as usize].lattice as usize];
         let below = InMemory { scene: self.scene, tree: self.tree, first, nodes };
         bounds::node(number, sums, lattice, &below, self.known)
     }
 
-    /// The node of a leaf.
+    /// Computes the node of a leaf.
     fn leaf<N: Stored>(&self, number: u32, sums: &Sums) -> N {
         let set = &self.tree.sets[number as usize];
         if set.range().len() == 1 {
@@ -103,15 +104,17 @@ impl Sets<'_> {
         (Node { first: set.first, count: set.range().len() as u32, ..node }, low).into()
     }
 
-    /// The node of a set that is divided, where those from number `nodes.0` on are known.
+    /// Computes the node of a divided set; `nodes.1` holds the known nodes from index `nodes.0` on.
     fn inner<N: Stored>(&self, number: u32, sums: &Sums, nodes: (usize, &[N])) -> N {
         let set = &self.tree.sets[number as usize];
         let (node, low) = self.made(number, sums, nodes);
         (Node { first: set.first_child, count: set.children, leaf: false, ..node }, low).into()
     }
 
-    /// The sums of the children of a set that is divided together (EQ 4), of which those that are divided are `known`, and the nodes of the others. Of children on another lattice
-    /// the moments are made anew on this one.
+    /// Adds up the sums of the children of a set (EQ 4): those of divided children are `known`,
+    /// those of leaves are computed here, and so are the nodes of leaves.
+    ///
+    /// The moments of a child on another lattice are computed again on the lattice of the set.
     fn summed<N: Stored>(&self, number: u32, (nodes, known): (&mut [N], &[Sums])) -> Sums {
         let set = &self.tree.sets[number as usize];
         let (mut all, mut known) = (Sums::default(), known.iter());

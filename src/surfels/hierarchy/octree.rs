@@ -1,4 +1,4 @@
-//! The tree: sets of points divided at their mean (Pajarola 2003, section 3.2).
+//! The octree: sets of points that are divided at their mean (Pajarola 2003, section 3.2).
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -8,31 +8,32 @@ use super::lattice::Lattice;
 use crate::scene::Bounds;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT};
 
-/// Steps across a set of more than [`FAN_OUT`] points below which they get a finer lattice of their own: then a mean has five digits within the set, whatever strays
+/// A set of more than [`FAN_OUT`] points that spans fewer lattice steps than this gets a finer
+/// lattice of its own. So the mean has five digits within the set, however far some points stray
 /// from the body of the scene.
 pub(super) const FEWEST_STEPS: i64 = 1 << 16;
 
-/// Points of a set whose sums are made by all threads.
+/// The box and the sum of a set of more points than this are computed by all threads.
 const MANY: usize = 1 << 16;
 
-/// A point.
+/// A point of the octree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Element {
-    /// On the lattice of the smallest set that it is in.
+    /// Its place on the lattice of the smallest set that contains it.
     pub place: [i32; 3],
-    /// The surfel.
+    /// The index of its surfel.
     pub index: u32,
 }
 
-/// A set of points, which follow each other.
+/// A set of points, contiguous in the order of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Set {
     pub first: u32,
     pub end: u32,
-    /// The number of its lattice.
+    /// The index of its lattice in [`Octree::lattices`].
     pub lattice: u32,
-    /// The number of the first set that it is divided into, and how many there are: none of a leaf.
+    /// The index of the first child set, and the number of child sets: 0 for a leaf.
     pub first_child: u32,
     pub children: u32,
 }
@@ -47,15 +48,15 @@ impl Set {
     }
 }
 
-/// All sets, level by level.
+/// The tree: all sets, level by level from the root.
 pub(super) struct Octree {
     pub sets: Vec<Set>,
-    /// Where each level starts, and the end.
+    /// The index of the first set of each level, and the number of sets.
     pub levels: Vec<usize>,
     pub lattices: Vec<Lattice>,
 }
 
-/// The places of points, three numbers each, in the memory that the points had.
+/// Compacts the places of points, three numbers each, within the memory of the points.
 pub(super) fn places(elements: Vec<Element>) -> Vec<i32> {
     let count = elements.len();
     let mut places: Vec<i32> = bytemuck::cast_vec(elements);
@@ -65,22 +66,27 @@ pub(super) fn places(elements: Vec<Element>) -> Vec<i32> {
     places
 }
 
-/// What becomes of a set.
+/// How a set is divided.
 struct Divided {
+    /// A finer lattice for the set, if it gets one.
     lattice: Option<Lattice>,
-    /// The points of each octant; none of a leaf.
+    /// The number of points in each octant; None for a leaf.
     counts: Option<[u32; 8]>,
 }
 
 impl Octree {
-    /// Divides `count` points, fewer than 2^32, at `position`; they come in the order of the leaves. The sets depend on the positions alone; `told` hears of each point
-    /// that came to a leaf.
+    /// Builds the tree of `count` points, fewer than 2^32, at `position`. Returns it with the
+    /// points in the order of the leaves.
+    ///
+    /// The sets depend on the positions alone. `told` is called with the number of points of each
+    /// leaf.
     pub fn grow(count: u32, position: impl Fn(u32) -> DVec3 + Sync, told: impl Fn(u64)) -> (Self, Vec<Element>) {
         let bounds = Bounds::of((0..count).into_par_iter().with_min_len(4096).map(&position));
         Self::grow_below((Lattice::over(&bounds), 0), count, position, told)
     }
 
-    /// The same of a set so many levels below the root, that has its points on this lattice.
+    /// As [`Self::grow`], for a set that lies `depth` levels below the root and whose places are on
+    /// the lattice `root`.
     pub fn grow_below(
         (root, depth): (Lattice, usize),
         count: u32,
@@ -95,7 +101,8 @@ impl Octree {
         (tree, elements)
     }
 
-    /// Divides the sets of the last level, of a tree that starts at this depth; whether there is another one.
+    /// Divides the sets of the last level of a tree whose first set has this depth. Returns whether
+    /// there is a further level.
     fn divide_level(
         &mut self,
         depth: usize,
@@ -104,7 +111,7 @@ impl Octree {
         told: &impl Fn(u64),
     ) -> bool {
         let [.., begin, end] = self.levels[..] else { return false };
-        // One level deeper there is none to divide them into.
+        // The sets of the deepest level are leaves.
         let deepest = depth + self.levels.len() - 2 == DEEPEST;
         let level = &self.sets[begin..end];
         let mut slices = Vec::with_capacity(level.len());
@@ -148,7 +155,7 @@ impl Octree {
     }
 }
 
-/// Puts the points of each octant of a set together, unless it is a leaf.
+/// Groups the points of a set by octant, unless it is a leaf.
 fn divided(own: &mut [Element], deepest: bool, position: &(impl Fn(u32) -> DVec3 + Sync)) -> Divided {
     let mut lattice = None;
     let mut extent = extent(own);
@@ -168,13 +175,15 @@ fn divided(own: &mut [Element], deepest: bool, position: &(impl Fn(u32) -> DVec3
     Divided { lattice, counts: Some(put_together(own, octant)) }
 }
 
-/// The octant of a point of a set with so many points and this sum of places, by bits. It is exact: a point is high if count q > Σ q, and equal ones are low, so
-/// that no set is divided into itself and nothing.
+/// The octant of a place in a set of `count` points whose places add up to `sum`, one bit per axis.
+///
+/// Bit k is set if `count q_k > Σ q_k`, which is exact. Places at the mean are low, so a set of
+/// different places always has at least two octants.
 pub(super) fn octant(place: [i32; 3], count: i64, sum: [i64; 3]) -> usize {
     (0..3).fold(0, |octant, k| octant | usize::from(count * i64::from(place[k]) > sum[k]) << k)
 }
 
-/// The longest side of the box around a set, steps.
+/// The longest side of the box around a set, lattice steps.
 fn extent(own: &[Element]) -> i64 {
     let nothing = || ([i32::MAX; 3], [i32::MIN; 3]);
     let both = |a: ([i32; 3], [i32; 3]), b: ([i32; 3], [i32; 3])| {
@@ -187,14 +196,15 @@ fn extent(own: &[Element]) -> i64 {
     (0..3).map(|k| i64::from(high[k]) - i64::from(low[k])).max().unwrap_or(0)
 }
 
-/// The sum of the places.
+/// The sum of the places of a set.
 fn sum(own: &[Element]) -> [i64; 3] {
     let both = |a: [i64; 3], b: [i64; 3]| std::array::from_fn(|k| a[k] + b[k]);
     let of = |part: &[Element]| part.iter().fold([0; 3], |all, element| both(all, element.place.map(i64::from)));
     if own.len() > MANY { own.par_chunks(MANY).map(of).reduce(|| [0; 3], both) } else { of(own) }
 }
 
-/// Sorts a set by octants, in place; how many points each has. Within one their order is of no matter.
+/// Sorts the points of a set by octant, in place, and returns how many each octant has. Points
+/// within an octant are in no particular order.
 fn put_together(own: &mut [Element], octant: impl Fn(&Element) -> usize) -> [u32; 8] {
     let mut counts = [0; 8];
     own.iter().for_each(|element| counts[octant(element)] += 1);
@@ -208,7 +218,7 @@ fn put_together(own: &mut [Element], octant: impl Fn(&Element) -> usize) -> [u32
     }
     for k in 0..8 {
         while next[k] < ends[k] {
-            // Each exchange brings one point to its octant, so this ends.
+            // Each swap moves one point to its octant, so this loop ends.
             let of = octant(&own[next[k]]);
             own.swap(next[k], next[of]);
             next[of] += 1;
@@ -231,7 +241,7 @@ mod tests {
         Octree::grow(points.len() as u32, |index| points[index as usize], |_| ())
     }
 
-    /// A plain recursive division, by the definition in f64: how many sets there are.
+    /// The number of sets of a plain recursive division in f64, by definition.
     fn plain(points: Vec<DVec3>) -> usize {
         if points.len() <= FAN_OUT || points.iter().all(|point| *point == points[0]) {
             return 1;
@@ -269,7 +279,8 @@ mod tests {
         let with_stray: Vec<DVec3> = near.iter().copied().chain([DVec3::splat(1e17)]).collect();
         let ((tree, _), (alone, _)) = (grown(&with_stray), grown(&near));
         assert_eq!(tree.sets.len(), alone.sets.len() + 2);
-        // And so do nests of clusters; what no lattice tells apart is one leaf.
+        // Nested clusters stay within the deepest level; points that no lattice separates are one
+        // leaf.
         let nested: Vec<DVec3> = (0..400).map(|k| DVec3::splat(0.5f64.powi(k))).collect();
         let (tree, _) = grown(&nested);
         assert!(tree.levels.len() <= DEEPEST + 2);

@@ -1,4 +1,4 @@
-//! How far what is below a node reaches: a surfel, or a node by what is told of it, shown in the node's plane or on its cap.
+//! Bounds how far surfels and child nodes reach when they are projected onto a node's plane or cap.
 
 use std::f64::consts::PI;
 
@@ -12,36 +12,42 @@ use crate::scene::{Cap, Surfel};
 use crate::surfels::eigen::Symmetric3;
 use crate::surfels::sizes::shape;
 
-/// What half-axes and radii are longer by than was found, as they are rounded to f32.
+/// Half-axes and radii are enlarged by this factor, so that rounding to f32 cannot shrink them.
 pub(super) const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
 
-/// What a quicker bound is longer by than one of the same in other roundings.
+/// A cheap bound is enlarged by this factor, as it rounds differently from the exact one.
 const ROUNDED: f64 = 1.0 + 1e-14;
 
-/// Cosine and sine of what the angle of a cone is larger by than was found, as cosines near 1 tell it badly: a thousandth of a radian.
+/// Cosine and sine of the angle by which cones are widened, 0.001 radians: near 1 a cosine
+/// determines its angle poorly.
 const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
 
-/// What is added to the tangent of a cone's angle for the same reason, and as a node's normal is rounded.
+/// Added to the tangent of a cone's angle for the same reason, and because a node's normal is
+/// rounded.
 const TURNED_MORE: f64 = 2e-3;
 
-/// What is rounded off a cosine.
+/// Subtracted from a cosine before it is rounded to f32.
 const ROUNDED_OFF: f64 = 1e-7;
 
-/// A disk is shown along its own normal too, unless that leans farther from the node's: the tangent of 76 degrees.
+/// A disk is also projected along its own normal, or along a direction that leans from the node's
+/// normal by at most this tangent: 76 degrees.
 const STEEPEST: f64 = 4.0;
 
-/// A direction and a shape: vectors of the plane across a normal, of which the second is `slimness` as long as the first.
+/// The orientation and the aspect ratio of an ellipse: two vectors along its half-axes in a node's
+/// plane, the longer one of length 1.
 #[derive(Clone, Copy)]
 pub(super) struct Shape {
     pub s: DVec3,
     pub t: DVec3,
-    /// What a vector's dot products with these are is its (u, v), in units of the half-axes.
+    /// The dot products of a vector with these are its (u, v), in units of `s` and `t`.
     pub seen: [DVec3; 2],
 }
 
 impl Shape {
-    /// Like the covariance in the plane (EQ 3, 5), with what f32 keeps of it. Of the centres alone, as in the paper, two disks side by side would
-    /// get an ellipse several times as long as both.
+    /// The shape of the covariance projected onto the plane of `normal` (EQ 3, 5), rounded to f32.
+    ///
+    /// The covariance is that of the disks. With that of the centres, as in the paper, two disks
+    /// side by side would get an ellipse several times as long as both.
     pub fn of(covariance: Symmetric3, normal: DVec3) -> Self {
         let (e1, e2) = normal.any_orthonormal_pair();
         let plane = [e1.dot(covariance.times(e1)), e1.dot(covariance.times(e2)), e2.dot(covariance.times(e2))];
@@ -52,26 +58,26 @@ impl Shape {
         Self { s, t, seen: [s, t].map(|axis| axis / axis.length_squared()) }
     }
 
-    /// How many times as long a vector's (u, v) is, at most: as of a vector along the shorter half-axis, which the other one is across but for what f32
-    /// leaves out.
+    /// An upper bound of |(u, v)| / |vector|: it is largest along the shorter half-axis, which is
+    /// perpendicular to the longer one up to f32 rounding.
     pub fn scale(&self) -> f64 {
         let [s, t] = self.seen.map(DVec3::length);
         s.max(t) * ROUNDED_UP
     }
 
-    /// (u, v) of a vector.
+    /// The (u, v) of a vector.
     pub fn seen(&self, vector: DVec3) -> DVec2 {
         DVec2::from_array(self.seen.map(|axis| vector.dot(axis)))
     }
 }
 
-/// How a node curves: its heights over the plane of two unit directions.
+/// The curvature of a node, as heights over the plane of two unit directions.
 #[derive(Clone, Copy)]
 pub(super) struct Curve {
     along: DVec3,
     across: DVec3,
     heights: DMat2,
-    /// The largest curvature.
+    /// The largest absolute curvature, 1 / world unit.
     most: f64,
 }
 
@@ -82,32 +88,33 @@ impl Curve {
         Self { along, across, heights: curvature::matrix(heights), most }
     }
 
-    /// The vector along these directions.
+    /// The components of `vector` along the two directions.
     fn in_plane(&self, vector: DVec3) -> DVec2 {
         DVec2::new(vector.dot(self.along), vector.dot(self.across))
     }
 
-    /// The height over the plane at a place, and what it gains for a unit along each direction.
+    /// The height over the plane at `place`, and its gradient.
     fn at(&self, place: DVec2) -> (f64, DVec2) {
         let slope = self.heights * place;
         (0.5 * slope.dot(place), slope)
     }
 }
 
-/// What bounds surfels so far.
+/// Bounds over a set of surfels.
 #[derive(Clone, Copy)]
 pub(super) struct Bound {
-    /// The largest |(u, v)| of a disk, shown in the node's plane along the node's normal and along its own.
+    /// The largest |(u, v)| of a disk's rim, projected onto the node's cap along the node's normal
+    /// and along the disk's own.
     pub rim: f64,
-    /// The largest distance from the centre.
+    /// The largest distance of a point from the node's centre, world units.
     pub radius: f64,
-    /// The smallest cosine.
+    /// The smallest cosine of the angle between a normal and the node's.
     pub cosine: f64,
 }
 
 impl Bound {
     pub const NOTHING: Self = Self { rim: 0.0, radius: 0.0, cosine: 1.0 };
-    /// What nothing lies beyond.
+    /// The weakest bounds, which hold for any set.
     pub const ALL: Self = Self { rim: f64::INFINITY, radius: f64::INFINITY, cosine: -1.0 };
 
     pub fn both(self, other: Self) -> Self {
@@ -119,32 +126,36 @@ impl Bound {
     }
 }
 
-/// That of a vector whose squares neither overflow nor vanish.
+/// The length of a 2D vector whose squares neither overflow nor underflow.
 fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-/// The longer half-axis of the ellipse with the half-axes s and t, of whose products these are: the larger singular value of [s t].
+/// The longer half-axis of the ellipse s cos φ + t sin φ, from the products [s·s, s·t, t·t]: the
+/// larger singular value of [s t].
 pub(super) fn longest([ss, st, tt]: [f64; 3]) -> f64 {
     (0.5 * (ss + tt + length(ss - tt, 2.0 * st))).sqrt()
 }
 
-/// The largest distance from 0 of a point of the ellipse around `at` with these half-axes, or hardly more.
+/// The largest distance from 0 to a point of the ellipse `at + u cos φ + v sin φ`, or hardly more.
 ///
-/// It is the maximum of `|a + M w|²` over the unit circle, and by duality the least of `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1, where λ_i are the
-/// eigenvalues of `MᵀM`, greatest first, and b is `Mᵀa` along its eigenvectors: each λ gives a bound, and where the derivative is 0 the least.
+/// Its square is the maximum of `|a + M w|²` over the unit circle, and by duality the minimum of
+/// `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1, where λ_i are the eigenvalues of `MᵀM`, largest
+/// first, and b is `Mᵀa` along its eigenvectors. Any such λ gives an upper bound; the tightest is
+/// where the derivative is 0.
 fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
     let (mean, half) = (0.5 * (uu + vv), length(0.5 * (uu - vv), uv));
     let [first, second] = [mean + half, mean - half];
-    // The longer of the eigenvector's two forms does not cancel; of a circle each direction is one.
+    // Both vectors are along the eigenvector; the longer one has not cancelled. For a circle any
+    // direction is an eigenvector.
     let (one, other) = (DVec2::new(first - vv, uv), DVec2::new(uv, first - uu));
     let longer = if one.length_squared() > other.length_squared() { one } else { other };
     let axis = longer.try_normalize().unwrap_or(DVec2::X);
     let b = DVec2::new(u.dot(at), v.dot(at));
     let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
     let (b1, b2) = (b.x * b.x, b.y * b.y);
-    // From past where the derivative is 0.
+    // Two Newton steps toward the root of the derivative, from beyond it.
     let least = first + b.x.abs();
     let mut lambda = first + b.length();
     for _ in 0..2 {
@@ -155,22 +166,23 @@ fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     }
     let part = |b: f64, rest: f64| if b > 0.0 { b / rest } else { 0.0 };
     let squared = lambda + part(b1, lambda - first) + part(b2, lambda - second) + at.length_squared();
-    // Where roundings leave no distance it is that of a circle around the ellipse.
+    // If rounding leaves no finite value, use the bound for a circle around the ellipse.
     if squared.is_finite() { squared.sqrt() } else { at.length() + first.sqrt() }
 }
 
-/// A node whose bounds are looked for.
+/// A node whose bounds are being computed.
 pub(super) struct Bounding {
     pub center: DVec3,
     pub normal: DVec3,
     pub shape: Shape,
     pub curve: Curve,
-    /// How much longer a vector is in units of the half-axes, at most.
+    /// [`Shape::scale`].
     pub scale: f64,
 }
 
 impl Bounding {
-    /// What bounds one surfel, which lies within `most`, where what is no more than `known` is of no matter.
+    /// Bounds one surfel, whose bounds are known to lie within `most`. Bounds that cannot exceed
+    /// those in `known` are skipped: the result has 0, or for the cosine 1, instead.
     pub fn of(&self, disk: &Disk, known: &Bound, most: &Bound) -> Bound {
         let Disk { surfel, center, cap } = disk;
         let own = normal_of(surfel);
@@ -195,25 +207,29 @@ impl Bounding {
         bound
     }
 
-    /// [`Bound::rim`] of a surfel with this unit normal, where what is no more than `known` is of no matter.
+    /// The [`Bound::rim`] of a surfel with the unit normal `own`; any smaller value if it does not
+    /// exceed `known`.
     fn rim(&self, Disk { surfel, center, cap }: &Disk, own: DVec3, known: f64) -> f64 {
         let offset = center - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let height = cap.highest();
         let across = self.leaning(own);
         let (over, slope) = self.curve.at(self.curve.in_plane(offset));
-        // A vector's dot product with this is what its end lies higher over the node's cap than its start, which bends by no more than that below it.
+        // The dot product of a vector with `higher` is how much higher its end lies over the node's
+        // cap than its start, up to `bend`.
         let higher = self.normal - slope.x * self.curve.along - slope.y * self.curve.across;
         let bend = 0.5 * self.curve.most * s.length_squared().max(t.length_squared());
         let places = [offset, s, t, own * height].map(|vector| self.shape.seen(vector));
         let above = [offset.dot(self.normal) - over, s.dot(higher), t.dot(higher), height * own.dot(higher)];
         [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
             let [at, u, v, lean] = [0, 1, 2, 3].map(|k| places[k] - across * above[k]);
-            // A cap leans out as far as it is high.
+            // The disk's own cap may reach beside the rim by its height, and `bend` may shift the
+            // projection.
             let lean = lean.length() + across.length() * bend;
             let matters = |reach: f64| at.length() + reach + lean > known.max(rim);
             let products = [u.dot(u), u.dot(v), v.dot(v)];
-            // That of a circle around the disk is found sooner, and a larger one yet sooner.
+            // Cheapest first: a circle of radius sqrt(|u|² + |v|²), then the circle around the
+            // projected disk.
             if !matters((products[0] + products[2]).sqrt() * ROUNDED) || !matters(longest(products)) {
                 return rim;
             }
@@ -221,10 +237,13 @@ impl Bounding {
         })
     }
 
-    /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's cap.
+    /// How far a point moves in (u, v), for each unit of height over the node's cap, if it is
+    /// projected along the normal `own` instead of the node's.
     ///
-    /// Along the node's normal alone, neighbours whose planes bend away from each other would part where they are seen askew: each ends where
-    /// the other does, but above or below it. Shown along the disk's normal, which is the surface's, both reach the line in which they meet.
+    /// Projected along the node's normal alone, neighbours whose planes bend away from each other
+    /// would come apart where they are seen obliquely: each ends where the other does, but above or
+    /// below it. Projected along the disk's normal, which is the surface's, both reach the line in
+    /// which their planes meet.
     fn leaning(&self, own: DVec3) -> DVec2 {
         let up = own.dot(self.normal);
         let beside = (own - up * self.normal) * up.signum();
@@ -233,30 +252,34 @@ impl Bounding {
         if slope.is_finite() { self.shape.seen(beside * slope) } else { DVec2::ZERO }
     }
 
-    /// What bounds all below a node, or more.
+    /// Bounds all surfels below a node by the node's own sphere and cone; these bounds are not
+    /// tight.
     pub fn of_node(&self, node: &Node, low: [f32; 3]) -> Bound {
         let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
         let offset = center + low - self.center;
         let radius = f64::from(node.radius) * ROUNDED_UP;
-        // Cosine and sine of the angle between the normals, of that and the cone's, and of these and what is rounded off.
+        // Cosine and sine of three angles: `angle` between the two normals, `angles` with the cone
+        // added, and `turned` with the rounding margin added too.
         let turned = |by: DVec2, cosine: f64| by.rotate(DVec2::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt()));
         let angle = turned(DVec2::X, normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0));
         let angles = turned(angle, f64::from(node.cone).clamp(-1.0, 1.0));
         let turned = ROUNDED_ANGLE.rotate(angles);
-        // A sum of angles past the half circle has a sine below 0, before what is rounded off is added or after; that of a whole cone is one.
+        // A sum of angles beyond 180 degrees has a negative sine, before or after the margin is
+        // added. A full cone counts as such a sum too.
         let beyond = node.cone <= -1.0 || angles.y < 0.0 || turned.y < 0.0;
         let slope = if !beyond && turned.y < STEEPEST * turned.x { turned.y / turned.x } else { STEEPEST };
         let at = self.shape.seen(offset);
         let place = self.curve.in_plane(offset);
         let (over, gain) = self.curve.at(place);
         let above = offset.dot(self.normal) - over;
-        // How much the height over the cap changes within the ball around it.
+        // How much the height over the node's cap changes within the sphere of the child.
         let around = radius * (1.0 + gain.length()) + 2.0 * self.curve.most * radius * radius;
         let high = above.abs() + around;
         let mut rim = at.length() + (radius + slope * high) * self.scale;
         if !beyond && turned.x > 0.0 && node.cone > 0.0 {
-            // Where it is shown along its own normal, and how far from there what is shown along others is: leanings change by no more than this, for each radian that a normal
-            // turns by, and a tangent is longer than its angle.
+            // A tighter bound, around the child's projection along its own normal. For each radian
+            // that a normal turns, `leaning` changes by at most `changes`; the tangent of an angle
+            // exceeds the angle.
             let changes = (turned.x * turned.x).recip().min(1.0 + STEEPEST * STEEPEST);
             let most = changes * ((f64::from(node.cone).powi(-2) - 1.0).max(0.0).sqrt() + TURNED_MORE);
             let own = (angle.y / angle.x).min(STEEPEST);
@@ -272,7 +295,8 @@ impl Bounding {
     }
 }
 
-/// The largest angle between the normals of a surfel's cap and that of its plane, or more: 0 of a flat one.
+/// An upper bound of the angle between the normals of a surfel's cap and of its plane, radians; 0
+/// for a flat surfel.
 pub(super) fn tilt(surfel: &Surfel, cap: &Cap) -> f64 {
     if cap.is_flat() {
         return 0.0;
@@ -282,7 +306,7 @@ pub(super) fn tilt(surfel: &Surfel, cap: &Cap) -> f64 {
     ((uu + uv) / length(surfel.s)).hypot((uv + vv) / length(surfel.t)).atan()
 }
 
-/// A cosine as a cone has it, where normals tell sides.
+/// The [`Node::cone`] for this smallest cosine; -1 where normals have no side.
 pub(super) fn cone(sided: bool, cosine: f64) -> f32 {
     if sided { (cosine - ROUNDED_OFF) as f32 } else { -1.0 }
 }
@@ -292,7 +316,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// What is told of a node is no less than of any disk below it, curved or not, on whichever side and however steep.
+    /// The bounds by a node hold for each disk below it, curved or not, on either side and however
+    /// steep.
     #[test]
     fn nodes_bound_their_disks() {
         let mut random = Random::stream(21, 0);
@@ -302,7 +327,7 @@ mod tests {
             let curved = [0.3, 0.1, -0.2].map(|height| height * number());
             let mut vector = || DVec3::new(number(), number(), number());
             let normal = vector().normalize();
-            // As f32 has them.
+            // Rounded to f32, as in `Shape::of`.
             let s = normal.any_orthonormal_vector().as_vec3().as_dvec3();
             let t = (normal.cross(s) * 0.3).as_vec3().as_dvec3();
             let normal = s.cross(t).normalize();
@@ -353,7 +378,7 @@ mod tests {
         assert!(tight > looked / 4, "{tight} of {looked}");
     }
 
-    /// The angles of a node's normals add up to a cosine, up to the half circle and past it.
+    /// The angle between normals and that of the cone add up, below and beyond 180 degrees.
     #[test]
     fn angles_of_nodes_add_up() {
         let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
@@ -373,7 +398,7 @@ mod tests {
                 let slope = if expected < STEEPEST.atan() { expected.tan() } else { STEEPEST };
                 assert!((bound.rim / (1.0 + slope) - 1.0).abs() < 1e-4, "{angle} {cone}: {}", bound.rim);
             }
-            // A whole cone has every normal, whatever its own is.
+            // A full cone contains every normal, whatever the node's own is.
             assert_eq!(of(angle, -1.0).cosine, -1.0);
         }
     }

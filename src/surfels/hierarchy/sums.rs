@@ -1,4 +1,5 @@
-//! What adds up from surfels to nodes and from children to parents: whole numbers, so that no order shows.
+//! Sums that add up from surfels to nodes and from children to parents. They are whole numbers, so
+//! the order of additions does not show.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,30 +10,30 @@ use crate::scene::color::srgb8;
 use crate::scene::{Colors, Scene, Surfel};
 use crate::surfels::eigen::Symmetric3;
 
-/// Units of a normal's coordinate; of 2^32 normals the sum fits an i64.
+/// Units for a normal's coordinate of 1; the sum of 2^32 normals fits an i64.
 const NORMAL_ONE: f64 = (1u64 << 30) as f64;
 
-/// Units of a product of two of them.
+/// Units for a product of 1 of two coordinates of a normal.
 const PRODUCT_ONE: f64 = (1u64 << 30) as f64;
 
-/// Units of a colour's range.
+/// Units for the whole range of a colour component.
 const COLOR_ONE: f64 = (1u64 << 30) as f64;
 
-/// A sum of normals that is shorter, for each of them, has no direction.
+/// A mean of unit normals that is shorter than this has no direction.
 const LEAST_MEAN: f64 = 1e-3;
 
-/// Units of a half-axis as long as the longest; of 2^32 products of two the sum fits an i128.
+/// Units for the longest half-axis; the sum of 2^32 products of two half-axes fits an i128.
 const AXIS_ONE: f64 = (1u64 << 30) as f64;
 
-/// How what surfels have is mapped to whole numbers.
+/// Maps the attributes of surfels to whole numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scales {
-    /// The smallest premultiplied colour, and what there is up to the largest.
+    /// The smallest premultiplied colour, and the difference between the largest and it.
     low: [f64; 4],
     span: [f64; 4],
-    /// Colours of surfels are codes of 8 bits, so those of nodes are too.
+    /// Whether the colours of surfels are 8-bit codes, so that those of nodes are too.
     coded: bool,
-    /// World units of the longest half-axis.
+    /// The longest half-axis, world units.
     longest: f64,
 }
 
@@ -42,7 +43,8 @@ impl Scales {
         Self::within(scene.color_range(), matches!(scene.colors, Colors::Srgb8(_)), longest)
     }
 
-    /// Those of surfels with this [range of colours](Scene::color_range), which are codes of 8 bits if they are `coded`, and this longest half-axis.
+    /// The scales of surfels with this [range of colours](Scene::color_range) and this longest
+    /// half-axis; `coded` if their colours are 8-bit codes.
     pub fn within((low, high): ([f32; 4], [f32; 4]), coded: bool, longest: f32) -> Self {
         let [low, high] = [low, high].map(|color| color.map(f64::from));
         Self { low, span: std::array::from_fn(|k| high[k] - low[k]), coded, longest: longest.into() }
@@ -56,7 +58,7 @@ impl Scales {
         })
     }
 
-    /// Straight, of a mean of units.
+    /// The linear colour with straight alpha for a mean of [`Self::units`].
     fn color(&self, units: [f64; 4]) -> [f32; 4] {
         let [r, g, b, a] = std::array::from_fn(|k| self.low[k] + self.span[k] * (units[k] / COLOR_ONE));
         let color = if a > 0.0 { [r / a, g / a, b / a, a].map(|value| value as f32) } else { [0.0; 4] };
@@ -64,34 +66,37 @@ impl Scales {
     }
 }
 
-/// The sums of a set of surfels.
+/// The sums over a set of surfels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sums {
     pub moments: Moments,
-    /// Of unit normals.
+    /// Sum of the unit normals.
     normal: [i64; 3],
-    /// Of n nᵀ: xx, yy, zz, xy, xz, yz.
+    /// Sum of n nᵀ over the unit normals n: xx, yy, zz, xy, xz, yz.
     axial: [i64; 6],
-    /// Of premultiplied colours.
+    /// Sum of the premultiplied colours.
     color: [i64; 4],
-    /// Of s sᵀ + t tᵀ.
+    /// Sum of s sᵀ + t tᵀ over the half-axes: xx, yy, zz, xy, xz, yz.
     disks: [i128; 6],
 }
 
-/// A whole number next to one below 2^62, from which it is half a unit away, or hardly more, or one from 2^52 on: the standard library's rounding, and its way to 128 bits,
-/// are functions and not instructions on many processors.
+/// Rounds `value`, of magnitude below 2^62, to a whole number. The error is at most half a unit or
+/// hardly more; from 2^52 on it is up to one unit.
+///
+/// The standard library's rounding and its conversion to 128 bits are function calls rather than
+/// instructions on many processors.
 fn whole(value: f64) -> i64 {
     (value + 0.5f64.copysign(value)) as i64
 }
 
-/// The unit normal of a surfel's plane; of one without a plane the world's z.
+/// The unit normal of a surfel's plane; the world's z axis if the half-axes span no plane.
 pub(super) fn normal_of(surfel: &Surfel) -> DVec3 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     s.cross(t).try_normalize().unwrap_or(DVec3::Z)
 }
 
 impl Sums {
-    /// Those of points at `places`, in the order of the surfels of `scene`, of which the first is number `first`.
+    /// Sums the surfels of `scene` from index `first` on, whose centres are `places` on a lattice.
     pub fn of(places: &[[i32; 3]], scene: &Scene, first: usize, scale: &Scales) -> Self {
         let mut all = Self { moments: Moments::of(places.iter().copied()), ..Self::default() };
         let products = |v: DVec3| [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.x * v.z, v.y * v.z];
@@ -125,8 +130,8 @@ impl Sums {
         self.moments.covariance() * (step * step)
     }
 
-    /// The covariance of the disks' points about their mean, square world units: that of the centres, and the mean of each disk's own, which
-    /// is (s sᵀ + t tᵀ) / 4.
+    /// The covariance of the points of all disks about their mean, square world units: that of the
+    /// centres plus the mean of each disk's own, (s sᵀ + t tᵀ) / 4.
     pub fn covariance(&self, lattice: &Lattice, scale: &Scales) -> Symmetric3 {
         let unit = scale.longest / AXIS_ONE;
         let mean = unit * unit / (4.0 * self.moments.count as f64);
@@ -134,8 +139,10 @@ impl Sums {
         self.covariance_of_centers(lattice) + Symmetric3 { xx, yy, zz, xy, xz, yz }
     }
 
-    /// The unit normal, and whether it tells sides: the mean of the normals, or where these have no side or cancel, the direction that is
-    /// nearest to all of them.
+    /// The unit normal, and whether it has a side.
+    ///
+    /// It is the direction of the mean normal. Where normals have no side or cancel, it is the axis
+    /// nearest to all of them, which has no side.
     pub fn normal(&self, oriented: bool) -> (DVec3, bool) {
         let sum = DVec3::from_array(self.normal.map(|value| value as f64 / NORMAL_ONE));
         if oriented && sum.length() > LEAST_MEAN * self.moments.count as f64 {
@@ -146,7 +153,8 @@ impl Sums {
         (nearest, false)
     }
 
-    /// How far the normals point in one direction, along which `normal` is: from 0 to 1, where all are parallel.
+    /// How closely the normals align with `normal`, from 0 to 1 where all are parallel: the length
+    /// of their mean, or the root mean square cosine if `normal` has no side.
     pub fn alignment(&self, (normal, sided): (DVec3, bool)) -> f64 {
         let count = self.moments.count as f64;
         if sided {
@@ -156,7 +164,7 @@ impl Sums {
         (normal.dot(Symmetric3 { xx, yy, zz, xy, xz, yz }.times(normal)) / count).max(0.0).sqrt()
     }
 
-    /// The mean colour, linear, straight alpha.
+    /// The mean colour: linear, straight alpha.
     pub fn color(&self, scale: &Scales) -> [f32; 4] {
         scale.color(self.color.map(|sum| sum as f64 / self.moments.count as f64))
     }

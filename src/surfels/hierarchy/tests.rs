@@ -6,7 +6,7 @@ use super::*;
 use crate::random::Random;
 use crate::scene::{Cap, Surfel};
 
-/// Ellipses at random places around a sphere, in random colours.
+/// Ellipses at random places on a sphere, in various colours.
 fn scene(count: usize, oriented: bool) -> Scene {
     let mut random = Random::stream(3, 0);
     let mut direction = || Vec3::from_array(std::array::from_fn(|_| random.number() as f32 - 0.5)).normalize();
@@ -23,7 +23,7 @@ fn scene(count: usize, oriented: bool) -> Scene {
     Scene { surfels, colors, caps, oriented, ..Scene::default() }
 }
 
-/// The surfels below a node, as a range.
+/// The range of the surfels below a node.
 fn below(hierarchy: &Hierarchy, index: usize) -> std::ops::Range<usize> {
     let node = &hierarchy.nodes[index];
     if node.leaf {
@@ -46,9 +46,9 @@ fn a_tree_is_the_same_for_any_order_and_number_of_threads() {
     let plain = |scene: Scene| Scene { provenance: Default::default(), ..scene };
     assert_eq!(plain(sorted.clone()), plain(other));
     assert_eq!(Hierarchy::check(&tree.nodes, 6000), Ok(()));
-    // The surfels are the scene's.
+    // Each surfel is that of the given scene to which its provenance points.
     assert_eq!(sorted.surfels[17], given.surfels[sorted.provenance.of(17).1 as usize]);
-    // Another surfel is another tree.
+    // A change of one surfel changes the tree.
     let mut moved = given;
     moved.surfels[5].center[0] += 0.1;
     assert_ne!(build(moved, &()).unwrap().1, tree);
@@ -63,7 +63,7 @@ fn a_node_has_the_mean_of_what_is_below_it() {
         let (node, own) = (&tree.nodes[index], below(&tree, index));
         let count = own.len() as f64;
         let mean = own.clone().map(|k| scene.center(k)).sum::<DVec3>() / count;
-        // Up to where the surface is, if it curves: along the normal.
+        // Where the surface curves, the node's centre is shifted along its normal.
         let beside = DVec3::from_array(node.surfel.center.map(f64::from)) - mean;
         assert!(beside.reject_from(sums::normal_of(&node.surfel)).length() < 4e-7, "{index}");
         assert!(beside.length() < 0.3 * f64::from(node.radius), "{index}");
@@ -77,8 +77,10 @@ fn a_node_has_the_mean_of_what_is_below_it() {
     }
 }
 
-/// Whether sums of products of f32 numbers, which f64 has exactly, say that a corner lies in a node's ellipse: with the rounding of few f64
-/// additions, 2^-49 of the largest term, on the safe side.
+/// Whether a corner certainly lies in a node's ellipse.
+///
+/// Products of f32 numbers are exact in f64, and few f64 additions round by at most 2^-49 of the
+/// largest term; the margin of 1e-14 exceeds that.
 fn holds(node: &Surfel, offset: DVec3) -> bool {
     let [s, t] = [node.s, node.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let part = |axis: DVec3| (offset.dot(axis).abs() + axis.length() * offset.length() * 1e-14) / axis.length_squared();
@@ -120,7 +122,8 @@ fn nodes_hold_what_is_below_them() {
                 let rim: [DVec3; 48] = std::array::from_fn(|_| {
                     rim.next().map_or(offset, |angle| offset + s * angle.cos() + t * angle.sin())
                 });
-                // Along the node's normal, and along its own, or along one between both.
+                // Project along the node's normal, and along the disk's own or, if that leans too
+                // far, a direction between both.
                 let own = sums::normal_of(surfel);
                 let up = own.dot(normal);
                 let across = (own - up * normal) / up;
@@ -133,15 +136,17 @@ fn nodes_hold_what_is_below_them() {
                     on_the_rim |= !shown.iter().all(|point| holds(&smaller, *point));
                 }
             }
-            // What lies off the cap makes it twice as large at most, and one surfel is itself.
+            // Points off the cap double the radius at most; the node of one surfel has the surfel's
+            // own.
             let most = if own.len() == 1 { 1.0 } else { 2.0 } * farthest * (1.0 + 1e-5);
             assert!(f64::from(node.radius) <= most, "{index}: {} {most}", node.radius);
-            // Of a flat node over flat disks nothing is added to what is shown.
+            // The ellipse of a flat node over flat disks has no margin: it touches a rim.
             assert!(curved || own.len() == 1 || !node.cap.is_flat() || on_the_rim, "{index}");
             looked += usize::from(own.len() > 1);
             tight += usize::from(on_the_rim);
         }
-        // A rim is on that of many nodes, shown along one or the other; where a cap bends below a disk, or disks are caps, it is farther than it need be.
+        // Many ellipses touch a rim in one of the two projections. An ellipse is larger than
+        // necessary where the cap bends below a disk, or disks have caps.
         assert!(looked > 1000 && (curved || 6 * tight > looked), "{tight} of {looked}");
         assert!(oriented == tree.nodes.iter().any(|node| node.cone > -1.0));
     }
@@ -163,7 +168,8 @@ fn odd_scenes_have_trees_too() {
     assert!(build(Scene::default(), &()).unwrap_err().to_string().contains("without surfels"));
 }
 
-/// Of a dense surface a node is not much larger than what it stands for: its area against the sum of its disks' that do not overlap.
+/// On a dense surface an ellipse is not much larger than the area that its disks stand for, a unit
+/// square each.
 #[test]
 fn ellipses_are_tight() {
     let disk = |k: usize| Surfel::disk(Vec3::new((k % 64) as f32, (k / 64) as f32, 0.0), Vec3::Z, 0.75);
@@ -175,6 +181,7 @@ fn ellipses_are_tight() {
         let ratio = std::f32::consts::PI * node.surfel.normal().length() / squares;
         (worst, sum, nodes) = (worst.max(ratio), sum + ratio, nodes + 1);
     }
-    // An ellipse around a square has pi / 2 of its area, and disks reach out by three quarters of a spacing.
+    // An ellipse around a square has pi / 2 times its area, and disks reach beyond it by three
+    // quarters of a spacing.
     assert!(worst < 7.0 && sum / (nodes as f32) < 4.0, "{worst} {}", sum / nodes as f32);
 }

@@ -1,4 +1,5 @@
-//! Where a cell borders on others, or the surface ends: lines in its tangent plane, and the polygon that they leave.
+//! The borders of a cell: lines in its tangent plane where other cells begin or the surface ends,
+//! and the polygon within them.
 
 use glam::{DVec2, DVec3};
 
@@ -7,68 +8,73 @@ use super::samples::{End, Samples};
 use crate::surfels::creases::{NARROWEST, SHARP, crease};
 use crate::surfels::neighbours::Neighbour;
 
-/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
+/// The cosine of the largest elevation of a neighbour over the tangent plane: 60 degrees. A
+/// neighbour beyond it lies above or below rather than beside.
 const STEEPEST: f64 = 0.5;
 
-/// A crease is the end that a surfel's line says, where the two run in about the same direction (cosine), and the line is at most so
-/// much farther (the crease's own distance, and of the surfel's radius).
+/// A crease and a clip line of the surfel are the same end if the cosine between their directions
+/// exceeds the first value, and the line is farther by at most the second times the crease's
+/// distance plus the third times the surfel's radius.
 const SAME_END: [f64; 3] = [0.9, 0.2, 0.1];
 
 /// Corners of a cell that has no neighbours.
 const OUTLINE: usize = 8;
 
-/// The line, in the tangent plane, where a cell borders on that of a neighbour.
+/// A line in the tangent plane at which a cell ends.
 pub(super) struct Border {
-    /// Unit.
+    /// The unit direction from the cell's point to the line.
     pub toward: DVec2,
     pub distance: f64,
     pub beyond: Beyond,
-    /// It is where two tangent planes meet.
+    /// Whether two tangent planes meet there.
     crease: bool,
 }
 
-/// What is beyond an edge of a cell.
+/// The neighbour or the end beyond an edge of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Beyond {
-    /// A neighbour, and how far it is.
+    /// A neighbour, and its distance.
     Neighbour(u32, f64),
-    /// A sharp edge of the surface, or a seam of its texture: the cell ends there, the graph has no edge.
+    /// A sharp edge of the surface, or a seam of its texture: the cell ends, and the graph has no
+    /// edge.
     Crease,
-    /// The line at which the surfel ends.
+    /// A clip line of the surfel.
     Line,
-    /// Such a line, but with a neighbour past it, and how far that is: splats grow over a bend that the tolerance allows.
+    /// A clip line with a neighbour past it, and the distance of that neighbour: splats grow over a
+    /// bend that the tolerance allows.
     Bend(u32, f64),
-    /// Nothing that is known.
+    /// The outline: nothing is known beyond it.
     Outline,
 }
 
-/// What an edge of a cell is to a splat that comes to it.
+/// The kinds of edges that a growing splat distinguishes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Edge {
-    /// The surface goes on.
+    /// The surface continues.
     Joined,
-    /// The surface goes on past the line at which the surfel ends.
+    /// The surface continues past a clip line of the surfel.
     Bend,
-    /// The surfel ends there: the line is as exact as the surfel is.
+    /// The surfel ends at a clip line, which is as exact as the surfel.
     Line,
-    /// The surface ends sharply, about there: where the tangent planes of two points meet, or halfway across a seam of its texture.
+    /// The surface ends sharply near this edge, which lies where the tangent planes of two points
+    /// meet, or halfway across a seam of the texture.
     Crease,
-    /// Nothing is known past it.
+    /// Nothing is known beyond the edge.
     Outline,
 }
 
 impl Edge {
-    /// Whether nothing that a splat could hold is past it.
+    /// Whether there is nothing beyond the edge that a splat could hold.
     pub fn is_end(self) -> bool {
         matches!(self, Self::Line | Self::Crease | Self::Outline)
     }
 
-    /// Whether a splat may be cut there.
+    /// Whether a splat may be clipped there.
     pub fn is_sharp(self) -> bool {
         matches!(self, Self::Line | Self::Crease | Self::Bend)
     }
 
-    /// Whether a surfel's own line says where it is.
+    /// Whether the edge is a clip line of the surfel.
     pub fn is_exact(self) -> bool {
         matches!(self, Self::Line | Self::Bend)
     }
@@ -94,12 +100,15 @@ impl Beyond {
 }
 
 impl Border {
-    /// Halfway to the neighbour, at half the distance in space: as if the surface were unrolled into the plane. Across a crease
-    /// it is where the two tangent planes meet, however near to one of the points that is; else the cell of the nearer would
-    /// reach past the crease, and that of the farther fall short of it.
+    /// The border with a neighbour: halfway to it, at half the distance in space, as if the surface
+    /// were unrolled into the plane.
     ///
-    /// None for a neighbour on another side of the surface, or above or below more than beside, without a crease between:
-    /// it bounds no cell.
+    /// Across a crease it is where the two tangent planes meet, however near to one of the points
+    /// that is. A border halfway would take the cell of the nearer point past the crease, and leave
+    /// that of the farther one short of it.
+    ///
+    /// None for a neighbour on another side of the surface, or one above or below rather than
+    /// beside, if there is no crease between: it bounds no cell.
     pub fn new(samples: &Samples, index: u32, neighbour: &Neighbour, tolerance: f64) -> Option<Self> {
         let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
         let [s, t] = tangent_basis(samples.normals[index as usize]);
@@ -118,8 +127,9 @@ impl Border {
         Some(Self { toward, distance: 0.5 * distance, beyond, crease: false })
     }
 
-    /// Whether this line of a surfel of this radius is the end that `border`, a crease, was found for. If so the line has its neighbour,
-    /// where that `is_smooth` with the point.
+    /// Whether this clip line of a surfel with this radius marks the same end as `border`, a
+    /// crease. If so, and if the neighbour across the crease `is_smooth` with the point, the line
+    /// becomes a [`Beyond::Bend`] to that neighbour.
     pub fn stands_for(&mut self, border: &Self, radius: f64, is_smooth: impl Fn(u32) -> bool) -> bool {
         let [along, share, of_radius] = SAME_END;
         let near = self.distance <= border.distance * (1.0 + share) + radius * of_radius;
@@ -132,6 +142,7 @@ impl Border {
         same
     }
 
+    /// The border at a clip line of the surfel of point `index`.
     pub fn of_line(samples: &Samples, index: u32, line: &End) -> Self {
         let [s, t] = tangent_basis(samples.normals[index as usize]);
         let toward = DVec2::new(line.toward.dot(s), line.toward.dot(t)).normalize_or(DVec2::X);
@@ -144,7 +155,8 @@ impl Border {
     }
 }
 
-/// Where a [`crease`] runs between a point and another at `offset`, which bends by more than a surface within the tolerance.
+/// The [`crease`] between a point and another at `offset`, if the surface bends there by more than
+/// the tolerance allows.
 fn crease_between(samples: &Samples, index: u32, other: u32, offset: DVec3, tolerance: f64) -> Option<(DVec3, f64)> {
     let radius = samples.radii[index as usize].min(samples.radii[other as usize]);
     let [normal, other] = [index, other].map(|point| samples.normals[point as usize]);
@@ -152,16 +164,16 @@ fn crease_between(samples: &Samples, index: u32, other: u32, offset: DVec3, tole
     crease([normal, if agrees { other } else { -other }], offset, radius, 2.0 * tolerance)
 }
 
-/// A convex polygon around the origin that remembers what cut each edge.
+/// A convex polygon around the origin, with what lies beyond each of its edges.
 #[derive(Default)]
 pub(super) struct Polygon {
     pub corners: Vec<DVec2>,
-    /// Of the edge from the corner of the same index to the next.
+    /// For the edge from the corner of the same index to the next.
     cut_by: Vec<Beyond>,
 }
 
 impl Polygon {
-    /// The outline, a regular polygon whose edges are `reach` away, cut by borders.
+    /// Clips the outline, a regular polygon whose edges are `reach` away, by `borders`.
     pub fn cut(reach: f64, borders: &[Border]) -> Self {
         let mut polygon = Self { corners: Vec::with_capacity(12), cut_by: Vec::with_capacity(12) };
         let edge = std::f64::consts::SQRT_2 - 1.0;
@@ -176,7 +188,7 @@ impl Polygon {
         polygon
     }
 
-    /// Keeps what is nearer than the border; the origin always is.
+    /// Keeps the part on this side of the border; the origin always is.
     fn clip(&mut self, border: &Border) {
         let beyond = |corner: DVec2| corner.dot(border.toward) - border.distance;
         if self.corners.iter().all(|&corner| beyond(corner) <= 0.0) {
@@ -207,12 +219,13 @@ impl Polygon {
         !self.corners.is_empty() && !self.cut_by.contains(&Beyond::Outline)
     }
 
-    /// Of each corner the edge to the next.
+    /// The edge from each corner to the next.
     pub fn edges(&self) -> Vec<Edge> {
         self.cut_by.iter().map(|beyond| beyond.edge()).collect()
     }
 
-    /// How far the corners are at edges without a neighbour; zero without such edges.
+    /// The distance of the farthest corner at an edge that [ends](Edge::is_end) the surface; zero
+    /// without such edges.
     pub fn farthest_at_end(&self) -> f64 {
         let count = self.corners.len();
         let ends = (0..count).filter(|&k| self.cut_by[k].edge().is_end()).flat_map(|k| [k, (k + 1) % count]);

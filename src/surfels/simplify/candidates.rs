@@ -1,8 +1,9 @@
-//! The splats to select from.
+//! The candidate splats for selection.
 //!
-//! Wu and Kobbelt grow one from every point. Where splats are large, most of those are nearly the same, and growing all takes
-//! time with the square of their size. Here points come in rounds, each spread evenly over the surface and as many as all before
-//! together; a point that enough splats of earlier rounds cover is passed over.
+//! Wu and Kobbelt grow one from every point. Where splats are large, most of them are nearly the
+//! same, and the time to grow all increases with the square of their size. Here points are taken in
+//! rounds, each spread evenly over the surface and with as many points as all earlier rounds
+//! together; a point that enough splats of earlier rounds cover is skipped.
 
 use rayon::prelude::*;
 
@@ -12,22 +13,23 @@ use super::growing::{Cover, Grower, Splat};
 use super::samples::Samples;
 use crate::Progress;
 
-/// A point covered by so many splats needs none of its own.
+/// A point whose cell this many splats cover needs no splat of its own.
 pub(super) const ENOUGH: u32 = 48;
 
-/// In the first round every so many-th point.
+/// The stride between the points of the first round.
 const FIRST_STRIDE: u32 = 64;
 
-/// Splats and what each covers.
+/// Splats, and the pieces that each covers.
 pub(super) struct Candidates {
     pub splats: Vec<Splat>,
-    /// Where the covers of each splat begin; one more at the end.
+    /// The index of the first cover of each splat, and the number of covers.
     first_cover: Vec<u64>,
     covers: Vec<Cover>,
 }
 
 impl Candidates {
-    /// Grows splats until each cell is covered by [`ENOUGH`] of them or has its own, and each piece is covered.
+    /// Grows splats until each cell is covered by [`ENOUGH`] of them or has one of its own, and
+    /// each piece is covered.
     pub fn grow(samples: &Samples, cells: &Cells, tolerance: f64, shape: SplatShape, progress: &dyn Progress) -> Self {
         progress.begin("growing splats", samples.len() as u64);
         let mut candidates = Self { splats: Vec::new(), first_cover: vec![0], covers: Vec::new() };
@@ -53,7 +55,8 @@ impl Candidates {
                 first = stride / 2;
             }
         }
-        // Pieces that no splat covers within the tolerance, because the surface bends more than that on the way.
+        // Some pieces are covered by no splat within the tolerance, because the surface bends by
+        // more than that on the way.
         let mut missing: Vec<u16> = (0..count).map(|cell| cells.pieces(cell)).collect();
         for cover in &candidates.covers {
             missing[cover.cell as usize] &= !cover.pieces;
@@ -64,7 +67,7 @@ impl Candidates {
         candidates
     }
 
-    /// Grows a splat by `grow` from each of `points`.
+    /// Grows a splat from each of `points` by `grow`, in parallel.
     fn append<'a>(
         &mut self,
         points: &[u32],
@@ -91,7 +94,7 @@ impl Candidates {
         }
     }
 
-    /// What a splat covers, in the order of cells.
+    /// The pieces that a splat covers, in the order of cells.
     pub fn covers(&self, splat: u32) -> &[Cover] {
         let [first, end] = [splat as usize, splat as usize + 1].map(|i| self.first_cover[i] as usize);
         &self.covers[first..end]

@@ -1,9 +1,12 @@
-//! Surface elements: the piece of surface that each point stands for, and which points it borders on.
+//! Surface elements: the piece of surface that each point stands for, and the points whose elements
+//! border on it.
 //!
-//! The element of a point is its Voronoi cell in its own tangent plane. The cells tile the surface, so disks that contain
-//! every cell leave no hole; the thesis takes `w = pi d²` (Eq. 1), which says how large an element is but not where it ends.
-//! The points whose cells share an edge are the natural neighbours: the edges of the graph that splats grow along. Among the
-//! k nearest they are those that no other neighbour hides, so the graph has no edge across a gap that points bridge.
+//! The element of a point is its Voronoi cell in its own tangent plane. The cells tile the surface,
+//! so disks that contain every cell leave no hole; the thesis takes `w = pi d²` (Eq. 1), which is
+//! the size of an element but not its boundary. Points whose cells share an edge are natural
+//! neighbours, which are the edges of the graph along which splats grow. Among the k nearest points
+//! they are those that no other neighbour hides, so the graph has no edge across a gap that points
+//! bridge.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -13,19 +16,22 @@ use super::samples::Samples;
 use crate::Progress;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 
-/// Nearest neighbours that a cell is cut out by. The thesis takes 10, for its graph alone; more close more cells of a random
-/// sampling, and the rest is cut out by [`MORE_NEIGHBOURS`].
+/// The number of nearest neighbours that bound a cell. The thesis takes 10, for its graph alone; 16
+/// neighbours close more cells of a random sampling, and cells that stay open take
+/// [`MORE_NEIGHBOURS`].
 const NEIGHBOURS: usize = 16;
 
-/// The same where [`NEIGHBOURS`] leave a cell open: unevenly spaced points, or another sheet among them.
+/// The number of neighbours where [`NEIGHBOURS`] leave a cell open: at unevenly spaced points, or
+/// near another sheet.
 const MORE_NEIGHBOURS: usize = 64;
 
-/// The neighbours that the local spacing is taken from: the square root of the area for each point. In a random sampling
-/// the squared distance to the k-th neighbour is k / pi of that area on average.
+/// The number of neighbours that determine the local spacing, the square root of the area per
+/// point. In a random sampling the squared distance to the k-th neighbour is k / pi of that area on
+/// average.
 const SPACING_NEIGHBOURS: usize = 16;
 
-/// A cell that reaches farther than this many local spacings is open there: the surface ends. In a random sampling one
-/// Voronoi vertex in ten million lies so far from its points.
+/// A cell that extends farther than this many local spacings is open there: the surface ends. In a
+/// random sampling one Voronoi vertex in ten million lies so far from its points.
 const REACH: f64 = 2.5;
 
 /// The largest number of [pieces](Cells::pieces) in a cell: the bits of a mask.
@@ -33,22 +39,24 @@ pub(super) const MOST_PIECES: usize = 16;
 
 /// All cells, and the graph of their neighbours.
 pub(super) struct Cells {
-    /// Where the corners of each cell begin; one more at the end.
+    /// The index of the first corner of each cell, and the number of corners.
     first_corner: Vec<usize>,
-    /// Relative to the cell's point, in the basis of its tangent plane; counter-clockwise. Scaled units.
+    /// The corners relative to the cell's point, in the basis of its tangent plane;
+    /// counter-clockwise, scaled units.
     corners: Vec<DVec2>,
-    /// Of each corner the edge to the next.
+    /// The edge from each corner to the next.
     edges: Vec<Edge>,
-    /// The distance of the farthest corner from the point.
+    /// The distance of the farthest corner from the point, scaled units.
     pub radii: Vec<f64>,
-    /// How far a cell with [ends](Edge::is_end) goes on there from its point; zero for other cells.
+    /// How far a cell extends from its point to its [ends](Edge::is_end), scaled units; zero
+    /// without ends.
     pub overhangs: Vec<f64>,
     first_neighbour: Vec<usize>,
     neighbours: Vec<u32>,
 }
 
 impl Cells {
-    /// Creases are told from bends that `tolerance`, scaled units, allows.
+    /// Computes all cells. Creases are bends of more than `tolerance` allows, scaled units.
     pub fn new(samples: &Samples, tolerance: f64, progress: &dyn Progress) -> Self {
         const CHUNK: usize = 2048;
         progress.begin("finding neighbours", samples.len() as u64);
@@ -85,7 +93,8 @@ impl Cells {
         }
         cells.first_corner.push(cells.corners.len());
         for (index, cell) in chunks.iter().flatten().enumerate() {
-            // Both ways: where dense points meet sparse ones, the sparse have neighbours that have nearer ones. But not if one is
+            // Edges go both ways: where dense points meet sparse ones, a dense point is a neighbour
+            // of a sparse one, but has nearer neighbours itself. There is no edge if one point is
             // out of the other's reach: an outlier is no neighbour of a surface.
             let near = |&&(other, distance): &&(u32, f64)| {
                 distance <= 2.0 * REACH * f64::min(cell.spacing, spacings[other as usize])
@@ -119,7 +128,7 @@ impl Cells {
         &self.neighbours[first..end]
     }
 
-    /// The pieces of a cell, as bits that say which of them: the triangles between its point and its edges.
+    /// The pieces of a cell, the triangles between its point and its edges, as bits.
     pub fn pieces(&self, index: u32) -> u16 {
         let pieces = self.corners(index).len().min(MOST_PIECES) as u32;
         ((1u32 << pieces) - 1) as u16
@@ -132,19 +141,19 @@ impl Cells {
         (0..corners.len()).map(move |k| (ends(k), self.edges[first + k]))
     }
 
-    /// The corners of some of its pieces, its point aside.
+    /// The corners of some pieces of a cell, except its point.
     pub fn corners_of(&self, index: u32, pieces: u16) -> impl Iterator<Item = DVec2> {
         let corners = self.corners(index);
         let edges = (0..corners.len()).filter(move |k| pieces >> piece_of(*k, corners.len()) & 1 == 1);
         edges.flat_map(move |k| [corners[k], corners[(k + 1) % corners.len()]])
     }
 
-    /// Where the pieces of a cell lie among those of all.
+    /// The index of a cell's first piece among the pieces of all cells.
     pub fn first_piece(&self, index: u32) -> usize {
         self.first_corner[index as usize]
     }
 
-    /// Places for pieces, used or not.
+    /// The number of indices of pieces, used or not.
     pub fn piece_places(&self) -> usize {
         self.corners.len()
     }
@@ -159,7 +168,8 @@ impl Cells {
     }
 }
 
-/// Which piece the triangle of edge `k` belongs to: its own, unless a cell has more edges than a mask has bits.
+/// The piece to which the triangle of edge `k` belongs: its own, unless the cell has more edges
+/// than a mask has bits.
 pub(super) fn piece_of(k: usize, edges: usize) -> usize {
     if edges <= MOST_PIECES { k } else { k * MOST_PIECES / edges }
 }
@@ -170,15 +180,18 @@ pub(super) fn tangent_basis(n: DVec3) -> [DVec3; 2] {
     [s, t]
 }
 
+/// The cell of one point.
 struct Cell {
     corners: Vec<DVec2>,
-    /// And how far they are.
+    /// Neighbours, and their distances.
     neighbours: Vec<(u32, f64)>,
     edges: Vec<Edge>,
     overhang: f64,
     spacing: f64,
 }
 
+/// Computes the cell of point `index`: from `few` neighbours, or from `many` if these leave it
+/// open.
 fn cell(
     samples: &Samples,
     index: u32,
@@ -207,13 +220,14 @@ fn cell(
             return Cell { edges: polygon.edges(), corners: polygon.corners, neighbours, overhang, spacing };
         }
     }
-    // Where the surface ends, it goes on as far as the surfel does.
+    // Where the surface ends, the cell extends as far as the surfel does.
     let overhang = samples.radii[index as usize];
     let polygon = Polygon::cut(overhang, &borders);
     Cell { edges: polygon.edges(), corners: polygon.corners, neighbours, overhang, spacing }
 }
 
-/// The local spacing; zero without neighbours.
+/// The local spacing, `sqrt(pi Σ d_k² / Σ k)` over distances to the k-th nearest neighbours; zero
+/// without neighbours.
 fn local_spacing(borders: &[Border]) -> f64 {
     let nearest = || borders.iter().filter_map(|border| Some(border.beyond.neighbour()?.1)).take(SPACING_NEIGHBOURS);
     let squares: f64 = nearest().map(|distance| distance * distance).sum();

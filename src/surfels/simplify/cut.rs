@@ -1,4 +1,5 @@
-//! Where a splat ends: at the lines of the surfels that it stands for, and at sharp edges around it.
+//! Clips splats: at the clip lines of the surfels that they stand for, and at sharp edges around
+//! them.
 
 use glam::{DVec2, DVec3};
 
@@ -9,45 +10,48 @@ use super::samples::Samples;
 use crate::scene::Clip;
 use crate::surfels::lines::{self, Line, hull, nearest_share};
 
-/// How far past what it covers a splat goes, by its deviation: splats that end at one edge may lie so far apart there.
+/// How far a splat extends past its covered pieces, in deviations: splats that end at one edge may
+/// lie so far apart there.
 const MARGIN: f64 = 2.0;
 
-/// And how far more, in radii of the surfel that it grew from, where the surface goes on past a line, or an edge is only about there: cells
-/// only nearly tile a rough surface. Of 3.5 million rays at 7,263 disks for `data/bunny.obj`, one finds a hole with 0.2, none with 0.3.
+/// An additional margin, in radii of the surfel from which the splat grew, where the surface
+/// continues past a line or an edge is only approximate: cells only nearly tile a rough surface.
+/// For `data/bunny.obj`, with 7,263 disks, one of 3.5 million rays finds a hole with 0.2, none with
+/// 0.3.
 const ROUGH_MARGIN: f64 = 0.3;
 
-/// A splat is cut where it stands out past an end by more than so many deviations: less may be the roughness of the surface, whose holes
-/// disks close by their overlap.
+/// A splat is clipped only where it extends past an end by more than this many deviations: less may
+/// be the roughness of the surface, whose holes are closed by the overlap of disks.
 const ROUGH: f64 = 4.0;
 
-/// The unit disk of a splat.
+/// A splat, mapped to the unit disk.
 struct Disk<'a> {
     samples: &'a Samples,
     cells: &'a Cells,
     center: DVec3,
-    /// Half-axes over their squares.
+    /// The half-axes divided by their squared lengths.
     inverse: [DVec3; 2],
 }
 
 impl Disk<'_> {
-    /// Where a corner of a cell lies on it.
+    /// The position of a cell's corner in the unit disk.
     fn place(&self, cell: u32, corner: DVec2) -> DVec2 {
         let [s, t] = tangent_basis(self.samples.normals[cell as usize]);
         let offset = self.samples.positions.position(cell) + s * corner.x + t * corner.y - self.center;
         DVec2::new(offset.dot(self.inverse[0]), offset.dot(self.inverse[1]))
     }
 
-    /// The edges of a cell.
+    /// The edges of a cell in the unit disk.
     fn edges(&self, cell: u32) -> impl Iterator<Item = ([DVec2; 2], Edge)> {
         self.cells.edges(cell).map(move |(ends, edge)| (ends.map(|corner| self.place(cell, corner)), edge))
     }
 
-    /// Of a unit of length, across a line.
+    /// The length in the unit disk of a scaled unit across a line.
     fn unit(&self, line: &Line) -> f64 {
         (self.inverse[0] * line.inward.x + self.inverse[1] * line.inward.y).length()
     }
 
-    /// The corners of what it covers.
+    /// The corners of the convex hull of the covered pieces.
     fn covered(&self, covers: &[Cover]) -> Vec<DVec2> {
         let corners = |&Cover { cell, pieces }: &Cover| {
             self.cells.corners_of(cell, pieces).map(move |corner| self.place(cell, corner))
@@ -55,7 +59,9 @@ impl Disk<'_> {
         hull(covers.iter().flat_map(corners).collect())
     }
 
-    /// The corners of what it lies over of these cells and those that the surface goes on to, to whose splats it closes slits.
+    /// The corners of the convex hull of what the disk overlaps of cells to which the surface
+    /// smoothly continues from the covered ones. This overlap closes slits between their splats and
+    /// this one.
     fn beside(&self, covers: &[Cover]) -> Vec<DVec2> {
         let goes_on = |cell: u32| {
             self.cells.neighbours(cell).iter().copied().filter(move |next| self.samples.are_smooth(cell, *next))
@@ -66,8 +72,11 @@ impl Disk<'_> {
     }
 }
 
-/// The lines at which a splat of these half-axes ends: those at which the surfels end that it stands for, and what lies around them. It
-/// keeps what it covers, of which the points lie up to `deviation` from its plane; the surfel that it grew from has this `radius`.
+/// The clip lines of a splat with these half-axes: those of the surfels that it stands for, and
+/// sharp edges around it.
+///
+/// The splat keeps its covered pieces, whose points lie up to `deviation` from its plane. `radius`
+/// is that of the surfel from which it grew. All lengths are in scaled units.
 pub(super) fn clip(
     samples: &Samples,
     cells: &Cells,
@@ -97,14 +106,14 @@ pub(super) fn clip(
     lines::clip(edges.filter_map(line).collect())
 }
 
-/// Each once.
+/// Sorts cells and removes duplicates.
 fn sorted(mut cells: Vec<u32>) -> Vec<u32> {
     cells.sort_unstable();
     cells.dedup();
     cells
 }
 
-/// The ends of the part of a segment that lies on the unit disk.
+/// The ends of the part of a segment that lies in the unit disk, if there is one.
 fn on_unit_disk([from, to]: [DVec2; 2]) -> Option<[DVec2; 2]> {
     let along = to - from;
     let (a, b, c) = (along.length_squared(), from.dot(along), from.length_squared() - 1.0);

@@ -1,9 +1,11 @@
-//! Splat growing: the largest disk around a point that the points in it allow.
+//! Splat growing: the largest disk around a point that the tolerance allows.
 //!
-//! Thesis section 4.2, after Wu and Kobbelt 2004: from the point outward, in the order of distance in the tangent plane, along
-//! the graph, until the next point would make the heights of those inside spread over more than twice the tolerance. The disk
-//! then moves along its normal to the middle of their heights, so none is farther from it than the tolerance.
-//! The points inside are the conquered set, those seen but not yet reached the confront set.
+//! A disk grows from its point outward along the graph, in the order of distance in the tangent
+//! plane, until the next point would make the heights of the points inside spread over more than
+//! twice the tolerance. It then moves along its normal to the middle of these heights, so that no
+//! point inside is farther from it than the tolerance. The points inside are the conquered set,
+//! those seen but not yet reached the confront set. (Thesis section 4.2, after Wu and Kobbelt
+//! 2004.)
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,26 +17,27 @@ use super::cells::{Cells, piece_of, tangent_basis};
 use super::paraboloid::Paraboloid;
 use super::samples::Samples;
 
-/// Half-axes of an ellipse are at most so many times as long as each other, and a disk unless they are this much.
+/// The largest ratio of the half-axes of an ellipse, and the ratio up to which it stays a disk.
 const LARGEST_RATIO: f64 = 4.0;
 const SMALLEST_RATIO: f64 = 1.1;
 
-/// The cosine of the angle between ends up to which one line cuts a splat at both: 10 degrees.
+/// The cosine of the angle between two ends up to which one line clips a splat at both: 10 degrees.
 const ONE_LINE: f64 = 0.985;
 
-/// How often a cap is fitted to what it holds, and grown again.
+/// How often a cap is fitted to the points that it holds and grown again: so many times as a
+/// circle, then as many as an ellipse.
 const FITS: usize = 3;
 
-/// The cosine of the angle up to which a cap bends: 37 degrees.
+/// The cosine of the largest angle between the normals of a cap and of its points: 37 degrees.
 const STEEPEST: f64 = 0.8;
 
-/// A line in a splat's plane at which it will be cut.
+/// A line in a splat's plane at which the splat will be clipped.
 struct Ended {
-    /// Unit.
+    /// The unit direction from the splat's point to the line.
     toward: DVec3,
-    /// From the splat's point; the surface ends there, or before.
+    /// The distance from the splat's point; the surface ends at the line, or before it.
     distance: f64,
-    /// How far from it an end may lie for which it stands.
+    /// The largest distance from the line of an end that it stands for.
     reach: f64,
 }
 
@@ -43,40 +46,41 @@ impl Ended {
         offset.dot(self.toward) > self.distance
     }
 
-    /// Whether it stands for an end in about this unit direction, from corner to corner.
+    /// Whether the line stands for an end with about this unit direction, between two corners.
     fn stands_for(&self, toward: DVec3, corners: [DVec3; 2]) -> bool {
         let is_near = |corner: DVec3| (corner.dot(self.toward) - self.distance).abs() <= self.reach;
         self.toward.dot(toward) > ONE_LINE && corners.into_iter().all(is_near)
     }
 }
 
-/// A disk or ellipse grown around a point.
+/// A disk, ellipse or cap that grew around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Splat {
     /// The point it grew from.
     pub point: u32,
-    /// Unit: that of the point, but of a cap.
+    /// The unit normal: that of the point, except for a cap.
     pub normal: DVec3,
-    /// How far its centre lies from that point along the normal.
+    /// The distance of its centre from that point along the normal, scaled units.
     pub shift: f64,
-    /// Half-axes, perpendicular to each other and to the normal. All in scaled units.
+    /// Half-axes, perpendicular to each other and to the normal, scaled units.
     pub axes: [DVec3; 2],
     /// How it curves.
     pub bend: Paraboloid,
-    /// The largest distance of a point inside from it. It exceeds the tolerance where the splat is
-    /// [larger](Grower::grow_over_cell) than it grew.
+    /// The largest distance of a point inside from the splat, scaled units. It exceeds the
+    /// tolerance only if the splat was [enlarged](Grower::grow_over_cell) beyond what it grew to.
     pub deviation: f64,
 }
 
-/// What a splat covers of a cell.
+/// The pieces of a cell that a splat covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cover {
     pub cell: u32,
-    /// The pieces that lie in the splat entirely; at least one.
+    /// The pieces that lie entirely in the splat, as bits; at least one.
     pub pieces: u16,
 }
 
-/// The distance of a point in a splat's plane, where the splat is a circle.
+/// The distance of a point in a splat's plane, in units of the half-axes, so that the splat is a
+/// circle.
 #[derive(Clone, Copy, Debug)]
 struct Distance(f64);
 
@@ -100,7 +104,7 @@ impl Ord for Distance {
     }
 }
 
-/// A point inside.
+/// A point inside the splat.
 #[derive(Clone, Copy)]
 struct Conquered {
     point: u32,
@@ -115,18 +119,19 @@ pub(super) struct Grower<'a> {
     /// Scaled units.
     tolerance: f64,
     shape: SplatShape,
-    /// Of the splat that is growing.
+    /// Normal and curvature of the growing splat.
     normal: DVec3,
     bend: Paraboloid,
     confront: BinaryHeap<Reverse<(Distance, u32)>>,
     conquered: Vec<Conquered>,
-    /// Which points the splat that is growing has seen: those with its number.
+    /// For each point, the number of the last splat that has seen it.
     seen: Vec<u32>,
+    /// The number of the growing splat.
     number: u32,
 }
 
 impl<'a> Grower<'a> {
-    /// With the tolerance in scaled units.
+    /// Creates a grower; `tolerance` is in scaled units.
     pub fn new(samples: &'a Samples, cells: &'a Cells, tolerance: f64, shape: SplatShape) -> Self {
         let seen = vec![0; samples.len()];
         Self {
@@ -143,7 +148,8 @@ impl<'a> Grower<'a> {
         }
     }
 
-    /// Grows a splat from `point` and appends what it covers, in the order of cells.
+    /// Grows a splat from `point` and appends the pieces that it covers to `covers`, in the order
+    /// of cells.
     pub fn grow(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
         let first = covers.len();
         self.normal = self.samples.normals[point as usize];
@@ -165,8 +171,9 @@ impl<'a> Grower<'a> {
         }
     }
 
-    /// The cap around the point of `disk`, whose covers start at `first`, that covers the most of those that are grown in turns from what
-    /// the last one holds, of circles and then of ellipses along the principal curvatures; or the disk.
+    /// Grows caps around the point of `disk`, whose covers start at index `first`, each from the
+    /// points that the last one holds: circles, then ellipses along the principal curvatures.
+    /// Returns the splat that covers most, which may be the disk, and leaves its covers only.
     fn grow_cap(&mut self, disk: Splat, first: usize, covers: &mut Vec<Cover>) -> Splat {
         let (point, mut best, mut kept) = (disk.point, disk, first);
         for turn in 0..2 * FITS {
@@ -196,7 +203,8 @@ impl<'a> Grower<'a> {
         covers.iter().map(|cover| self.cells.area(cover.cell, cover.pieces)).sum()
     }
 
-    /// The paraboloid through the conquered set of the splat that grew last, around `point`, and what it would take next.
+    /// The paraboloid around `point` through the conquered and confront sets of the splat that grew
+    /// last, and the unit normal with which it would fit best.
     fn bend_of(&self, point: u32) -> Option<(Paraboloid, DVec3)> {
         let (center, normal) = (self.samples.positions.position(point), self.normal);
         let [s, t] = tangent_basis(normal);
@@ -212,7 +220,8 @@ impl<'a> Grower<'a> {
         Some((bend, (normal - s * tilt.x - t * tilt.y).normalize()))
     }
 
-    /// How far a point lies over the splat that grows around one of this normal, at `offset` from that.
+    /// The height over the growing splat, whose normal is `normal`, of a point at `offset` from the
+    /// splat's point.
     fn over(&self, normal: DVec3, offset: DVec3) -> f64 {
         if self.bend.is_flat() {
             return offset.dot(normal);
@@ -221,14 +230,15 @@ impl<'a> Grower<'a> {
         self.bend.over(DVec2::new(offset.dot(s), offset.dot(t)), offset.dot(normal))
     }
 
-    /// Whether the splat that grows from `point` may hold `other`.
+    /// Whether the growing splat, from `point`, may hold `other`.
     fn holds(&self, point: u32, other: u32) -> bool {
         let next = self.samples.normals[other as usize];
         self.samples.same_side(point, other) && (self.bend.is_flat() || self.normal.dot(next).abs() > STEEPEST)
     }
 
-    /// The same for a disk that is at least so large that it covers the point's own cell, though another point inside may then
-    /// lie beyond the tolerance. It covers nothing of the cells of such points.
+    /// As [`Self::grow`], for a disk that is at least large enough to cover the point's own cell.
+    /// Another point inside may then lie beyond the tolerance; the disk covers nothing of the cells
+    /// of such points.
     pub fn grow_over_cell(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
         self.normal = self.samples.normals[point as usize];
         self.grow_shape(point, self.circle(), true, covers)
@@ -239,10 +249,12 @@ impl<'a> Grower<'a> {
         tangent_basis(self.normal)
     }
 
-    /// Half-axes with the ratio and the directions in which the surface bends equally far from the tangent plane: along
-    /// those of the principal curvatures, as the inverse root of their sizes. From the paraboloid of least squares through the
-    /// conquered and the confront set of the splat that grew last, which must be a disk around `point`. None where it is
-    /// nearly a circle.
+    /// Half-axes, of product 1, along which the surface bends equally far from the tangent plane.
+    /// They lie along the principal curvatures, and are proportional to the inverse square roots of
+    /// the curvatures' magnitudes.
+    ///
+    /// They follow from the least-squares paraboloid through the conquered and confront sets of the
+    /// splat that grew last, which must be around `point`. None for nearly a circle.
     fn principal_axes(&self, point: u32) -> Option<[DVec3; 2]> {
         let (center, normal) = (self.samples.positions.position(point), self.normal);
         let [s, t] = tangent_basis(normal);
@@ -263,13 +275,13 @@ impl<'a> Grower<'a> {
         let (mean, half_difference) = (0.5 * (quadric.x + quadric.z), 0.5 * (quadric.x - quadric.z));
         let deviation = half_difference.hypot(0.5 * quadric.y);
         let (strong, weak) = (mean.abs() + deviation, (mean.abs() - deviation).abs());
-        // A matrix without an inverse says nothing, nor does a plane.
+        // A singular matrix or a plane determines no ellipse.
         if !quadric.is_finite() || strong <= SMALLEST_RATIO * SMALLEST_RATIO * weak {
             return None;
         }
         let ratio = (strong / weak).sqrt().min(LARGEST_RATIO);
-        // The direction of the larger curvature is that of the larger eigenvalue where their mean is positive, else of the
-        // smaller one, across it.
+        // The direction of the larger curvature is that of the larger eigenvalue if their mean is
+        // positive, else that of the smaller one, perpendicular to it.
         let angle = 0.5 * (0.5 * quadric.y).atan2(half_difference);
         let along = s * angle.cos() + t * angle.sin();
         let across = normal.cross(along);
@@ -279,7 +291,8 @@ impl<'a> Grower<'a> {
         Some([weak * stretch, normal.cross(weak).dot(strong).signum() * strong / stretch])
     }
 
-    /// The same for the shape of an ellipse with half-axes along `shape`: distances and radii are in units of them.
+    /// Grows a splat whose half-axes are multiples of `shape`; distances and radii are in units of
+    /// `shape`. With `over_cell`, it is enlarged to cover the point's own cell.
     fn grow_shape(&mut self, point: u32, shape: [DVec3; 2], over_cell: bool, covers: &mut Vec<Cover>) -> Splat {
         let mut radius = self.conquer(point, shape);
         let normal = self.normal;
@@ -287,7 +300,7 @@ impl<'a> Grower<'a> {
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let flat = |p: DVec3| DVec2::new(p.dot(inverse[0]), p.dot(inverse[1]));
         if over_cell {
-            // By the same steps as below, so that rounding leaves out no corner.
+            // Computed exactly as in `covered_pieces`, so that rounding leaves out no corner.
             let [s, t] = tangent_basis(normal);
             let corners = self.cells.corners(point).iter();
             radius = corners.map(|corner| flat(s * corner.x + t * corner.y).length()).fold(radius, f64::max);
@@ -310,12 +323,12 @@ impl<'a> Grower<'a> {
         Splat { point, normal, shift, axes: shape.map(|axis| axis * radius), bend: self.bend, deviation }
     }
 
-    /// The range of heights over the tangent plane of the points inside.
+    /// The range of heights of the points inside, over the tangent plane or the paraboloid.
     fn heights(&self) -> (f64, f64) {
         self.conquered.iter().fold((0.0, 0.0), |(low, high): (f64, f64), c| (low.min(c.height), high.max(c.height)))
     }
 
-    /// Fills the conquered set and returns the radius.
+    /// Fills the conquered set and returns the radius, in units of `shape`.
     fn conquer(&mut self, point: u32, shape: [DVec3; 2]) -> f64 {
         self.confront.clear();
         self.conquered.clear();
@@ -329,7 +342,7 @@ impl<'a> Grower<'a> {
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let shortest = shape[0].length().min(shape[1].length());
         let (mut low, mut high) = (0f64, 0f64);
-        // As large as the ends of the surface so far allow.
+        // The largest radius that the ends of the surface found so far allow.
         let mut end = f64::INFINITY;
         let mut lines = Vec::with_capacity(2);
         self.seen[point as usize] = self.number;
@@ -343,13 +356,15 @@ impl<'a> Grower<'a> {
             let height = self.over(normal, offset);
             (low, high) = (low.min(height), high.max(height));
             if high - low > 2.0 * self.tolerance {
-                // A way along the graph may lead back inward: what is farther out than this point is not inside.
+                // A path along the graph may lead back inward: points farther out than this one are
+                // not inside.
                 self.conquered.retain(|conquered| conquered.distance < distance);
                 self.confront.push(Reverse((Distance(distance), next)));
                 return distance;
             }
             if lines.iter().any(|line: &Ended| line.is_past(offset)) {
-                // The surface goes round the end of a line: what is past it would be kept, and nothing cut.
+                // The surface goes around the end of a line. Clipping would have to keep this
+                // point, and so would cut off nothing: growth ends here.
                 self.conquered.retain(|conquered| conquered.distance < distance);
                 return end.min(distance);
             }
@@ -365,19 +380,22 @@ impl<'a> Grower<'a> {
                     self.seen[neighbour as usize] = self.number;
                     self.confront.push(Reverse((Distance(reached), neighbour)));
                 } else {
-                    // The surface turns away, though by no more than the tolerance so far.
+                    // The surface turns away, though not yet by more than the tolerance.
                     end = end.min(self.turn_at(neighbour, offset, shape).unwrap_or(reached).max(distance));
                 }
             }
         }
-        // All of a surface is inside: the disk ends with the last cell.
+        // The whole surface is inside: the disk ends with the farthest cell.
         let reach = self.conquered.iter().map(|c| c.distance + self.cells.radii[c.point as usize] / shortest);
         end.min(reach.fold(0.0, f64::max))
     }
 
-    /// How large a splat of this shape may be that holds the point `next` at `offset`, for the ends of that point's cell: it
-    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point. But it is cut at up to
-    /// two ends, `lines`, that no point inside lies past, however far it reaches.
+    /// The largest radius of a splat of this shape that the ends of the cell of `next`, a point
+    /// inside at `offset`, allow.
+    ///
+    /// The splat reaches past an end, in the direction of that end, by no more than the cell
+    /// extends from its point. Up to two ends set no limit if no point inside lies past them: they
+    /// are put into `lines`, and the splat is clipped there.
     fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2], lines: &mut Vec<Ended>) -> f64 {
         let overhang = self.cells.overhangs[next as usize];
         let [s, t] = tangent_basis(self.samples.normals[next as usize]);
@@ -403,20 +421,23 @@ impl<'a> Grower<'a> {
         least
     }
 
-    /// Whether a conquered point lies past an end, relative to the splat's point; the last of them, `next`, lies at `offset`.
+    /// Whether a conquered point lies past an end, relative to the splat's point. The last of them,
+    /// `next`, lies at `offset`.
     fn is_any_past(&self, next: u32, offset: DVec3, ended: &Ended) -> bool {
         let center = self.samples.positions.position(next) - offset;
         let mut points = self.conquered.iter().map(|conquered| self.samples.positions.position(conquered.point));
         points.any(|point| ended.is_past(point - center))
     }
 
-    /// How large it may be before `next`, at `offset`, which faces away from it: the surface turns in the direction in which that
-    /// point faces, or against it. None where it faces the opposite way.
+    /// The largest radius before `next`, a point at `offset` that faces away from the splat: the
+    /// surface turns in the direction in which that point faces, or against it. None if the point
+    /// faces the opposite way.
     fn turn_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2]) -> Option<f64> {
         let (toward, extent) = along(self.samples.normals[next as usize], shape)?;
         Some(offset.dot(toward).abs() / extent)
     }
 
+    /// The pieces of a conquered point's cell that lie entirely within `radius`, as bits.
     fn covered_pieces(&self, of: &Conquered, center: DVec3, flat: impl Fn(DVec3) -> DVec2, radius: f64) -> u16 {
         if of.distance > radius {
             return 0;
@@ -439,8 +460,8 @@ impl<'a> Grower<'a> {
     }
 }
 
-/// The unit direction of `v` in the plane of an ellipse with perpendicular half-axes `shape`, and how far that reaches in it. None
-/// for a `v` across the plane.
+/// The unit direction of `v` in the plane of an ellipse with perpendicular half-axes `shape`, and
+/// the extent of the ellipse in that direction. None if `v` is perpendicular to the plane.
 fn along(v: DVec3, shape: [DVec3; 2]) -> Option<(DVec3, f64)> {
     let normal = shape[0].cross(shape[1]).normalize();
     let toward = v.reject_from_normalized(normal).try_normalize()?;

@@ -1,38 +1,47 @@
-//! Fewer, larger surfels for the same surface, within a tolerance: splat growing and selection (Tien 2008, chapter 4, after Wu
-//! and Kobbelt 2004, "Optimized sub-sampling of point sets for surface splatting").
+//! Replaces the surfels of a surface by fewer, larger ones within a tolerance, by splat growing and
+//! selection (Tien 2008, chapter 4, after Wu and Kobbelt 2004, "Optimized sub-sampling of point
+//! sets for surface splatting").
 //!
 //! ```text
-//! samples    = distinct(surfels)                  one position, normal and colour each
-//! cells      = voronoi(samples)                   the surface element of each sample; neighbours share an edge
-//! candidates = grow(samples, cells, tolerance)    the largest disk around a sample with heights within 2 tolerance
-//! selected   = select(candidates)                 greedily by area, until each piece of each cell lies in a disk
-//! selected   = relax(selected)                    moves that leave fewer (optional)
+//! samples    = distinct(surfels)                one position, normal and colour each
+//! cells      = voronoi(samples)                 surface elements; neighbours share an edge
+//! candidates = grow(samples, cells, tolerance)  largest disks with heights within 2 tolerance
+//! selected   = select(candidates)               greedily by area, until disks hold all cells
+//! selected   = relax(selected)                  moves that leave fewer (optional)
 //! ```
 //!
-//! Each stage is a file. The result depends on no order of the surfels and no number of threads.
+//! Each stage has its own file. The result does not depend on the order of the surfels or on the
+//! number of threads.
 //!
-//! **Hole-free.** A point is in a disk or not; a surface that lies between points needs more. The thesis counts as covered
-//! what lies within a constant share of the radius (0.5 to 0.7), Wu and Kobbelt what does not lie on the convex hull of the points
-//! inside. Here a cell is cut, from its point, into a triangle for each edge, and a disk covers those triangles that lie in it.
-//! As disks are convex and the triangles tile the surface, selected disks that cover all triangles leave no hole, and two disks
-//! may share a cell. What is left is seen aslant, where disks of different heights meet, or where the surface is rough between points:
-//! [`written`] closes it. Of 3.5 million rays at 13,152 disks for 57,000 samples of the Stanford bunny, at a tolerance of 0.00036
-//! diagonals, one finds a hole.
+//! **Hole-free.** Even where each point lies in a disk, the surface between points may be bare. The
+//! thesis counts as covered the points within a constant fraction of the radius (0.5 to 0.7), Wu
+//! and Kobbelt those inside that are not on the convex hull. Here a cell is divided into pieces,
+//! the triangles between its point and its edges, and a disk covers the triangles that lie in it.
+//! Disks are convex and the triangles tile the surface, so selected disks that cover all triangles
+//! leave no hole, and two disks may share a cell. Slits remain in oblique views, where disks of
+//! different heights meet, and where the surface is rough between points: [`written`] closes them.
+//! For the Stanford bunny, with 13,152 disks for 57,000 samples at a tolerance of 0.00036
+//! diagonals, one of 3.5 million rays finds a hole.
 //!
-//! **Caps.** A cap grows in turns: a disk, then the paraboloid through what the last one held, its own normal, and what that holds
-//! within the tolerance; at last ellipses of it. It holds points whose normals are within 37 degrees of its own, so that what it covers
-//! of them in its plane is what it covers of the surface.
+//! **Caps.** A cap grows in rounds. The first is a disk; each further one is grown from the
+//! paraboloid, with its own normal, through the points that the previous one held; the last ones
+//! are ellipses. A cap holds only points whose normals are within 37 degrees of its own, so that
+//! the part of a cell that it covers in its plane is the part of the surface that it covers.
 //!
-//! **Edges.** Where the surfels that came in end at lines, and at creases of more than 60 degrees, cells end and the graph has no
-//! edge; disks that stand for several surfels are cut there, as far as what they cover allows. As they are cut they may grow past two ends.
+//! **Edges.** Cells end, and the graph has no edge, at the clip lines of the input surfels and at
+//! creases of more than 60 degrees. Disks that stand for several surfels are clipped there, as far
+//! as their covered pieces allow. As they are clipped, they may grow past two such ends.
 //!
-//! **Textures.** Where the surfels that came in have texture coordinates, cells end at seams too: what is painted from two parts of an image
-//! is covered by disks of each. Disks that are cut at both sides of a seam overlap little there, so little of it shows their mean colours.
+//! **Textures.** If the input surfels have texture coordinates, cells end at seams too: disks do
+//! not cover surface on both sides of a seam. Disks that are clipped on both sides of a seam
+//! overlap little there, so their mean colours hardly show.
 //!
-//! **Within the tolerance.** A disk covers the cells of those points in it that it grew over, none of which is farther off than
-//! the tolerance. Where the surface bends by more than that within a cell no disk covers all of it so, and at a crease any that
-//! does holds, seen along its normal, points of the other side. There the cell's own point gets a disk as large as the cell
-//! ([`Report::beyond_tolerance`] counts them), which covers nothing of cells beyond the crease.
+//! **Within the tolerance.** A disk covers cells only of points that it grew over, and none of
+//! these is farther from it than the tolerance. Where the surface bends by more than that within a
+//! cell, no such disk covers the whole cell; and at a crease, any disk that does, seen along its
+//! normal, also lies over points of the other side. There the cell's own point gets a disk as large
+//! as the cell ([`Report::beyond_tolerance`] counts them), which covers nothing of the cells beyond
+//! the crease.
 
 mod borders;
 mod candidates;
@@ -61,7 +70,7 @@ use crate::scene::Scene;
 use crate::scene::options::kind_and_amount;
 use crate::surfels::Coordinates;
 
-/// How far points may lie from the splat that stands for them.
+/// The largest distance of a point from the splat that stands for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// A fraction of the diagonal of the box around the surfels' centres.
@@ -71,7 +80,7 @@ pub enum Tolerance {
 }
 
 impl Tolerance {
-    /// In world units, for surfels in a box of this diagonal.
+    /// The tolerance in world units, for surfels in a box of this diagonal.
     pub fn in_world(self, diagonal: f64) -> f64 {
         match self {
             Self::Relative(fraction) => fraction * diagonal,
@@ -97,38 +106,41 @@ impl FromStr for Tolerance {
     }
 }
 
-/// What splats grow to.
+/// The shape of the splats that grow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplatShape {
     /// Circular disks, as in the thesis.
     #[default]
     Disk,
-    /// Ellipses along the principal curvatures where these cover more, as in Wu and Kobbelt.
+    /// Ellipses along the principal curvatures where these cover more than disks, as in Wu and
+    /// Kobbelt.
     Ellipse,
-    /// Disks and ellipses that curve as the points inside do ([`Cap`](crate::scene::Cap)), which lets them hold more of those.
+    /// Disks and ellipses that are curved as the points inside are ([`Cap`](crate::scene::Cap)), so
+    /// they can hold more of them.
     Cap,
 }
 
-/// How to simplify.
+/// The options of [`simplify`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// How far points may lie from the splat that stands for them.
+    /// The largest distance of a point from the splat that stands for it.
     pub tolerance: Tolerance,
-    /// What splats grow to.
+    /// The shape of the splats that grow.
     pub shape: SplatShape,
-    /// Rounds of relaxation, at most.
+    /// The largest number of rounds of relaxation; 0 for none.
     pub relaxations: u32,
 }
 
 /// Selects few large surfels that stand for all surfels of `scene`.
 ///
-/// Each comes from a surfel: it has its normal, or as a cap one nearby, and its centre lies on the line through it along that
-/// normal, halfway between the highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is
-/// the mean of what it covers, by area (linear light, weighted by alpha).
+/// Each selected surfel grows from an input surfel. It has the normal of that surfel, or as a cap a
+/// similar one. Its centre lies on the line through that surfel along the normal, halfway between
+/// the highest and the lowest of the surfels inside, so that all of them are within the tolerance.
+/// Its colour is the mean over the area that it covers (linear light, weighted by alpha).
 ///
-/// The surface is where a scene's surfels are, and between them where they surround a gap that is no more than a few
-/// spacings wide; where it ends, it goes on as far as its surfels do. Normals that face apart by a right angle or more belong
-/// to different surfaces, unless they were estimated and have no side.
+/// The surface is where the surfels are, and between them where they surround a gap of at most a
+/// few spacings; where it ends, it extends as far as its surfels do. Normals that differ by a right
+/// angle or more belong to different surfaces, unless they were estimated and have no side.
 ///
 /// # Errors
 ///
@@ -137,12 +149,16 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
     simplify_in_texture(scene, &Coordinates::default(), options, progress).map(|(scene, _, report)| (scene, report))
 }
 
-/// [`simplify`] for surfels that have texture coordinates, and what those of the selected ones are. Slopes are fitted over the surfels that
-/// each stands for, or stay of one that stands for itself, and none stands for surfels on both sides of a seam, where coordinates jump.
+/// As [`simplify`], for surfels with texture coordinates. Also returns those of the selected
+/// surfels.
+///
+/// The slopes of the coordinates are fitted over the surfels that each selected surfel stands for;
+/// one that stands for itself keeps its own. No selected surfel stands for surfels on both sides of
+/// a seam, where coordinates jump.
 ///
 /// # Errors
 ///
-/// Those of [`simplify`].
+/// As [`simplify`].
 pub fn simplify_in_texture(
     scene: &Scene,
     coordinates: &Coordinates,
@@ -151,7 +167,7 @@ pub fn simplify_in_texture(
 ) -> Result<(Scene, Coordinates, Report)> {
     let tolerance = options.tolerance.in_world(scene.bounds().extent().length());
     if !(tolerance.is_finite() && tolerance >= 0.0) {
-        return Err(Error::Usage(format!("a tolerance is finite and not negative, {tolerance} is not")));
+        return Err(Error::Usage(format!("a tolerance must be finite and at least 0: {tolerance} is not")));
     }
     progress.begin("sorting points", 0);
     let samples = Samples::new(scene, coordinates)?;
@@ -166,7 +182,7 @@ pub fn simplify_in_texture(
     }
     let (simplified, left, deviations) =
         outcome::scene((scene, &coordinates.slopes), &samples, &cells, &candidates, &selected, scaled);
-    // Rounding aside.
+    // The factor allows for rounding.
     let beyond = |&&index: &&u32| candidates.splats[index as usize].deviation > scaled * (1.0 + 1e-9);
     let beyond_tolerance = selected.iter().filter(beyond).count() as u64;
     let report = Report {
@@ -176,7 +192,7 @@ pub fn simplify_in_texture(
         before_relaxation,
         tolerance,
         max_deviation: deviations.max,
-        // Where all are the same, a mean may be more by rounding.
+        // Rounding may make the mean of equal deviations exceed the largest.
         mean_deviation: deviations.mean.min(deviations.max),
         beyond_tolerance,
     };

@@ -1,4 +1,4 @@
-//! Selected splats as surfels, and how far from them the points lie.
+//! Turns selected splats into surfels, and measures how far points lie from them.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -15,21 +15,24 @@ use crate::scene::{Cap, Clip, Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 use crate::surfels::texture::{in_world, slopes_along};
 
-/// A half-axis is written longer than it grew by at most this part of itself,
+/// A half-axis is written longer than it grew by at most this fraction of itself.
 const LARGEST_OVERLAP: f64 = 0.4;
 
-/// at least this part,
+/// A half-axis is written longer than it grew by at least this fraction of itself.
 const SMALLEST_OVERLAP: f64 = 0.02;
 
-/// and in between by so many tolerances.
+/// Within these limits, a half-axis is written longer than it grew by this many tolerances.
 const OVERLAP_IN_TOLERANCES: f64 = 8.0;
 
-/// The half-axis that a surfel has, at least, whose half-axis grew to `grown`, in the unit of the tolerance.
+/// The smallest half-axis with which a surfel is written whose half-axis grew to `grown`, in the
+/// unit of the tolerance.
 ///
-/// Disks that just cover the surface together leave slits where it is seen aslant, because they lie at different heights. Two
-/// within a tolerance E of the surface are at most 2 E apart where they meet; overlapping by 8 E each they close the slit
-/// for views up to atan 8, 83 degrees, from the normal. More would only show past sharp edges. Between points a rough surface
-/// leaves the tolerance; the surfels that came in cover it there, so none is written smaller than the one that it grew from.
+/// Disks that just cover the surface together leave slits in oblique views, because they lie at
+/// different heights. Two disks within a tolerance E of the surface are at most 2 E apart where
+/// they meet; an overlap of 8 E each closes the slit for views up to atan 8, 83 degrees, from the
+/// normal. More would only show past sharp edges. Between points a rough surface may exceed the
+/// tolerance. The input surfels cover it there, so no surfel is written smaller than the one from
+/// which it grew.
 pub fn written(grown: f64, tolerance: f64) -> f64 {
     let overlap = (OVERLAP_IN_TOLERANCES * tolerance).max(SMALLEST_OVERLAP * grown);
     grown + overlap.min(LARGEST_OVERLAP * grown)
@@ -41,52 +44,53 @@ pub fn grown(written: f64, tolerance: f64) -> f64 {
     between.min(written / (1.0 + SMALLEST_OVERLAP)).max(written / (1.0 + LARGEST_OVERLAP))
 }
 
-/// What simplification did. Lengths are in world units.
+/// The outcome of a simplification. Lengths are in world units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Surfels that came in.
+    /// Input surfels.
     pub surfels: u64,
-    /// Different positions among them.
+    /// Distinct positions among them.
     pub distinct_positions: u64,
-    /// Surfels that stand for them.
+    /// Selected surfels.
     pub selected: u64,
-    /// How many those were after the greedy selection.
+    /// Selected surfels before relaxation.
     pub before_relaxation: u64,
-    /// What was asked for.
+    /// The tolerance of the options.
     pub tolerance: f64,
-    /// The largest distance of a point, along the normal, from the plane or the cap of a selected surfel that covers its cell or
-    /// a part of it: at most the tolerance, rounding aside.
+    /// The largest distance of a point, along the normal, from the plane or the cap of a selected
+    /// surfel that covers its cell or a part of it. It is at most the tolerance, up to rounding.
     pub max_deviation: f64,
-    /// The mean distance of a point so from the selected surfels that cover its cell or a part of it, weighted by the
-    /// area that they cover.
+    /// The mean of these distances over points and the selected surfels that cover their cells,
+    /// weighted by the covered area.
     pub mean_deviation: f64,
-    /// Selected surfels at creases: the surface bends by more than the tolerance within the cell of their own point, which they
-    /// cover. Points that lie farther off than that are over or under them, but not in the cells that they cover.
+    /// Selected surfels at creases, where the surface bends by more than the tolerance within the
+    /// cell of their own point, which they cover. Some points over or under them are beyond the
+    /// tolerance, but they cover nothing of the cells of such points.
     pub beyond_tolerance: u64,
 }
 
-/// How far points lie from the surfels that cover them, world units.
+/// Distances of points from the surfels that cover them, world units.
 pub(super) struct Deviations {
     pub max: f64,
     pub mean: f64,
 }
 
-/// What u and v gain for a world unit along each axis.
+/// The gradients of u and v, per world unit.
 type Slopes = [[f32; 3]; 2];
 
-/// A selected splat as it is written.
+/// A selected splat, as it is written.
 struct Chosen {
-    /// Of the scene, world units.
+    /// The centre relative to the scene's origin, world units.
     center: DVec3,
     surfel: Surfel,
     clip: Clip,
     cap: Cap,
     color: [f32; 4],
-    /// Texture coordinates at the centre and their slopes, if there are any.
+    /// Texture coordinates at the centre and their slopes; zero without texture coordinates.
     place: ([f32; 2], Slopes),
-    /// Area times deviation, and area.
+    /// Sums over the covered cells of area times deviation, and of area.
     sums: [f64; 2],
-    /// The largest deviation.
+    /// The largest deviation, world units.
     largest: f64,
 }
 
@@ -106,7 +110,7 @@ impl Chosen {
         .unwrap_or_else(|| Self::grown(index, samples, cells, candidates, tolerance));
         let point = candidates.splats[index as usize].point;
         let (center, fitted) = place(&chosen.surfel, point, covers, samples, cells);
-        // A surfel that stands for itself has what it came with.
+        // A surfel that stands for itself alone keeps its own slopes.
         let given = match (covers.len(), samples.only[point as usize]) {
             (1, Some(own)) => {
                 slopes.get(own as usize).filter(|slopes| slopes.as_flattened().iter().any(|gain| *gain != 0.0))
@@ -116,8 +120,8 @@ impl Chosen {
         Self { place: (center, given.copied().unwrap_or(fitted)), ..chosen }
     }
 
-    /// What stands for one surfel is that as it came, but for a factor that lets it hold its cell. None where several share a position, as
-    /// of a file that was read twice.
+    /// A splat that stands for one surfel is that surfel, enlarged if necessary to hold its cell.
+    /// None if several surfels share the position, as in a file that was read twice.
     fn alone(Cover { cell, pieces }: Cover, scene: &Scene, samples: &Samples, cells: &Cells) -> Option<Self> {
         let index = samples.only[cell as usize]? as usize;
         let surfel = scene.surfels[index];
@@ -168,7 +172,8 @@ impl Chosen {
         let world = |v: DVec3| (v / scale).as_vec3().to_array();
         let axes = splat.axes.map(|axis| {
             let length = axis.length();
-            // Where the surface bends by more than the tolerance, disks that meet are farther apart.
+            // Disks that meet where the surface bends by more than the tolerance are farther apart,
+            // and get the largest overlap.
             let tolerance = if splat.deviation > tolerance { f64::INFINITY } else { tolerance };
             axis * (written(length, tolerance).max(samples.radii[splat.point as usize]) / length)
         });
@@ -181,7 +186,7 @@ impl Chosen {
         );
         let Cap(heights) = splat.bend.cap(axes.map(|axis| DVec2::new(axis.dot(basis[0]), axis.dot(basis[1]))));
         let [s, t] = axes.map(world);
-        // As it is read again, where a tiny patch is written as large as its sample was.
+        // Limited as when the file is read: a tiny patch may be written as large as its sample.
         let longer = axes[0].length().max(axes[1].length()) / scale;
         let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32)).usable(longer);
         let color = mean_color(color, sums[1]);
@@ -191,7 +196,8 @@ impl Chosen {
     }
 }
 
-/// The texture coordinates of a splat that grew from a point: there, and their slopes over what it covers and what is beside that point.
+/// The texture coordinates at the point from which a splat grew, and their slopes, fitted to the
+/// covered cells and the point's neighbours.
 fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells: &Cells) -> ([f32; 2], Slopes) {
     let Some(own) = samples.places.get(point as usize) else { return Default::default() };
     let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -203,13 +209,13 @@ fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells
     (own.as_vec2().to_array(), in_world(slopes_along(axes, steps), axes))
 }
 
-/// Linear and not premultiplied, of a sum of premultiplied colours over this area.
+/// The linear colour with straight alpha for a sum of premultiplied colours over `area`.
 pub(super) fn mean_color([r, g, b, alpha]: [f64; 4], area: f64) -> [f32; 4] {
     let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
     [r / opaque, g / opaque, b / opaque, alpha / area].map(|c| c as f32)
 }
 
-/// The selected splats as a scene like `scene`; the tolerance in scaled units.
+/// Makes a scene like `scene` of the selected splats; `tolerance` is in scaled units.
 pub(super) fn scene(
     (scene, slopes): (&Scene, &[Slopes]),
     samples: &Samples,

@@ -1,22 +1,24 @@
-//! How a cap curves that grows: the paraboloid of the points that it holds.
+//! The curvature of a growing cap: the paraboloid through the points that it holds.
 
 use glam::{DMat2, DMat4, DVec2, DVec3, DVec4};
 
 use crate::scene::Cap;
 
-/// Points on a strip say nothing of how the surface curves across it: the determinant of their equations is at least this part of the
-/// fourth power of their trace. It is 5e-5 of a disk, and falls with the sixth power of a strip's width.
+/// Points on a strip do not determine the curvature across it. The determinant of the normal
+/// equations must be at least this part of the fourth power of their trace: it is 5e-5 of it for a
+/// disk, and falls with the sixth power of a strip's width.
 const LEAST_SPREAD: f64 = 1e-8;
 
-/// Heights over the tangent plane of a splat's point, `x u² + y u v + z v²` at (u, v) in the basis of that plane, scaled units. A disk's
-/// are zero.
+/// Heights over the tangent plane of a splat's point, `x u² + y u v + z v²` at (u, v) in the basis
+/// of that plane, scaled units. They are zero for a disk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Paraboloid(DVec3);
 
 impl Paraboloid {
     pub const FLAT: Self = Self(DVec3::ZERO);
 
-    /// That of the least squares through points at (u, v) and a height, but for a height that all have. None where they do not say.
+    /// Fits a paraboloid to points (u, v, height) by least squares, up to a height that all have in
+    /// common. None if the points do not determine it.
     pub fn through(points: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
         let reach = points.clone().map(|point| point.length()).fold(0.0, f64::max);
         let (mut matrix, mut right) = (DMat4::ZERO, DVec4::ZERO);
@@ -31,7 +33,8 @@ impl Paraboloid {
         (found.is_finite() && matrix.determinant() > LEAST_SPREAD * trace.powi(4)).then_some(Self(found))
     }
 
-    /// The slope of the plane of the least squares through what is left of points over it. None where they do not say.
+    /// The slope of the least-squares plane through the heights of points over the paraboloid. None
+    /// if the points do not determine it.
     pub fn tilt(&self, points: impl Iterator<Item = DVec3>) -> Option<DVec2> {
         let outer = |a: DVec2| DMat2::from_cols(a * a.x, a * a.y);
         let (mut matrix, mut right, mut sum, mut count) = (DMat2::ZERO, DVec2::ZERO, DVec3::ZERO, 0.0);
@@ -54,12 +57,14 @@ impl Paraboloid {
         self.0.dot(DVec3::new(at.x * at.x, at.x * at.y, at.y * at.y))
     }
 
-    /// How far a point at (u, v) and a height lies over it along the normal, which is no less than how far it lies from it.
+    /// The height over the paraboloid of a point at (u, v) with this height over the plane. It is
+    /// at least the distance from the paraboloid.
     pub fn over(&self, at: DVec2, height: f64) -> f64 {
         height - self.height(at)
     }
 
-    /// The cap that it is over half-axes s and t in that basis, in their unit.
+    /// The cap over half-axes s and t, which are given in the basis of the plane; its heights are
+    /// in the same unit.
     pub fn cap(&self, [s, t]: [DVec2; 2]) -> Cap {
         let product = |a: DVec2, b: DVec2| {
             2.0 * self.0.x * a.x * b.x + self.0.y * (a.x * b.y + a.y * b.x) + 2.0 * self.0.z * a.y * b.y

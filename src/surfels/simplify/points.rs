@@ -1,11 +1,12 @@
-//! What is left, as it is kept in a file.
+//! The simplified scene as points of a file.
 
 use super::SplatShape;
 use crate::io::Points;
 use crate::scene::{Atlas, Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 
-/// The surfels of a scene that is simplified to this shape as points, with these texture coordinates.
+/// The surfels of `scene`, which is simplified to this shape, as points with these texture
+/// coordinates.
 pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
     let Coordinates { centers, slopes, atlas } = coordinates;
@@ -13,7 +14,7 @@ pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Poi
     let own = |place: [f64; 2]| atlas.own(place).map(|turns| turns as f32);
     let number = |place: [f64; 2]| Some(atlas.number(place)).filter(|number| *number < atlas.textures);
     let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
-    // Lines and caps are by half-axes.
+    // Clip lines and caps are relative to half-axes.
     let half_axes = shape != SplatShape::Disk || !scene.clips.is_empty();
     Points {
         positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),

@@ -1,20 +1,24 @@
-//! Relaxation: selected splats give way to others that cover what only they cover, until some are not needed.
+//! Relaxation: replaces selected splats by others that cover what only they cover, until some are
+//! superfluous.
 //!
-//! Greedy selection never takes a splat back, so late ones fill gaps between early ones and overlap them. Wu and Kobbelt
-//! move splats of the selection in rounds, to where they overlap less. Here the aim is the number: the sum over the splats of the
-//! root of the area that each alone covers. A root falls fastest near zero, so moves that lower the sum make the splats that
-//! are hardly needed smaller still, and one that covers nothing alone is left out. Each cell stays covered after each move.
+//! Greedy selection never removes a splat, so late ones fill gaps between early ones and overlap
+//! them. Wu and Kobbelt move selected splats in rounds, to where they overlap less. Here the aim is
+//! a smaller number: a move must lower the sum, over the selected splats, of the square root of the
+//! area that each alone covers. A root is steepest near zero, so such moves shrink the shares of
+//! splats that are hardly needed, and a splat that covers nothing alone is removed. Each cell stays
+//! covered after each move.
 
 use super::candidates::Candidates;
 use super::cells::Cells;
 use super::growing::Cover;
 use crate::Progress;
 
-/// A move must lower the sum by this part of a splat's own share, so that rounding cannot move splats back and forth.
+/// A move must lower the sum by this fraction of a splat's own share, so that rounding cannot move
+/// splats back and forth.
 const LEAST_GAIN: f64 = 1e-6;
 
-/// Moves splats for at most `rounds` rounds, or until no move lowers the sum. Each round looks at each splat once, in the order
-/// of candidates.
+/// Moves splats for at most `rounds` rounds, or until no move lowers the sum. Each round tries each
+/// selected splat once, in the order of candidates. Returns the selected splats, ascending.
 pub(super) fn relax(
     cells: &Cells,
     candidates: &Candidates,
@@ -42,20 +46,21 @@ pub(super) fn relax(
 struct State<'a> {
     cells: &'a Cells,
     candidates: &'a Candidates,
-    /// For each cell the candidates that cover some of it: [`Inverse`].
+    /// The candidates that cover some of each cell.
     covering: Inverse,
     selected: Vec<bool>,
-    /// For each piece how many selected splats cover it, and their numbers joined by exclusive or: of one, its number.
+    /// For each piece, the number of selected splats that cover it, and the exclusive or of their
+    /// indices: the index itself if there is one.
     count: Vec<u32>,
     joined: Vec<u32>,
-    /// For each splat the pieces that it alone covers, and their area.
+    /// For each splat, the number of pieces that it alone covers, and their area.
     own_pieces: Vec<u32>,
     own_area: Vec<f64>,
     /// The pieces of each cell that a replacement must cover; zero between moves.
     needed: Vec<u16>,
 }
 
-/// For each cell the candidates that cover some of it, ascending.
+/// For each cell, the candidates that cover some of it, ascending.
 struct Inverse {
     first: Vec<u64>,
     splats: Vec<u32>,
@@ -89,7 +94,7 @@ impl Inverse {
     }
 }
 
-/// The set bits.
+/// The indices of the set bits, ascending.
 fn bits(mut pieces: u16) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lowest = (pieces != 0).then(|| pieces.trailing_zeros() as usize)?;
@@ -113,7 +118,7 @@ impl<'a> State<'a> {
             needed: vec![0; cells.radii.len()],
         };
         selected.iter().for_each(|&splat| state.add(splat));
-        // What the greedy selection made superfluous itself.
+        // The greedy selection may have made some splats superfluous itself.
         for &splat in selected {
             if state.own_pieces[splat as usize] == 0 {
                 state.remove(splat);
@@ -126,7 +131,7 @@ impl<'a> State<'a> {
         self.selected[splat as usize]
     }
 
-    /// Every piece of a cover: its place, and its area.
+    /// The index and the area of each piece of a cover.
     fn pieces(&self, cover: &Cover) -> impl Iterator<Item = (usize, f64)> + use<'a> {
         let (cells, cell) = (self.cells, cover.cell);
         bits(cover.pieces).map(move |bit| (cells.first_piece(cell) + bit, cells.area(cell, 1 << bit)))
@@ -167,8 +172,8 @@ impl<'a> State<'a> {
         (self.own_pieces[splat as usize], self.own_area[splat as usize]) = (0, 0.0);
     }
 
-    /// Replaces a selected splat by the candidate that lowers the sum most, if one does, and leaves out those that are not
-    /// needed then.
+    /// Replaces a selected splat by the candidate that lowers the sum most, if one does, and
+    /// removes splats that become superfluous. Returns whether it did.
     fn improve(&mut self, splat: u32) -> bool {
         let mut needed: Vec<Cover> = Vec::new();
         for cover in self.candidates.covers(splat) {
@@ -201,7 +206,7 @@ impl<'a> State<'a> {
         idle.sort_unstable();
         idle.dedup();
         for splat in idle {
-            // Two that cover the same are both idle, until one is gone.
+            // Two splats that cover the same are both idle until one is removed.
             if self.is_idle(splat) {
                 self.remove(splat);
             }
@@ -221,9 +226,10 @@ impl<'a> State<'a> {
         met.count() == cells
     }
 
-    /// By how much the sum of roots changes if `other`, which covers all that `splat` alone does, takes its place.
+    /// The change of the sum of roots if `other`, which covers all that `splat` alone covers, takes
+    /// its place.
     fn change(&self, splat: u32, other: u32) -> f64 {
-        // What other selected splats gain or lose.
+        // The areas that other selected splats gain or lose.
         let mut changes: Vec<(u32, f64)> = Vec::new();
         for cover in self.candidates.covers(splat) {
             for (piece, area) in self.pieces(cover).filter(|(piece, _)| self.count[*piece] == 2) {
@@ -238,7 +244,7 @@ impl<'a> State<'a> {
             for bit in bits(cover.pieces) {
                 let piece = self.cells.first_piece(cover.cell) + bit;
                 let of_splat = shared >> bit & 1 == 1;
-                // Covered, after the move, by one more than `other`.
+                // After the move, one splat besides `other` covers the piece.
                 let loses = match self.count[piece] {
                     1 if !of_splat => self.joined[piece],
                     2 if of_splat => self.joined[piece] ^ splat,
@@ -254,7 +260,7 @@ impl<'a> State<'a> {
             .map(|of_one| {
                 let before = self.own_area[of_one[0].0 as usize];
                 let after = before + of_one.iter().map(|change| change.1).sum::<f64>();
-                // Rounding leaves a little of an area that is gone.
+                // Rounding leaves a small rest of an area that vanishes.
                 root(if after < 1e-9 * before { 0.0 } else { after }) - root(before)
             })
             .sum()

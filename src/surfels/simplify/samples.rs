@@ -1,4 +1,4 @@
-//! The points as the algorithm sees them: distinct positions with a normal, a radius and a colour each.
+//! The input of the algorithm: distinct positions, each with a normal, a radius and a colour.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -10,39 +10,43 @@ use crate::surfels::creases::SMOOTH;
 use crate::surfels::positions::DistinctPositions;
 use crate::surfels::texture::{around, jumps, typical_change};
 
-/// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
+/// The surfels of a scene, merged at each distinct position, in an order that depends on the set of
+/// positions alone.
+///
 /// Lengths are in scaled units: see [`DistinctPositions::scale`].
 pub(super) struct Samples {
     pub positions: DistinctPositions,
-    /// Unit normals: the mean over the surfels at a position, or, where they cancel, the first of them by coordinates.
+    /// Unit normals: the mean over the surfels at a position, or, if they cancel, the first of them
+    /// by coordinates.
     pub normals: Vec<DVec3>,
-    /// The surfel at a position, if it is the only one there.
+    /// The surfel at a position, if there is only one.
     pub only: Vec<Option<u32>>,
     /// The largest half-axis of the surfels at a position.
     pub radii: Vec<f64>,
-    /// The lines at which the one surfel at a position ends, if it does.
+    /// The ends of the surfel at a position, if there is only one.
     pub lines: Vec<Vec<End>>,
     /// Mean linear colour of the surfels at a position, premultiplied by alpha.
     pub colors: Vec<[f64; 4]>,
-    /// Texture coordinates in the plane of their textures, of several surfels at a position the smallest; none where surfels have none.
+    /// Texture coordinates in the plane of the atlas, the smallest of several surfels at a
+    /// position; empty if surfels have none.
     pub places: Vec<DVec2>,
-    /// How the textures lie in that plane.
+    /// The layout of the textures in that plane.
     atlas: Atlas,
-    /// How far those change for a scaled unit, typically, from each point to the next.
+    /// The typical change of texture coordinates around each point, per scaled unit.
     changes: Vec<f64>,
-    /// Whether the side that a normal points to means something.
+    /// Whether normals have a side.
     pub oriented: bool,
 }
 
 impl Samples {
-    /// With the texture coordinates of the surfels, if they have any.
+    /// Merges the surfels of `scene`, with their texture coordinates if they have any.
     pub fn new(scene: &Scene, coordinates: &Coordinates) -> Result<Self> {
         let center = |index: usize| scene.center(index).to_array();
         let centers: Vec<[f64; 3]> = (0..scene.surfels.len()).into_par_iter().map(center).collect();
         let positions = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
         let count = positions.len();
-        // The surfels of each position together; within one in an order of their own content, so that sums come out the
-        // same for any order of the scene.
+        // Groups surfels by position. Within a group they are ordered by content, so that sums do
+        // not depend on the order of the scene.
         let attributes = |surfel: u32| {
             let normal = unit_normal(&scene.surfels[surfel as usize]);
             let color = scene.colors.linear(surfel as usize).map(f64::from);
@@ -73,7 +77,7 @@ impl Samples {
                 radius = radius.max(f64::from(scene.surfels[surfel as usize].radius()));
             }
             let first = group.first().map_or(DVec3::Z, |&(_, surfel)| attributes(surfel).0);
-            // A sum this short is what rounding leaves of normals that cancel.
+            // A sum this short is the rounding error of normals that cancel.
             let cancelled = normal.length() < 1e-3;
             normals.push(if cancelled { first } else { normal.normalize() });
             radii.push(radius * positions.scale());
@@ -96,7 +100,7 @@ impl Samples {
         Ok(Self { positions, normals, only, radii, lines, colors, places, atlas, changes, oriented: scene.oriented })
     }
 
-    /// The way from one point to another, in space and in the texture.
+    /// The step from one point to another: in space, scaled units, and in texture coordinates.
     pub fn step(&self, from: u32, to: u32) -> (DVec3, DVec2) {
         let offset = self.positions.position(to) - self.positions.position(from);
         (offset, self.places[to as usize] - self.places[from as usize])
@@ -113,19 +117,21 @@ impl Samples {
         self.normals.len()
     }
 
-    /// Whether the tangent planes of two points differ by less than an edge of the surface does: 30 degrees.
+    /// Whether the tangent planes of two points differ by less than 30 degrees, so that no edge of
+    /// the surface lies between.
     pub fn are_smooth(&self, a: u32, b: u32) -> bool {
         self.normals[a as usize].dot(self.normals[b as usize]).abs() > SMOOTH
     }
 
-    /// Whether two points may lie on one side of one surface. Points of opposite sides of a thin body, or of faces that
-    /// meet at a right angle or a sharper one, may not, however close they are. Normals without a side cannot tell.
+    /// Whether two points may lie on the same side of one surface. Points on opposite sides of a
+    /// thin body, or on faces that meet at a right angle or a sharper one, do not, however close
+    /// they are. Normals without a side allow all.
     pub fn same_side(&self, a: u32, b: u32) -> bool {
         !self.oriented || self.normals[a as usize].dot(self.normals[b as usize]) > 0.0
     }
 }
 
-/// The texture coordinates of positions.
+/// The smallest texture coordinates at each position.
 fn places(positions: &DistinctPositions, coordinates: &[[f32; 2]]) -> Vec<[f32; 2]> {
     let mut places = vec![[f32::INFINITY; 2]; if coordinates.is_empty() { 0 } else { positions.len() }];
     for (own, &position) in coordinates.iter().zip(positions.of_point()) {
@@ -137,21 +143,21 @@ fn places(positions: &DistinctPositions, coordinates: &[[f32; 2]]) -> Vec<[f32; 
     places
 }
 
-/// Where the surface ends at a line in a surfel's plane.
+/// A line in a surfel's plane at which the surface ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
-    /// Unit, in the plane.
+    /// The unit direction from the surfel's centre to the line, in the plane.
     pub toward: DVec3,
-    /// From the surfel's centre in that direction, scaled units; not negative.
+    /// The distance of the line from the surfel's centre, scaled units; not negative.
     pub distance: f64,
 }
 
-/// Those of a surfel's lines that leave something out of it but not its centre.
+/// The clip lines that cut off a part of a surfel but not its centre.
 fn ends(surfel: &Surfel, clip: &Clip, scale: f64) -> Vec<End> {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let end = |line: &[f32; 3]| {
         let [x, y, z] = line.map(f64::from);
-        // Along it the line's value changes by its length for each unit.
+        // The gradient of the line's value, x u + y v + z, per world unit.
         let gradient = s * (x / s.length_squared()) + t * (y / t.length_squared());
         let end = End { toward: -gradient.try_normalize()?, distance: z / gradient.length() * scale };
         (z >= 0.0 && end.distance.is_finite() && z <= x.hypot(y)).then_some(end)
@@ -159,7 +165,7 @@ fn ends(surfel: &Surfel, clip: &Clip, scale: f64) -> Vec<End> {
     clip.0.iter().filter_map(end).collect()
 }
 
-/// In f64, where the product of half-axes does not underflow.
+/// The unit normal, in f64, where the cross product of half-axes does not underflow.
 fn unit_normal(surfel: &Surfel) -> DVec3 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     s.cross(t).try_normalize().unwrap_or(DVec3::Z)

@@ -1,7 +1,9 @@
-//! Splat selection: greedily the splat that adds the largest area, until every cell is covered.
+//! Splat selection: repeatedly takes the splat that adds the largest area, until every cell is
+//! covered.
 //!
-//! Thesis section 4.3: the contribution `Q` of a splat (Eq. 2) is the area of what it covers and no selected splat does. To find
-//! the smallest set is NP-hard; the greedy one is at most `1 + ln n` times as large (n pieces in the largest splat).
+//! The contribution `Q` of a splat is the area that it covers and no selected splat does (thesis
+//! section 4.3, Eq. 2). Finding the smallest set is NP-hard; the greedy set is at most `1 + ln n`
+//! times as large, with n pieces in the largest splat.
 
 use std::collections::BinaryHeap;
 
@@ -9,8 +11,9 @@ use super::candidates::Candidates;
 use super::cells::Cells;
 use crate::Progress;
 
-/// A splat and its contribution when it was last looked at. Contributions only shrink, so the top of the heap is the best
-/// splat if its contribution is up to date: most are never looked at again.
+/// A splat and its contribution when it was last computed. Contributions only shrink, so the top of
+/// the heap is the best splat if its contribution is up to date. Most contributions are never
+/// computed again.
 #[derive(PartialEq)]
 struct Entry {
     contribution: f64,

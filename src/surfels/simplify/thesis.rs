@@ -1,15 +1,18 @@
-//! Growing and selection as Tien 2008 has them (sections 4.1 to 4.3), to compare with: the parent module says what it does instead.
+//! Growing and selection as in Tien 2008 (sections 4.1 to 4.3), for comparison: the parent module
+//! describes what it does instead.
 //!
 //! ```text
 //! graph    = 10 nearest neighbours
-//! grow     = from a point breadth first, nearest first, until one is farther from its plane than the tolerance; the radius is that of the
-//!            farthest point before
+//! grow     = from a point breadth first, nearest first, until one is farther from its plane than
+//!            the tolerance; the radius is that of the farthest point before
 //! conquers = what growth reaches within RATIO times the radius
-//! Q        = the sum of w = pi d^2 over what it conquers and no selected one does, d to the tenth neighbour
+//! Q        = the sum of w = pi d^2 over what it conquers and no selected one does, d to the tenth
+//!            neighbour
 //! select   = the greatest Q, until all are 0
 //! ```
 //!
-//! Nothing says that what lies between points is covered; RATIO, 0.5 to 0.7 in the thesis, makes that likely.
+//! Nothing guarantees that the surface between points is covered; RATIO, 0.5 to 0.7 in the thesis,
+//! makes it likely.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -24,10 +27,11 @@ use crate::scene::{Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 
-/// K of the thesis.
+/// The number of neighbours of a point, K in the thesis.
 const NEIGHBOURS: usize = 10;
 
-/// A point on the way of a growing splat, or a splat by its contribution; equals in the order of points.
+/// A point that a growing splat will visit, or a splat with its contribution; the greatest comes
+/// first, and of equals the lower index.
 #[derive(PartialEq)]
 struct Next(f64, u32);
 
@@ -56,7 +60,7 @@ impl Graph {
         let search = NeighbourSearch::new(&samples.positions, NEIGHBOURS);
         let of = |found: &mut Vec<Neighbour>, index: u32| {
             search.nearest(index, found);
-            // Of fewer points than that the point itself fills up.
+            // If there are fewer points, the point itself fills the rest.
             let neighbours = std::array::from_fn(|k| found.get(k).map_or(index, |neighbour| neighbour.index));
             let squared = found.last().map_or(1.0, |last| last.squared_distance);
             (neighbours, std::f64::consts::PI * squared)
@@ -67,18 +71,19 @@ impl Graph {
     }
 }
 
-/// What a thread needs to grow splats one after the other.
+/// The buffers of a thread that grows splats one after the other.
 #[derive(Default)]
 struct Growth {
-    /// The splat for which each point was met last, and one more.
+    /// For each point, one plus the index of the last splat that met it.
     met: Vec<u32>,
     front: BinaryHeap<Next>,
-    /// Points that it reached, nearest first, and how far they are, scaled units.
+    /// The points that it reached, nearest first, and their distances, scaled units.
     reached: Vec<(u32, f64)>,
 }
 
 impl Growth {
-    /// Grows over points that are at most `limit` away and not farther from the plane than `tolerance`; it ends at the first that is.
+    /// Grows from `seed` over points that are at most `limit` away, until the first one that is
+    /// farther from the plane than `tolerance`.
     fn grow(&mut self, seed: u32, (samples, graph): (&Samples, &Graph), tolerance: f64, limit: f64) {
         self.met.resize(samples.len(), 0);
         self.front.clear();
@@ -102,7 +107,7 @@ impl Growth {
         }
     }
 
-    /// What a selected splat would add, of what is not covered.
+    /// The surface area that the splat would add to what is `covered`.
     fn contribution(&self, graph: &Graph, covered: &[bool]) -> f64 {
         self.reached
             .iter()
@@ -112,14 +117,14 @@ impl Growth {
     }
 }
 
-/// What is selected.
+/// The selected splats.
 #[derive(Default)]
 struct Selection {
-    /// Points that splats grew from, and their radii, scaled units.
+    /// The points from which the splats grew, and their radii, scaled units.
     splats: Vec<(u32, f64)>,
-    /// The largest distance of a point from a splat that conquers it, along its normal, scaled units.
+    /// The largest distance of a point from the plane of a splat that conquers it, scaled units.
     largest: f64,
-    /// The sum of these by surface area elements, and of the elements.
+    /// The sum of these distances, weighted by surface area elements, and the sum of the elements.
     sums: [f64; 2],
 }
 
@@ -135,7 +140,7 @@ impl Selection {
     }
 }
 
-/// What the thesis would select of the samples.
+/// Selects splats as in the thesis.
 fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress) -> Selection {
     let graph = Graph::new(samples);
     progress.begin("growing splats", samples.len() as u64);
@@ -153,7 +158,8 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
     progress.begin("selecting splats", samples.len() as u64);
     let mut heap: BinaryHeap<Next> = contributions.into_iter().zip(0..).map(|(q, point)| Next(q, point)).collect();
     let (mut covered, mut selected, mut growth) = (none, Selection::default(), Growth::default());
-    // Contributions only fall, so the greatest is the one that is still so when it is summed again.
+    // Contributions only fall, so an entry that is still the greatest when computed again is the
+    // greatest of all.
     while let Some(Next(_, seed)) = heap.pop() {
         growth.grow(seed, (samples, &graph), tolerance, ratio * radii[seed as usize]);
         let own = growth.contribution(&graph, &covered);
@@ -174,8 +180,9 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
     selected
 }
 
-/// The disks that the thesis would select of the surfels of `scene`, each at a surfel and of its colour, within a tolerance in world units;
-/// what they conquer lies within `ratio` of their radii.
+/// Simplifies `scene` as in the thesis, to disks that are each centred at a surfel and have its
+/// colour. The tolerance is in world units; a disk conquers the points within `ratio` times its
+/// radius.
 ///
 /// # Errors
 ///
@@ -191,7 +198,7 @@ pub fn as_in_the_thesis(
     let Selection { splats: selected, largest, sums: [off, area] } =
         select(&samples, tolerance * scale, ratio, progress);
     let disk = |&(point, radius): &(u32, f64)| {
-        // A point alone is as large as its surfel.
+        // A point that conquers no other is as large as its surfel.
         let radius = if radius > 0.0 { radius } else { samples.radii[point as usize] } / scale;
         let center = samples.positions.position(point) / scale;
         Surfel::disk(center.as_vec3(), samples.normals[point as usize].as_vec3(), radius as f32)

@@ -1,4 +1,5 @@
-//! The tree as far as it is made: subtrees whose surfels and nodes are kept in files, and the nodes above them.
+//! The part of the tree that is finished: subtrees, whose surfels and nodes are stored in files,
+//! and the nodes above them.
 
 use std::ops::Range;
 use std::path::Path;
@@ -17,60 +18,62 @@ use crate::scene::hierarchy::Node;
 use crate::scene::scene::core_step;
 use crate::scene::{Colors, LevelFacts, Sample, Scene};
 
-/// A node of the tree.
+/// Identifies a node of the tree.
 #[derive(Clone, Copy)]
 pub(super) enum Key {
-    /// One above subtrees, by its number.
+    /// A node above subtrees, by its index in [`Kept::parts`].
     Above(u32),
-    /// One of the subtree whose first node has this number; its children, or surfels if it is a leaf, are so many of those that are kept.
+    /// A node of the subtree whose first node is number `subtree`. Its children, or in a leaf its
+    /// surfels, are `count` stored rows from `first` on.
     Within { leaf: bool, first: u64, count: u32, subtree: u64 },
 }
 
-/// A node, and the number of surfels below it.
+/// A finished node, and the number of surfels below it.
 pub(super) struct Branch {
     pub key: Key,
     pub made: Made,
     pub surfels: u64,
 }
 
-/// Some nodes of the tree that hang together.
+/// A connected part of the tree.
 pub(super) enum Part {
-    /// One above subtrees.
+    /// A node above subtrees.
     Above { depth: usize, children: Vec<Branch>, made: Made },
     /// A subtree.
     Subtree {
-        /// The level of its root in the tree.
+        /// The level of its root within the tree.
         depth: usize,
-        /// The number of its first node.
+        /// The number of its first stored node.
         first: u64,
-        /// Where each of its levels starts after that, and the end.
+        /// The start of each of its levels relative to `first`, and the end.
         levels: Vec<usize>,
     },
 }
 
-/// What is kept.
+/// All that is finished.
 pub(super) struct Kept<'a> {
     survey: &'a Survey,
-    /// Surfels in the order of the tree.
+    /// The surfels, in the order of the tree.
     pub surfels: Rows,
     pub nodes: KeptNodes,
-    /// Of nodes on one level, what is left of others comes first.
+    /// In depth-first order, children before parents: among the parts with nodes on a level, this
+    /// is the order of that level.
     pub parts: Vec<Part>,
-    /// What nodes are written with.
+    /// The format of nodes in the file.
     pub kind: Nodes,
     pub levels: LevelFacts,
-    /// Centres by which the body is told, and the core.
+    /// Samples of centres: for the body of the scene, and for its core.
     pub sample: Sample,
     pub sampled: Vec<[f32; 3]>,
-    /// Of surfels, and of nodes.
+    /// Caches of surfels and of nodes.
     surfel_pages: Pages<Scene>,
     node_pages: Pages<Vec<Made>>,
-    /// What could not be read of these files.
+    /// The first error of reading these files.
     failed: Failed,
 }
 
 impl<'a> Kept<'a> {
-    /// Nothing yet.
+    /// Starts with nothing.
     pub fn new(survey: &'a Survey, folder: &Path, path: &Path) -> Result<Self> {
         let surfels = Rows::temporary(folder, properties(survey), path)?;
         let nodes = KeptNodes::new(folder, path)?;
@@ -82,7 +85,7 @@ impl<'a> Kept<'a> {
         Ok(Self { survey, surfels, nodes, parts, kind, levels, sample, sampled, surfel_pages, node_pages, failed })
     }
 
-    /// Keeps a subtree, whose surfels are in its order.
+    /// Stores a subtree, whose surfels are in its order.
     pub fn subtree(&mut self, depth: usize, tree: &Octree, scene: &Scene, mut nodes: Vec<Made>) -> Result<Branch> {
         let (surfels, first) = (self.surfels.count(), self.nodes.count());
         let pieces: Vec<Range<usize>> = (0..scene.surfels.len())
@@ -95,7 +98,7 @@ impl<'a> Kept<'a> {
             encoded.iter().try_for_each(|bytes| self.surfels.append(bytes))?;
         }
         for (node, _) in nodes.iter_mut().filter(|(node, _)| node.leaf) {
-            // Fewer than 2^32 surfels are there in all.
+            // There are fewer than 2^32 surfels in all.
             node.first += surfels as u32;
         }
         (0..scene.surfels.len()).for_each(|index| self.sample.add(scene.center(index)));
@@ -109,7 +112,8 @@ impl<'a> Kept<'a> {
         Ok(Branch { key, made: nodes[0], surfels: scene.surfels.len() as u64 })
     }
 
-    /// Puts a node, which `make` is told how to look below of, above some branches.
+    /// Adds a node above some branches. `make` computes it, from its key and from what is stored
+    /// below it.
     pub fn above(
         &mut self,
         depth: usize,
@@ -130,7 +134,7 @@ impl<'a> Kept<'a> {
         Ok(Branch { key, made, surfels })
     }
 
-    /// Hears of nodes that are made.
+    /// Records the facts about new nodes that the file's header needs.
     fn told(&mut self, nodes: &[Made]) {
         let none = Nodes::none(self.survey.known.origin, false);
         let kind = nodes.par_iter().fold(|| none, |all, (node, low)| all.with(node, *low)).reduce(|| none, Nodes::both);
@@ -138,20 +142,20 @@ impl<'a> Kept<'a> {
         self.levels = self.levels.both(LevelFacts::of_nodes(nodes.par_iter().map(|(node, _)| node)));
     }
 
-    /// Some of the surfels that are kept, as a part of the scene.
+    /// Reads a range of the stored surfels as a part of the scene.
     pub fn part(&self, numbers: Range<u64>) -> Result<Scene> {
         let points = self.surfels.points(&self.surfels.bytes(numbers)?)?;
-        self.survey.part_again(points).ok_or_else(|| self.surfels.malformed("a surfel has no place or no half-axes"))
+        self.survey.part_again(points).ok_or_else(|| self.surfels.malformed("a surfel has no position or half-axes"))
     }
 }
 
-/// How a node of a subtree, whose first node has this number, is come to.
+/// The key of a node of the subtree whose first node is number `subtree`.
 fn within(node: &Node, subtree: u64) -> Key {
     let first = if node.leaf { node.first.into() } else { subtree + u64::from(node.first) };
     Key::Within { leaf: node.leaf, first, count: node.count, subtree }
 }
 
-/// What surfels are written with.
+/// The PLY properties with which surfels are written.
 pub(super) fn properties(survey: &Survey) -> Properties {
     let Scene { oriented, closed, up, .. } = survey.empty;
     Properties {

@@ -1,8 +1,11 @@
-//! Levels of detail of more points than memory has room for: the same file, to the bit, as of [`build`](super::build()) and [`write_scene`](crate::io::ply::write_scene).
+//! Builds levels of detail of more points than fit in memory. The file is identical, bit for bit,
+//! to that of [`build`](super::build()) and [`write_scene`](crate::io::ply::write_scene).
 //!
-//! What all points say together is looked for first (`survey`); then they are copied into a file and divided at their means into files of fewer, until memory has room for
-//! those of a set (`runs`). Its subtree is made there, and kept in files (`kept`); nodes above subtrees are made of what is kept. At the end all is written level by level
-//! (`write`). A tree depends on the set of points alone, and so it is of no matter where it was made.
+//! A first pass collects facts about all points (`survey`). The points are then copied into a file
+//! and divided at their means into files of fewer points, until a set fits in memory (`runs`).
+//! There its subtree is built, and stored in files (`kept`). Nodes above subtrees are computed from
+//! what is stored. In the end everything is written level by level (`write`). A tree depends on the
+//! set of points alone, so it does not matter where it was built.
 
 mod kept;
 mod pages;
@@ -34,41 +37,45 @@ use crate::scene::hierarchy::{DEEPEST, Node};
 use crate::surfels::{Preparation, complete};
 use crate::{Error, Progress, Result};
 
-/// Memory of the program and of what is read and written at once, bytes, and of each thread for pieces.
+/// Memory of the program and its file buffers, and memory of each thread for its pieces, bytes.
 const PROGRAM: u64 = 96 << 20;
 const OF_THREAD: u64 = 48 << 20;
 
-/// Memory of a surfel of a subtree beside what the scene has of it, bytes: its place, its part of the nodes and of their sums.
+/// Memory for each surfel of a subtree, beside that of the scene, bytes: its place, and its share
+/// of the nodes and their sums.
 const OF_SURFEL: u64 = 150;
 
-/// The most bytes that a scene has of a surfel ([`Survey::surfel_bytes`]).
+/// The most memory that a scene has for each surfel, bytes ([`Survey::surfel_bytes`]).
 const LARGEST_SURFEL: u64 = 112;
 
-/// Points that memory must have room for.
+/// The number of points that must fit in memory.
 const FEWEST: u64 = 1 << 16;
 
-/// What came of it.
+/// The outcome of [`write_levels`].
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Surfels.
+    /// Surfels that were written.
     pub surfels: u64,
-    /// Nodes of the tree.
+    /// Nodes that were written.
     pub nodes: u64,
-    /// Its levels.
+    /// Levels of the tree.
     pub levels: u64,
-    /// Subtrees that were made one after the other.
+    /// Subtrees that were built in memory, one after the other.
     pub subtrees: u64,
-    /// What was done to the points.
+    /// Facts about the preparation of the points, such as how many were dropped.
     pub preparation: Preparation,
 }
 
-/// Writes the surfels of all points of `files` with levels of detail at `path`, within about so many bytes of `memory`; what is kept meanwhile is in files without a name in
-/// `folder`, of up to twice the size of what is written.
+/// Writes the surfels of all points of `files`, with levels of detail, to the file `path`.
+///
+/// It takes about `memory` bytes of memory. Unnamed files in `folder` hold intermediate data, up to
+/// twice the size of the output.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for too little memory, or too many points or nodes, [`Error::Malformed`] for points without a normal or a radius, [`Error::EmptyScene`], and [`Error::Read`]
-/// and [`Error::Write`] of the system.
+/// [`Error::Usage`] for too little memory, or too many points or nodes; [`Error::Malformed`] for
+/// points without a normal or a radius; [`Error::EmptyScene`] without usable points;
+/// [`Error::Read`] and [`Error::Write`] from the system.
 pub fn write_levels(
     files: &[Rows],
     memory: u64,
@@ -77,7 +84,7 @@ pub fn write_levels(
 ) -> Result<Report> {
     let fixed = fixed();
     if memory < fixed + FEWEST * OF_SURFEL {
-        // Enough for points of any kind, as nobody has looked at these.
+        // The points have not been read yet, so ask for memory that suffices for any kind.
         return Err(too_little(fixed + FEWEST * (LARGEST_SURFEL + OF_SURFEL)));
     }
     let sources = Sources { files, progress };
@@ -91,7 +98,7 @@ pub fn write_levels(
     made(&sources, runs, (fits, of_surfel))
 }
 
-/// Memory that is taken however few points there are, bytes.
+/// Memory that is used however few points there are, bytes.
 fn fixed() -> u64 {
     PROGRAM + OF_THREAD * rayon::current_num_threads() as u64
 }
@@ -101,7 +108,7 @@ fn too_little(least: u64) -> Error {
     Error::Usage(format!("--memory is less than the {least}MiB that levels of detail of these points take at least"))
 }
 
-/// The file, where memory has room for the tree of so many points at once.
+/// Writes the file if trees of `fits` surfels, with `of_surfel` bytes each, fit in memory.
 fn made(sources: &Sources<'_>, runs: Runs<'_>, (fits, of_surfel): (u64, u64)) -> Result<Report> {
     let Runs { survey, folder, path, progress } = runs;
     let root = Lattice::over(&survey.bounds);
@@ -117,31 +124,32 @@ fn made(sources: &Sources<'_>, runs: Runs<'_>, (fits, of_surfel): (u64, u64)) ->
     write::write(path, divider.kept, survey, progress)
 }
 
-/// How a part of a scene is made of points.
+/// Makes a part of a scene from points.
 type MadeOf = fn(&Survey, Points) -> Option<Scene>;
 
-/// A branch, and what its parent's sums are made of.
+/// A branch, and the sums from which those of its parent are computed.
 struct Summed {
     branch: Branch,
     sums: Sums,
-    /// On each of the lattices of the sets that it is in.
+    /// Moments on each lattice of [`Divider::lattices`].
     moments: Vec<Moments>,
 }
 
-/// What sets are divided with, from the root down.
+/// Divides sets, from the root down.
 struct Divider<'a> {
     runs: Runs<'a>,
     kept: Kept<'a>,
-    /// Points that memory has room for.
+    /// The number of surfels that fit in memory.
     fits: u64,
-    /// Memory of each, bytes.
+    /// Memory for each surfel, bytes.
     of_surfel: u64,
-    /// Those of the sets that the one which is looked at is in, each on the last.
+    /// The lattices of the current set and of those that contain it, from the root's on; the
+    /// current set's places are on the last.
     lattices: Vec<Lattice>,
 }
 
 impl Divider<'_> {
-    /// The tree of a set, so many levels below the root.
+    /// Builds the tree of a set that lies `depth` levels below the root.
     fn branch(&mut self, mut run: Run, depth: usize) -> Result<Summed> {
         if run.rows.count() <= self.fits {
             let pieces: Vec<_> = run.rows.pieces(PIECE).into_iter().map(|piece| (&run.rows, piece)).collect();
@@ -157,7 +165,7 @@ impl Divider<'_> {
         if below.len() < 2 {
             let enough = (fixed() + count * self.of_surfel).div_ceil(1 << 20);
             return Err(Error::Usage(format!(
-                "{count} points are too near each other to be divided, and --memory has room for {}: give {enough}MiB",
+                "{count} points are too near each other to be divided, and --memory has room for only {} of them: give it {enough}MiB",
                 self.fits
             )));
         }
@@ -167,7 +175,7 @@ impl Divider<'_> {
         summed.map(|summed| Summed { moments: summed.moments[..known].to_vec(), ..summed })
     }
 
-    /// The node above some branches, which has this lattice.
+    /// Computes the node above some branches, whose set has this lattice.
     fn above(&mut self, children: Vec<Summed>, (depth, lattice): (usize, &Lattice)) -> Result<Summed> {
         let mut moments = vec![Moments::default(); self.lattices.len()];
         let mut sums = Sums::default();
@@ -185,7 +193,7 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// The tree of a set's surfels.
+    /// Builds the tree of a set that fits in memory.
     fn subtree(&mut self, scene: Scene, depth: usize) -> Result<Summed> {
         let (survey, progress) = (self.runs.survey, self.runs.progress);
         let count = scene.surfels.len() as u32;
@@ -206,7 +214,8 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// So many surfels of some pieces of files, as they are `made` of points.
+    /// Reads `count` surfels from pieces of files, and makes parts of the scene from their points
+    /// by `made`.
     fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)], made: MadeOf) -> Result<Scene> {
         let survey = self.runs.survey;
         let mut scene = survey.empty.clone();

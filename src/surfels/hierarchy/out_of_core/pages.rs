@@ -1,31 +1,34 @@
-//! Pages of what is kept in files: nodes above many look at few of them, or at all, one after the other.
+//! A cache of pages of a file. Nodes above many subtrees read few of their rows, or all in order.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::Result;
 
-/// Rows of a page.
+/// Rows in a page.
 const PAGE: u64 = 1 << 12;
 
-/// Pages that stay, at most.
+/// The largest number of pages in the cache.
 const SLOTS: u64 = 64;
 
-/// What is made of some rows.
+/// A range of rows, and the value that was read from them.
 type Page<T> = (Range<u64>, Arc<T>);
 
-/// Pages of rows of a file that grows.
+/// Cached pages of a growing file.
 pub(super) struct Pages<T> {
     slots: Vec<Mutex<Option<Page<T>>>>,
 }
 
 impl<T> Pages<T> {
-    /// None yet.
+    /// An empty cache.
     pub fn new() -> Self {
         Self { slots: (0..SLOTS).map(|_| Mutex::new(None)).collect() }
     }
 
-    /// Lets `see` see the pages that have the `wanted` ones of so many rows, and which of each: those that are not there are read in place of others.
+    /// Calls `see` with each page that has some of the `wanted` rows, and their range within the
+    /// page. `all` is the number of rows in the file.
+    ///
+    /// Pages that are not in the cache are read, and replace others.
     pub fn each(
         &self,
         (wanted, all): (Range<u64>, u64),
@@ -49,7 +52,8 @@ impl<T> Pages<T> {
         if let Some((_, page)) = lock().as_ref().filter(|(known, _)| *known == rows) {
             return Ok(page.clone());
         }
-        // Nothing is locked while a thread reads, as what it waits for may be work that wants a page.
+        // No lock is held during the read: while it waits, the thread may run other work that needs
+        // a page.
         let page = Arc::new(read(rows.clone())?);
         *lock() = Some((rows, page.clone()));
         Ok(page)

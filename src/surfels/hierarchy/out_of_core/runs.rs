@@ -1,4 +1,5 @@
-//! Sets of points that memory has no room for: rows of a file without a name, which are divided into those of the sets below.
+//! Sets of points that do not fit in memory: rows of an unnamed file, which are divided into the
+//! files of their child sets.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -21,7 +22,7 @@ pub(super) struct Run {
     spread: Spread,
 }
 
-/// How a set lies on a lattice.
+/// Sums and bounds of a set's places on a lattice.
 #[derive(Clone, Copy)]
 struct Spread {
     sum: [i64; 3],
@@ -51,24 +52,24 @@ impl Spread {
         }
     }
 
-    /// The longest side of the box around it, steps.
+    /// The longest side of the box around the set, lattice steps.
     fn extent(&self) -> i64 {
         (0..3).map(|k| i64::from(self.high[k]) - i64::from(self.low[k])).max().unwrap_or(0)
     }
 }
 
-/// Where runs are made, and what of.
+/// The inputs that all runs share.
 pub(super) struct Runs<'a> {
     pub survey: &'a Survey,
-    /// Where files without a name are.
+    /// The folder of the unnamed files.
     pub folder: &'a Path,
-    /// What errors call them.
+    /// The name of these files in error messages.
     pub path: &'a Path,
     pub progress: &'a dyn Progress,
 }
 
 impl Runs<'_> {
-    /// No points yet.
+    /// Creates an empty run.
     fn none(&self) -> Result<Run> {
         let (empty, has) = (&self.survey.empty, &self.survey.has);
         let properties = Properties {
@@ -87,7 +88,7 @@ impl Runs<'_> {
         Ok(Run { rows: Rows::temporary(self.folder, properties, self.path)?, spread: Spread::NOTHING })
     }
 
-    /// The points of all files, on the lattice of the root.
+    /// Copies the points of all files to one run, with places on the root's lattice.
     pub fn all(&self, sources: &Sources<'_>, lattice: &Lattice) -> Result<Run> {
         let run = Mutex::new(self.none()?);
         self.progress.begin("copying points", sources.count());
@@ -111,7 +112,7 @@ impl Runs<'_> {
         Ok(run.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// A row's centre, as the part of the scene that has it knows it.
+    /// The centre in a row, exactly as in the part of the scene that is made from it.
     fn center(&self, row: &[u8]) -> DVec3 {
         let origin = self.survey.known.origin;
         let [short, rest] = split(DVec3::from_array(position(row)) - origin);
@@ -128,7 +129,8 @@ impl Runs<'_> {
         spread
     }
 
-    /// What `of` makes of the bytes of each piece of a run, joined in any order.
+    /// Maps the bytes of each piece of a run by `of`, and merges the results by `join` in any
+    /// order.
     fn each<T: Send>(
         &self,
         run: &Run,
@@ -140,7 +142,8 @@ impl Runs<'_> {
         run.rows.pieces(PIECE).into_par_iter().map(piece).try_reduce(&nothing, |one, other| Ok(join(one, other)))
     }
 
-    /// A finer lattice for a set that is small on this one, as for sets in memory.
+    /// Gives a set that spans few steps of its lattice a finer one, under the same condition as
+    /// sets in memory.
     pub fn refined(&self, run: &mut Run) -> Result<Option<Lattice>> {
         if run.spread.extent() >= FEWEST_STEPS {
             return Ok(None);
@@ -150,7 +153,8 @@ impl Runs<'_> {
         Ok(Some(finer))
     }
 
-    /// The sets that a set is divided into at its mean on this lattice, in the order of octants; fewer than two if it cannot be divided.
+    /// Divides a set at its mean on this lattice. Returns the child sets in the order of octants;
+    /// fewer than two if the set cannot be divided.
     pub fn divided(&self, run: Run, lattice: &Lattice) -> Result<Vec<Run>> {
         let (sum, count, size) = (run.spread.sum, run.rows.count() as i64, run.rows.size());
         let below: Vec<Mutex<Run>> = (0..8).map(|_| self.none().map(Mutex::new)).collect::<Result<_>>()?;

@@ -1,4 +1,4 @@
-//! The points of files that are read piece by piece, as often as they are wanted.
+//! The points of the input files, which are read piece by piece, once for each pass.
 
 use std::ops::Range;
 use std::path::Path;
@@ -13,27 +13,28 @@ use crate::scene::Places;
 use crate::surfels::gather::is_usable;
 use crate::{Error, Progress, Result};
 
-/// Rows of a piece.
+/// Rows in a piece.
 pub(super) const PIECE: u64 = 1 << 16;
 
-/// The files.
+/// The input files.
 pub(super) struct Sources<'a> {
     pub files: &'a [Rows],
     pub progress: &'a dyn Progress,
 }
 
 impl Sources<'_> {
-    /// How many points they have.
+    /// The number of points in all files.
     pub fn count(&self) -> u64 {
         self.files.iter().map(Rows::count).sum()
     }
 
-    /// Their pieces.
+    /// The pieces of all files.
     pub fn pieces(&self) -> Vec<(&Rows, Range<u64>)> {
         self.files.iter().flat_map(|file| file.pieces(PIECE).into_iter().map(move |piece| (file, piece))).collect()
     }
 
-    /// What `of` makes of the points of each piece and of the file's name, joined in any order.
+    /// Maps the points of each piece and the path of its file by `of`, and merges the results by
+    /// `join` in any order.
     pub fn each<T: Send>(
         &self,
         nothing: impl Fn() -> T + Sync + Send,
@@ -51,22 +52,22 @@ impl Sources<'_> {
     }
 }
 
-/// Places that are read from files each time that they are gone through.
+/// [`Places`] that are read from files anew in each pass over them.
 pub(super) struct Read<P, F> {
     count: usize,
     pieces: Vec<P>,
     of: F,
-    /// Why a piece could not be read.
+    /// The first error of reading a piece.
     failed: Failed,
 }
 
 impl<P: Clone + Sync, F: Fn(P) -> Result<Vec<(DVec3, f64)>> + Sync> Read<P, F> {
-    /// So many, of which `of` reads pieces.
+    /// Describes `count` places, which `of` reads from `pieces`.
     pub fn new(count: usize, pieces: Vec<P>, of: F) -> Self {
         Self { count, pieces, of, failed: Failed::default() }
     }
 
-    /// What was made of all of them, if they could be read.
+    /// Returns the result of `of`, or the first error of reading a piece.
     pub fn made<T>(self, of: impl FnOnce(&Self) -> T) -> Result<T> {
         let made = of(&self);
         self.failed.check().map(|()| made)
@@ -92,12 +93,12 @@ impl<P: Clone + Sync, F: Fn(P) -> Result<Vec<(DVec3, f64)>> + Sync> Places for R
     }
 }
 
-/// The first thing that went wrong where nothing could be said of it.
+/// The first error in code that cannot return one.
 #[derive(Default)]
 pub(super) struct Failed(Mutex<Option<Error>>);
 
 impl Failed {
-    /// What went well.
+    /// Returns the value, or records the error.
     pub fn noted<T>(&self, outcome: Result<T>) -> Option<T> {
         let note = |error| {
             self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
@@ -105,7 +106,7 @@ impl Failed {
         outcome.map_err(note).ok()
     }
 
-    /// Whether all went well.
+    /// Returns the recorded error, if there is one.
     pub fn check(&self) -> Result<()> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
@@ -113,6 +114,6 @@ impl Failed {
 
 /// The usable positions of some points.
 pub(super) fn usable(points: &Points) -> impl Iterator<Item = DVec3> {
-    // Adding +0 makes -0 the same coordinate as 0.
+    // Adding +0 turns -0 into 0.
     points.positions.iter().filter(|position| is_usable(position)).map(|p| DVec3::from_array(*p) + DVec3::ZERO)
 }

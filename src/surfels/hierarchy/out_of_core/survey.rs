@@ -1,4 +1,4 @@
-//! What all points say together, which each part of them must be told.
+//! Facts about all points, which are needed to build any part of the scene.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,11 +18,12 @@ use crate::surfels::complete::{self, Added};
 use crate::surfels::{Preparation, guess_up, origin_for, usable_axes};
 use crate::{Error, Result};
 
-/// A scene without its surfels, and what is known of these.
+/// The facts, and a scene without surfels.
 pub(super) struct Survey {
-    /// What parts of the scene start from.
+    /// The scene without surfels from which each part starts.
     pub empty: Scene,
-    /// What each part is joined with, so that it has what others have.
+    /// An input without points. It is joined with each part, which so has the attributes that any
+    /// file has.
     others: Points,
     pub has: Has,
     pub known: Known,
@@ -32,17 +33,17 @@ pub(super) struct Survey {
     pub largest_radius: f32,
     /// [`Scene::largest_shorter`].
     pub largest_shorter: f32,
-    /// All colours are opaque.
+    /// Whether all colours are opaque.
     pub opaque: bool,
-    /// [`Scene::bounds`], with centres as a file gives them back.
+    /// [`Scene::bounds`] of the centres as a file gives them back.
     pub bounds: Bounds,
-    /// An f32 would lose digits of a coordinate.
+    /// Whether an f32 would lose digits of a coordinate.
     pub double: bool,
     pub preparation: Preparation,
 }
 
 impl Survey {
-    /// That of the points of files.
+    /// Surveys the points of `sources`.
     pub fn of(sources: &Sources<'_>) -> Result<Self> {
         let mut look = Look::new(sources)?;
         let told = |what: &str| sources.progress.begin(what, sources.count());
@@ -58,7 +59,7 @@ impl Survey {
         if u32::try_from(count).is_err() {
             return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {count}")));
         }
-        // The sample is of all points that there are.
+        // Sampling depends on the number of usable points: if some are unusable, sample again.
         let sample =
             if looks.preparation.dropped_non_finite == 0 { looks.sample.clone() } else { sampled(sources, count)? };
         let places = Read::new(count as usize, sources.pieces(), |(file, piece)| {
@@ -71,11 +72,11 @@ impl Survey {
         let extent = body.extent().max_element();
         if extent < SMALLEST_SCENE || f64::from(looks.longest) > LARGEST_IN_EXTENTS * extent {
             return Err(Error::Usage(
-                "points that are all at one place, and disks of a million times the extent of all, are not taken with --memory: leave it out".into(),
+                "--memory takes neither points that are all at one place nor disks of over a million times the extent of all points: leave it out".into(),
             ));
         }
         let has = Has { low: true, ..looks.has };
-        told("looking at digits");
+        told("checking the precision of coordinates");
         let places = sources.each(
             <[Placed; 2]>::default,
             |points, _| Ok(look.placed(points, has)),
@@ -86,7 +87,7 @@ impl Survey {
         Ok(look.finish(looks, places?))
     }
 
-    /// What the scene has of a surfel, bytes.
+    /// The memory that the scene has for each surfel, bytes.
     pub fn surfel_bytes(&self) -> u64 {
         let Has { low, clips, caps, normals } = self.has;
         let lists = [(low, 12), (clips, 24), (caps, 12), (normals, 12)];
@@ -98,7 +99,7 @@ impl Survey {
         36 + colors + lists.iter().map(|(has, bytes)| if *has { *bytes } else { 0 }).sum::<u64>()
     }
 
-    /// Makes room for so many surfels.
+    /// Reserves memory for `count` surfels.
     pub fn reserve(&self, scene: &mut Scene, count: usize) {
         let Has { low, clips, caps, normals } = self.has;
         let count_if = |has: bool| if has { count } else { 0 };
@@ -114,14 +115,16 @@ impl Survey {
         }
     }
 
-    /// A part of the scene: the surfels of these points.
+    /// Returns the surfels of `points` as a part of the scene; None if a point lacks a normal or a
+    /// radius.
     pub fn part(&self, points: Points) -> Option<Scene> {
         let mut scene = self.empty.clone();
         complete::add(&mut scene, vec![points, self.others.clone()], self.has)?;
         Some(scene)
     }
 
-    /// The same of points that were written of a part: what it made of their normals stays, to the bit.
+    /// As [`Self::part`], for points that were written from a part: its normals are taken over, bit
+    /// for bit.
     pub fn part_again(&self, mut points: Points) -> Option<Scene> {
         let normals = if self.has.normals { points.normals.take() } else { None };
         let part = self.part(points)?;
@@ -129,7 +132,7 @@ impl Survey {
     }
 }
 
-/// The sample of so many usable points.
+/// The sample of `count` usable points.
 fn sampled(sources: &Sources<'_>, count: u64) -> Result<Sample> {
     let nothing = || Sample::of(count as usize);
     let sampled = |points: Points, _: &Path| {
@@ -140,14 +143,14 @@ fn sampled(sources: &Sources<'_>, count: u64) -> Result<Sample> {
     sources.each(nothing, sampled, Sample::both)
 }
 
-/// How points are looked at.
+/// The facts that the headers of all files give.
 struct Look {
     empty: Scene,
     others: Points,
     up: Option<Up>,
 }
 
-/// What they say, wherever their origin is.
+/// Facts about points that do not depend on the scene's origin.
 #[derive(Clone)]
 struct Looks {
     preparation: Preparation,
@@ -156,17 +159,17 @@ struct Looks {
     radius: f32,
     shorter: f32,
     range: ([f32; 4], [f32; 4]),
-    /// One of the colours, if all are the same.
+    /// The colour, if all are the same.
     color: One,
     opaque: bool,
     /// The box of their positions, world coordinates.
     all: Bounds,
     sample: Sample,
-    /// Of each file, how many are usable, and how many are not.
+    /// The numbers of usable and unusable points of each file.
     of_files: BTreeMap<PathBuf, [u64; 2]>,
 }
 
-/// Whether colours are one.
+/// Whether colours are all the same.
 #[derive(Clone, Copy, PartialEq)]
 enum One {
     Nothing,
@@ -197,7 +200,7 @@ impl One {
 }
 
 impl Looks {
-    /// Of so many points, none yet.
+    /// The facts before any of `count` points is read.
     fn of(count: u64) -> Self {
         Self {
             preparation: Preparation::default(),
@@ -249,15 +252,16 @@ impl Looks {
     }
 }
 
-/// Where centres are as a file gives them back, with trailing parts or without.
+/// Facts about centres as a file gives them back, with their parts beyond f32 or without.
 #[derive(Clone, Copy)]
 struct Placed {
     bounds: Bounds,
-    /// An f32 would lose digits of a coordinate.
+    /// Whether an f32 would lose digits of a coordinate.
     double: bool,
-    /// What f32 centres leave out shows.
+    /// Whether the error of a centre in f32 may be visible.
     shows: bool,
-    /// The largest error of a coordinate that shows though trailing parts are kept; 0 if none does.
+    /// The largest error of a coordinate that may be visible although parts beyond f32 are stored;
+    /// 0 if none is.
     error: f64,
 }
 
@@ -284,7 +288,7 @@ impl Placed {
 }
 
 impl Look {
-    /// What all files have, by what none of their points has.
+    /// Collects what the files have, by reading no points from each.
     fn new(sources: &Sources<'_>) -> Result<Self> {
         let mut all = Self { empty: Scene::default(), others: Points::default(), up: None };
         for file in sources.files {
@@ -309,7 +313,7 @@ impl Look {
         Ok(all)
     }
 
-    /// What points say.
+    /// Collects the facts about `points`.
     fn at(&self, points: Points, path: &Path, nothing: Looks) -> Result<Looks> {
         let all = Has { low: false, clips: true, caps: true, normals: true };
         let mut scene = self.empty.clone();
@@ -317,13 +321,13 @@ impl Look {
         else {
             return Err(Error::malformed(
                 path,
-                "a point has no normal or no radius, and with --memory none are estimated: make surfels of it first (epsplat surfels)",
+                "a point has no normal or no radius, and --memory estimates none: make surfels of the points first (epsplat surfels)",
             ));
         };
         if !scene.surfels.iter().all(|surfel| usable_axes([surfel.s, surfel.t]).is_some()) {
             return Err(Error::malformed(
                 path,
-                "a disk is smaller, larger or thinner than half-axes in a file can be, which it must be with --memory",
+                "a disk is too small, too large or too thin: with --memory its half-axes must be ones that a file can hold",
             ));
         }
         let (mut all, mut sample) = (Bounds::EMPTY, nothing.sample);
@@ -358,7 +362,7 @@ impl Look {
         })
     }
 
-    /// Where points are, without and with what f32 centres leave out.
+    /// Collects the facts about centres without and with their parts beyond f32.
     fn placed(&self, points: Points, has: Has) -> [Placed; 2] {
         let mut scene = self.empty.clone();
         let added = complete::add(&mut scene, vec![points, self.others.clone()], has).unwrap_or_default();
@@ -379,7 +383,8 @@ impl Look {
         all
     }
 
-    /// Whether surfels of all files cover closed surfaces: of those that have a usable one, and none that is not.
+    /// Whether the surfels cover closed surfaces: each file with a usable point must say so and
+    /// have no unusable one.
     fn are_closed(&self, sources: &Sources<'_>, looks: &Looks) -> bool {
         sources.files.iter().all(|file| match looks.of_files.get(file.path()) {
             None | Some([0, _]) => true,
@@ -387,6 +392,8 @@ impl Look {
         })
     }
 
+    /// Joins the facts; `without` and `with` are those about centres without and with parts beyond
+    /// f32.
     fn finish(self, looks: Looks, [without, with]: [Placed; 2]) -> Survey {
         let Self { mut empty, mut others, up } = self;
         let low = without.shows;

@@ -10,7 +10,7 @@ use crate::random::Random;
 use crate::scene::{Cap, Clip, Colors, Surfel};
 use crate::surfels::{build, hierarchy};
 
-/// Disks around a sphere at `center`, with codes as colours.
+/// Disks on a sphere around `center`, with 8-bit colours.
 fn sphere(count: usize, center: [f64; 3], radius: f64) -> Points {
     let mut random = Random::stream(count as u64, 0);
     let mut direction = || Vec3::from_array(std::array::from_fn(|_| random.number() as f32 - 0.5)).normalize();
@@ -26,7 +26,7 @@ fn sphere(count: usize, center: [f64; 3], radius: f64) -> Points {
     }
 }
 
-/// The same as ellipses, some of which end, curve or have a normal of their own.
+/// The same as ellipses, some of which have a clip line, a cap or a normal of their own.
 fn ellipses(count: usize) -> Points {
     let points = sphere(count, [6.1e6, -2.5, 40.25], 3.0);
     let normals = points.normals.clone().unwrap();
@@ -49,7 +49,7 @@ fn ellipses(count: usize) -> Points {
     }
 }
 
-/// Points with those of others behind them; what one lacks, all lack.
+/// Points followed by `other`; attributes that `one` lacks are left out.
 fn and(mut one: Points, other: &Points) -> Points {
     one.positions.extend(&other.positions);
     one.normals.iter_mut().for_each(|all| all.extend(other.normals.iter().flatten()));
@@ -73,7 +73,7 @@ fn rows(paths: &[PathBuf]) -> Vec<Rows> {
     paths.iter().map(|path| Rows::open(Input::open(path, None).unwrap(), false).unwrap().unwrap()).collect()
 }
 
-/// What is made where memory has room for so many points.
+/// The report of writing levels if `fits` points fit in memory.
 fn made_of(files: &[Rows], fits: u64, path: &Path) -> Result<Report> {
     let sources = Sources { files, progress: &() };
     let survey = Survey::of(&sources)?;
@@ -81,7 +81,8 @@ fn made_of(files: &[Rows], fits: u64, path: &Path) -> Result<Report> {
     made(&sources, Runs { survey: &survey, folder, path, progress: &() }, (fits, 100))
 }
 
-/// Scenes with all that a scene of surfels may have, near and far, in one file and in several.
+/// Scenes with all features that surfels may have, at large and small coordinates, in one file and
+/// in several.
 fn scenes() -> Vec<(&'static str, Vec<Points>)> {
     let plain = || sphere(3000, [0.0; 3], 1.0);
     let stray = sphere(3, [3e9, 1.0, 0.0], 0.5);
@@ -118,7 +119,8 @@ fn scenes() -> Vec<(&'static str, Vec<Points>)> {
     ]
 }
 
-/// Whatever memory has room for, the file is the one that is made in memory, and nothing else is left.
+/// However few points fit in memory, the file is the one that is built in memory, and no other file
+/// is left.
 #[test]
 fn files_are_those_that_are_made_in_memory() {
     for (name, inputs) in scenes() {
@@ -144,7 +146,7 @@ fn files_are_those_that_are_made_in_memory() {
         }
         assert!(subtrees[0] == 1 && subtrees[1] > 2 && subtrees.is_sorted() && subtrees[3] > 60, "{name} {subtrees:?}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), paths.len() + 2);
-        // By one thread, of files in another order.
+        // By one thread, with the files in another order.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let turned: Vec<PathBuf> = paths.iter().rev().cloned().collect();
         pool.install(|| made_of(&rows(&turned), 300, &path).unwrap());
@@ -152,7 +154,7 @@ fn files_are_those_that_are_made_in_memory() {
     }
 }
 
-/// What cannot be made ends in a sentence, and leaves no file.
+/// Inputs that cannot be built end in a one-line error, and leave no file.
 #[test]
 fn what_cannot_be_made_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -182,7 +184,7 @@ fn what_cannot_be_made_is_told() {
     assert!(little.contains("takes at least") || little.contains("take at least"), "{little}");
 }
 
-/// Files that are not read in pieces, or of which a piece is not all that a point is.
+/// Files that cannot be read in pieces, or whose pieces do not hold all attributes of a point.
 #[test]
 fn other_files_are_no_rows() {
     let folder = tempfile::tempdir().unwrap();

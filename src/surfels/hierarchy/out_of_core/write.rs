@@ -1,4 +1,4 @@
-//! The file, of what is kept: surfels as they lie, and nodes level by level.
+//! Writes the file from what is stored: surfels in their order, and nodes level by level.
 
 use std::ops::Range;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::scene::{Whole, framed_within};
 use crate::surfels::Preparation;
 use crate::{Error, Progress, Result};
 
-/// Writes all that is kept.
+/// Writes the file `path` from all that is stored.
 pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn Progress) -> Result<Report> {
     let above = kept.parts.iter().filter(|part| matches!(part, Part::Above { .. })).count();
     let nodes = kept.nodes.count() + above as u64;
@@ -29,7 +29,7 @@ pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn
             Piece::Kept(numbers) => kept.nodes.read(numbers)?,
         };
         for (node, _) in read.iter_mut().filter(|(node, _)| !node.leaf) {
-            // The children of the nodes of a level follow each other.
+            // The children of a level's nodes are contiguous.
             node.first = next;
             next += node.count;
         }
@@ -50,14 +50,14 @@ pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn
     Ok(Report { surfels: kept.surfels.count(), nodes, levels: levels as u64, subtrees, preparation })
 }
 
-/// Some nodes that follow each other.
+/// A few contiguous nodes.
 enum Piece<'a> {
     One(&'a NodeAndLow),
     Kept(Range<u64>),
 }
 
 impl Part {
-    /// The first level of the tree on which it has no nodes.
+    /// The level after its deepest one.
     fn end(&self) -> usize {
         match self {
             Self::Above { depth, .. } => depth + 1,
@@ -65,7 +65,7 @@ impl Part {
         }
     }
 
-    /// Its nodes on a level.
+    /// Its nodes on a level of the tree.
     fn pieces(&self, level: usize) -> Vec<Piece<'_>> {
         match self {
             Self::Above { depth, made, .. } if *depth == level => vec![Piece::One(made)],
@@ -80,7 +80,7 @@ impl Part {
     }
 }
 
-/// What a reader of a part must know, and how many points stray.
+/// The facts that a reader of a part of the file needs, and the number of strays.
 fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) -> Result<(Whole, u64)> {
     let count = kept.surfels.count();
     let places = |piece: Range<u64>| {
@@ -88,13 +88,13 @@ fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) 
         progress.advance(scene.surfels.len() as u64);
         Ok((0..scene.surfels.len()).map(|k| (scene.center(k), f64::from(scene.surfels[k].radius()))).collect())
     };
-    progress.begin("looking at surfels", count);
+    progress.begin("measuring the scene", count);
     let read = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
     let boxes = read.made(|places| framed_within(kept.sample.clone().core(), survey.bounds, places));
     progress.end();
     let (body, framed, strays) = boxes?;
     let whole = Whole {
-        // A survey has no more.
+        // The survey has refused larger counts.
         surfels: count as u32,
         nodes: u32::try_from(nodes)
             .map_err(|_| Error::Usage(format!("a tree has at most 2^32 - 1 nodes, not {nodes}")))?,

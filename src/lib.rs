@@ -39,6 +39,7 @@ pub mod bench;
 pub mod error;
 pub mod frame;
 pub mod gpu;
+pub mod guide;
 #[cfg(feature = "bench")]
 pub mod hardcases;
 pub mod io;

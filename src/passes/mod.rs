@@ -28,6 +28,20 @@
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the
 //! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. [`shared`] holds the
 //! files of every kernel.
+//!
+//! # How to add
+//!
+//! - **An accumulator**: write `wgsl/accumulator_NAME.wgsl` with the functions of
+//!   `accumulator_fixed32.wgsl` (`quantise`, `term`, `add`, `add_pair`, `settle`, `sum_at`,
+//!   `weight_at`) and a row of [`ACCUMULATORS`](crate::plan::ACCUMULATORS): words per sum, needed
+//!   features, whether the bits are the same in any order, and a proven bound on its error. Tests
+//!   and `epsplat hardcases` loop over that table.
+//! - **A map** that a pass of its own makes: a row of [`MAPS`](crate::scene::MAPS), a pass with its
+//!   twin such as [`index`], its row in `MAP_PASSES`, and a kernel in `wgsl/`. The build finds
+//!   kernel files by itself. A file with loops names the proof that they end (`gpu/loops.rs`); else
+//!   its loops are counted at run time.
+//! - **An experiment** needs no variant: [`Sources::replace`](crate::gpu::Sources::replace) changes
+//!   the text of a kernel at run time.
 
 pub mod accumulate;
 pub mod attributes;

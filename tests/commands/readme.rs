@@ -1,15 +1,15 @@
-//! The README stays true: every command in it runs.
+//! The README and the guide stay true: every command in them runs.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::Path;
 use std::process::Command;
 
-/// The lines of the README's ```sh blocks, continuation lines joined.
-fn commands() -> Vec<String> {
-    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+/// The lines of the ```sh blocks of a page, continuation lines joined.
+fn commands(page: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
     let mut commands = Vec::new();
-    for block in readme.split("```sh\n").skip(1) {
+    for block in text.split("```sh\n").skip(1) {
         let block = block.split("```").next().unwrap().replace("\\\n", " ");
         commands
             .extend(block.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).map(str::to_owned));
@@ -17,45 +17,68 @@ fn commands() -> Vec<String> {
     commands
 }
 
-#[cfg(unix)]
-#[test]
-fn every_command_of_the_readme_runs() {
+/// The shell's line for a command of a page; none for those that other scripts run.
+fn line(command: &str) -> Option<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // Commands that install drivers, or run the tests, are those of the script that runs the tests.
+    if command.contains("apt-get") {
+        let script = std::fs::read_to_string(root.join("tests/run")).unwrap();
+        for package in command.split(' ').filter(|word| word.contains("vulkan")) {
+            assert!(script.contains(package), "tests/run does not install {package}");
+        }
+        return None;
+    }
+    if command == "tests/run" {
+        assert!(root.join("tests/run").exists());
+        return None;
+    }
+    let binary = env!("CARGO_BIN_EXE_epsplat");
+    let arguments = command.strip_prefix("cargo run --release -- ").or_else(|| command.strip_prefix("epsplat "));
+    let arguments = arguments.unwrap_or_else(|| panic!("a page has a command that no test runs: {command}"));
+    Some(format!("{binary} {arguments}"))
+}
+
+/// Runs the commands of a page in order, in a folder that links to the data and the studies, and
+/// returns the folder.
+fn run(page: &str, least: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for name in ["data", "benches"] {
         std::os::unix::fs::symlink(root.join(name), folder.path().join(name)).unwrap();
     }
-    let commands = commands();
-    assert!(commands.len() >= 8, "the README lost its commands: {commands:?}");
-    let mut ran = 0;
-    for command in &commands {
-        // What installs or runs the tests is run by the tests' own script, so that script must hold it.
-        if command.contains("apt-get") {
-            let script = std::fs::read_to_string(root.join("tests/run")).unwrap();
-            for package in command.split(' ').filter(|word| word.contains("vulkan")) {
-                assert!(script.contains(package), "tests/run does not install {package}");
-            }
-            continue;
-        }
-        if command == "tests/run" {
-            assert!(root.join("tests/run").exists());
-            continue;
-        }
-        let binary = env!("CARGO_BIN_EXE_epsplat");
-        let line = if let Some(rest) = command.strip_prefix("cargo run --release -- ") {
-            format!("{binary} {rest}")
-        } else if let Some(rest) = command.strip_prefix("epsplat ") {
-            format!("{binary} {rest}")
-        } else {
-            panic!("the README has a command that no test runs: {command}");
-        };
+    let commands = commands(page);
+    let lines: Vec<String> = commands.iter().filter_map(|command| line(command)).collect();
+    assert!(lines.len() >= least, "{page} lost its commands: {commands:?}");
+    for line in lines {
         let output = Command::new("sh").arg("-c").arg(&line).current_dir(folder.path()).output().unwrap();
-        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-        ran += 1;
+        assert!(output.status.success(), "{page}: {line}: {}", String::from_utf8_lossy(&output.stderr));
     }
-    assert!(ran >= 6, "only {ran} commands ran");
+    folder
+}
+
+#[cfg(unix)]
+#[test]
+fn the_readmes_commands_run() {
+    let folder = run("README.md", 10);
     let autzen = std::fs::metadata(folder.path().join("autzen.png")).expect("the first command writes autzen.png");
     assert!(autzen.len() > 100_000);
+}
+
+#[cfg(unix)]
+#[test]
+fn the_guides_commands_run() {
+    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/guide");
+    let mut pages: Vec<String> = std::fs::read_dir(guide)
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().into_string().unwrap().strip_suffix(".md").map(str::to_owned))
+        .map(|name| format!("src/guide/{name}.md"))
+        .collect();
+    pages.push("benches/README.md".into());
+    pages.sort();
+    assert!(pages.len() >= 9, "{pages:?}");
+    for page in pages {
+        run(&page, 1);
+    }
 }
 
 /// A file of tests that no module names would never run.

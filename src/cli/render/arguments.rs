@@ -90,7 +90,7 @@ pub(super) struct CameraArguments {
     /// Focal lengths and principal point in pixels
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics, allow_hyphen_values = true, hide_short_help = true)]
     pub(super) intrinsics: Option<[f64; 4]>,
-    /// A camera file (see the README), in place of all other camera options but --size
+    /// A camera file (see the guide), in place of all other camera options but --size
     #[arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true)]
     pub(super) file: Option<PathBuf>,
     /// Many cameras: a transforms.json, or a folder with COLMAP's cameras.txt and images.txt

@@ -1,4 +1,5 @@
-// What the visibility pass keeps of the fragments of a pixel: the nearest depth. Same interface as nearest_color.wgsl.
+// Visibility pass that stores only the nearest depth of each pixel. Same interface as
+// nearest_color.wgsl.
 
 fn mark_of(surfel: u32) -> u32 {
     return 0u;
@@ -8,7 +9,7 @@ fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
     atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(fragment.depth)));
 }
 
-// The bits of the nearest depth, where `visible` has it from now on.
+// The bits of the nearest depth. `visible` reads the same buffer.
 fn nearest_at(pixel: u32) -> u32 {
     return kept_depth(atomicLoad(&nearest[pixel]));
 }

@@ -1,10 +1,12 @@
-// Normals, each turned toward the viewer and mapped from [-1, 1] to [0, 1] before they are summed: those of the front and the back
-// of a thin part would cancel.
+// Sums of normals. Each normal is turned toward the viewer and mapped from [-1, 1] to [0, 1] before
+// it is summed, because the normals of the front and the back of a thin part would cancel.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x5f4eb9a33ee59bf8
 
 override NORMAL_CHANNEL: u32;
-// The rasteriser's own depth test blends both sides of a surface, and normals as they are given (src/passes/raster.rs).
+// Whether normals are turned toward the viewer. False where a pixel blends both sides of a surface,
+// with normals as they are given (Sides::Both in src/plan/needs.rs): with the rasteriser's own
+// depth test (src/passes/raster.rs) and with order-independent transparency.
 override TURNS: bool;
 
 fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {
@@ -12,7 +14,8 @@ fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {
     add(pixel, NORMAL_CHANNEL + 2u, term(weight, normal.z));
 }
 
-// The normalised mean, on the side that is seen; 0 where opposite normals cancel.
+// The normalised mean, turned to the side that the nearest fragment shows; 0 where opposite normals
+// cancel.
 fn resolve_normal(pixel: u32, weight: f32, front: f32) -> vec3<f32> {
     var mean: vec3<f32>;
     for (var k = 0u; k < 3u; k++) {

@@ -1,12 +1,12 @@
-// The normals of caps: they turn from the centre's along the surfel. Same interface as normal_flat.wgsl.
+// The normals of caps, which change along the surfel. Same interface as normal_flat.wgsl.
 // Twin: src/passes/splat.rs.
 
-// Of the centre, world space, unit.
+// The normal at the centre, world space, unit length.
 fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     return surfel_normal(index);
 }
 
-// Minus the gradient of the height, world space.
+// The change of the normal per unit of u and of v: minus the gradient of the height, world space.
 fn bend_of(index: u32) -> Bend {
     let surfel = surfel_at(index);
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
@@ -17,7 +17,7 @@ fn bend_of(index: u32) -> Bend {
     return Bend(-(m[0] * heights.x + m[1] * heights.y), -(m[0] * heights.y + m[1] * heights.z));
 }
 
-// Unit, turned, mapped to [0, 1].
+// The normal at a fragment: unit length, turned toward the viewer, mapped to [0, 1].
 fn normal_at(attributes: Attributes, spot: Spot) -> vec3<f32> {
     let n = attributes.normal + attributes.bend.u * spot.uv.x + attributes.bend.v * spot.uv.y;
     let unit_normal = n * inverseSqrt(max(dot3(n, n), 1e-12));

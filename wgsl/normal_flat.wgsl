@@ -1,6 +1,6 @@
 // The normals of disks: each surfel has one. Same interface as normal_curved.wgsl.
 
-// World space, unit, turned, mapped to [0, 1].
+// World space, unit length, turned toward the viewer, mapped to [0, 1].
 fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     let unit_normal = surfel_normal(index);
     let turned = TURNS && (splat.bounds_last & AWAY) != 0u;

@@ -1,7 +1,8 @@
-// A surfel's normal where it is another one than its disk's: a disk lies in a triangle's plane, and light sees the surface that the
-// triangles stand for.
+// Surfels with normals of their own, which may differ from their disks': a disk lies in a
+// triangle's plane, but is lit as the smooth surface that the triangles approximate. Same interface
+// as normal_plane.wgsl.
 
-// The first of three words of a surfel's attributes: world space, unit.
+// The first of the normal's three words in a surfel's attributes: world space, unit length.
 override NORMAL_WORD: u32;
 
 fn surfel_normal(index: u32) -> vec3<f32> {

@@ -1,6 +1,6 @@
-// A surfel's normal: that of its disk. Same interface as normal_own.wgsl.
+// A surfel's normal is that of its disk. Same interface as normal_own.wgsl.
 
-// World space, unit.
+// World space, unit length.
 fn surfel_normal(index: u32) -> vec3<f32> {
     let surfel = surfel_at(index);
     // In device units, so that no product underflows.

@@ -1,5 +1,5 @@
-// Stage 2, its end: the farthest of the nearest depths in each tile of pixels, by which stage 3 tells splats that are
-// hidden altogether without a look at their pixels. No image depends on it.
+// Stage 2, its end: the farthest of the nearest depths in each tile of pixels. Stage 3 uses it to
+// skip splats that are hidden completely, without a look at their pixels. No image depends on it.
 // Host side: src/passes/visibility.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xc48f03445918a49c
 
@@ -9,7 +9,7 @@ fn occlusion_tiles() -> vec2<u32> {
     return (vec2<u32>(held.width, held_band.rows) + OCCLUSION_TILE - 1u) / OCCLUSION_TILE;
 }
 
-// The farthest of the tile's nearest depths; a pixel where nothing is counts as `nothing`.
+// Stores the farthest of the tile's nearest depths; an empty pixel counts as `nothing`.
 fn farthest_in(tile: u32, nothing: u32) {
     let tiles = occlusion_tiles();
     if (tile >= tiles.x * tiles.y) {
@@ -28,13 +28,14 @@ fn farthest_in(tile: u32, nothing: u32) {
     atomicStore(&nearest[band_pixels() + tile], farthest);
 }
 
-// The words of the covered tiles follow (covered.wgsl).
+// The word of `nearest` at which the list of covered tiles starts (covered.wgsl).
 fn covered_start() -> u32 {
     let tiles = occlusion_tiles();
     return band_pixels() + tiles.x * tiles.y;
 }
 
-// Whether anything is in a tile of covered.wgsl, which is one tile here, or two.
+// Whether a tile of covered.wgsl has a fragment. That tile is one tile here, or two, one above the
+// other.
 fn has_any(tile: u32) -> bool {
     let tiles = occlusion_tiles();
     let y = tile / tiles.x * (TILE_ROWS / OCCLUSION_TILE);
@@ -46,7 +47,8 @@ fn has_any(tile: u32) -> bool {
     return farthest != 0u;
 }
 
-// When all is drawn: what has nothing stays so. One invocation a tile.
+// Runs after everything is drawn. Empty pixels stay empty then, so they count as depth 0. One
+// invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn occlude(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -57,10 +59,11 @@ fn occlude(
     farthest_in(linear_index(workgroup, workgroups, local), 0u);
 }
 
-// 0 where a study leaves this out.
+// 0 where a study leaves this optimisation out.
 override HIDES: u32;
 
-// Whether no fragment of the splat can be accepted at `pixels`: accepted depths grow with the nearest one.
+// Whether no fragment of the splat can be accepted at `pixels`. Testing against the farthest front
+// of the tiles suffices, because the farthest accepted depth grows with the nearest depth.
 fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool {
     if (any(pixels.first > pixels.last)) {
         return true;
@@ -72,7 +75,7 @@ fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool
     let tiles = occlusion_tiles();
     let first = (pixels.first - vec2<u32>(0u, held_band.first_row)) / OCCLUSION_TILE;
     let last = (pixels.last - vec2<u32>(0u, held_band.first_row)) / OCCLUSION_TILE;
-    // Positive f32 order as their bits.
+    // The bits of positive f32 order as their values.
     var front = 0u;
     let start = band_pixels();
     for (var y = first.y; y <= last.y; y++) {

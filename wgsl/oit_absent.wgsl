@@ -1,4 +1,5 @@
-// Fragments of a surface are blended by their kernel alone, and its alpha is the mean. Same interface as oit.wgsl.
+// Fragments of a surface are blended by their kernel weights alone, and its alpha is their mean.
+// Same interface as oit.wgsl.
 
 fn weight_before(pixel: u32, depth: f32, weight: f32) -> f32 {
     return weight;

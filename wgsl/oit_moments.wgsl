@@ -1,27 +1,28 @@
-// A fragment weighs what those before it let through, as far as the moments of all say (Muenstermann et al. 2018). The visibility pass sums
-// them; same interface as nearest_depth.wgsl and oit_weighted.wgsl.
+// Order-independent transparency by moments: a fragment's weight is multiplied by the transmittance
+// in front of it, as estimated from the moments of all fragments (Muenstermann et al. 2018). The
+// visibility pass sums the moments. Same interface as nearest_depth.wgsl and oit_weighted.wgsl.
 // Twin: src/passes/moments.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x162af31a4e26f963
 
-// Of each pixel five sums of 64 bits, low word first; negative ones are complements.
+// Five 64-bit sums per pixel, low word first, in two's complement.
 @group(0) @binding(51) var<storage, read_write> moments: array<atomic<u32>>;
 
 const MOMENTS: u32 = 5u;
-// 2^26 of an optical depth of 1, of which a fragment has at most 28.
+// 2^26 units for an optical depth of 1. A fragment has at most 28.
 const MOMENT_UNITS: f32 = 67108864.0;
 // MIXED and OF_OWN in the twin.
 const MIXED: f32 = 0.00006103515625;
 const OF_OWN: f32 = 0.25;
-// LEAST_SPREAD and LEAST_MASS there.
+// LEAST_SPREAD and LEAST_MASS in the twin.
 const LEAST_SPREAD: f32 = 1e-6;
 const LEAST_MASS: f32 = 1.52587890625e-5;
 
-// In [-1, 1].
+// Maps a depth to [-1, 1].
 fn moment_place(depth: f32) -> f32 {
     return 2.0 * depth_fraction(depth) - 1.0;
 }
 
-// The alpha, with which cover() hands it on.
+// The alpha of the surfel, which cover() hands on to keep_nearest().
 fn mark_of(surfel: u32) -> u32 {
     return bitcast<u32>(surfel_alpha(surfel));
 }
@@ -63,27 +64,28 @@ fn moment_at(pixel: u32, moment: u32) -> f32 {
     return select(value, -value, negative) / MOMENT_UNITS;
 }
 
-// The part of the mass that counts as before a place, of moments 1 to 4 of unit mass.
+// The fraction of the mass that counts as in front of `place`, from moments 1 to 4 of unit mass.
 fn mass_before(b: vec4<f32>, place: f32) -> f32 {
     let mean = b.x;
     let second = max(b.y - mean * mean, LEAST_SPREAD);
     let third = b.z - mean * (3.0 * b.y - 2.0 * mean * mean);
     let fourth = b.w - mean * (4.0 * b.z - mean * (6.0 * b.y - 3.0 * mean * mean));
     let x = place - mean;
-    // The polynomial whose zeros are the other two places that have mass; at x it is one over the mass there.
+    // The polynomial whose zeros are the two other places with mass; at x its value is 1 over the
+    // mass there.
     let rest = max(fourth - second * second - third * third / second, LEAST_SPREAD * second);
     let c2 = (x * x - second - third / second * x) / rest;
     let c1 = (x - third * c2) / second;
     let c0 = 1.0 - second * c2;
     let own = 1.0 / (c0 + x * (c1 + x * c2));
-    // One of them may be infinitely far, where it has no mass.
+    // One of them may be infinitely far away; it has no mass then.
     let divisor = select(c2, 1e-12, abs(c2) < 1e-12);
     let half = -0.5 * c1 / divisor;
     let product = c0 / divisor;
     let root = sqrt(max(half * half - product, 0.0));
     let larger = half + select(root, -root, half < 0.0);
     let other = product / larger;
-    // Of all mass 1 and the first moment 0.
+    // Solved from total mass 1 and first moment 0.
     let of_larger = (-own * x - other * (1.0 - own)) / (larger - other);
     let of_other = 1.0 - own - of_larger;
     let before = OF_OWN * own + select(0.0, of_larger, larger < x) + select(0.0, of_other, other < x);

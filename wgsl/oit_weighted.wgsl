@@ -1,7 +1,8 @@
-// A fragment weighs less the deeper it lies (McGuire and Bavoil 2013, Eq. 10). Same interface as oit_moments.wgsl.
+// Order-independent transparency by weights that fall with depth (McGuire and Bavoil 2013, Eq. 10).
+// Same interface as oit_moments.wgsl.
 // Twin: src/passes/oit.rs.
 
-// LEAST_OF_DEPTH there.
+// LEAST_OF_DEPTH in the twin.
 const LEAST_OF_DEPTH: f32 = 1.0 / 300000.0;
 
 fn weight_before(pixel: u32, depth: f32, weight: f32) -> f32 {
@@ -9,7 +10,8 @@ fn weight_before(pixel: u32, depth: f32, weight: f32) -> f32 {
     return weight * max(left * left * left, LEAST_OF_DEPTH);
 }
 
-// As there is no visibility pass, sums say where anything is. One invocation a pixel.
+// Marks the pixels that are not empty, from their sums, as there is no visibility pass. One
+// invocation per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn mark_covered(
     @builtin(workgroup_id) workgroup: vec3<u32>,

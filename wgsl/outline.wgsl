@@ -1,15 +1,17 @@
-// Polygons instead of disks (paper 001, section 3): what lies past a side of the regular polygon inscribed in the unit disk is left out.
-// One corner lies at u = 1, so the sides above v = 0 are those below it.
+// Polygons instead of disks (paper 001, section 3): the part of the unit disk outside the inscribed
+// regular polygon is left out. One corner lies at u = 1, so the polygon is symmetric about v = 0.
 // All loops end, by 1 of src/gpu/loops.rs: 0x21ca402a3cfbd5fc
 // Same interface as outline_absent.wgsl. Twin: src/scene/outline.rs.
 
-// Sides whose middles have v >= 0.
+// The number of sides whose middles have v >= 0.
 override OUTLINE_SIDES: u32;
-// The cosine and sine of half the angle of a side: the direction of the first one's middle, which lies at the cosine's distance.
+// The cosine and sine of half the central angle of a side. They are the direction of the first
+// side's middle, and the cosine is the distance of every side from the centre.
 override OUTLINE_COS: f32;
 override OUTLINE_SIN: f32;
 
-// Of (u, v, 1) times a positive factor, of a unit disk that was turned in itself (rows.wgsl).
+// Whether a point is outside the polygon. `p` is (u, v, 1) times a positive factor, on a unit disk
+// that `turn` has rotated (rows.wgsl).
 fn beyond_outline(turn: vec2<f32>, p: vec3<f32>) -> bool {
     let own = vec2<f32>(p.x * turn.x - p.y * turn.y, abs(p.x * turn.y + p.y * turn.x));
     let step = vec2<f32>(OUTLINE_COS * OUTLINE_COS - OUTLINE_SIN * OUTLINE_SIN, 2.0 * OUTLINE_COS * OUTLINE_SIN);

@@ -1,7 +1,9 @@
-// What the rasteriser's layers show so far: after each one, what it blended goes over what is behind it. Host side: src/passes/peel.rs.
+// The layers that the rasteriser has peeled so far: each new one is composited behind those before.
+// Host side: src/passes/peel.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x6f64d54604ba503e
 
-// Of each pixel: the premultiplied colour, the transmittance, the layers, and the nearest depths of raster_peeled.wgsl.
+// Per pixel: the premultiplied colour (four words), the transmittance, the number of layers, and
+// the nearest depths of the last front and the last back that were peeled (raster_peeled.wgsl).
 @group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
 
 const PEELED_WORDS: u32 = 8u;
@@ -11,11 +13,11 @@ fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
     let at = pixel * PEELED_WORDS;
     let color = bitcast<vec4<f32>>(vec4<u32>(peeled[at], peeled[at + 1u], peeled[at + 2u], peeled[at + 3u]));
     let layers = peeled[at + 5u];
-    // The buffer was cleared.
+    // The buffer was cleared, so without a layer the transmittance is not stored yet.
     return Shown(color, select(bitcast<f32>(peeled[at + 4u]), 1.0, layers == 0u), layers, 0.0);
 }
 
-// One invocation a pixel.
+// One invocation per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn peel(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -33,7 +35,8 @@ fn peel(
     }
     let at = pixel * PEELED_WORDS;
     peeled[at + PEELED_FRONTS + select(0u, bitcast<u32>(front) & SIDE_BIT, SIDES)] = bitcast<u32>(front);
-    // A target of few bits may have kept nothing of a faint layer, which is peeled all the same.
+    // A target of few bits may have rounded a faint layer to nothing; the layer counts as peeled
+    // all the same.
     let weight = sum_at(pixel, WEIGHT_CHANNEL);
     if (weight == 0.0) {
         return;

@@ -1,30 +1,31 @@
-// Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
-// that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
+// Stage 1: projects every surfel to a splat, once. One invocation per surfel. The rare surfels that
+// take longer (thin splats, disks that reach the near depth) and the large splats are queued and
+// processed together later, so that the other invocations of a subgroup need not wait.
 // Twin: src/passes/project.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x20f7c987e4d23957
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
-// Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
-// for each large one, three from QUEUE_LISTING on one with a workgroup for LISTED_AT_ONCE of them, and from QUEUE_START on come
-// their slots.
+// The queue of large splats. Word 0 counts them; word 1 counts all surfels out of view. Three words
+// from QUEUE_GRID on are a grid with one workgroup for each large splat, three from QUEUE_LISTING
+// on one with a workgroup for LISTED_AT_ONCE of them. The splats' slots follow from QUEUE_START on.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
-// The rare ones, in the same form; the grid is project_rare's.
+// The queue of rare surfels, in the same layout; its grid is that of project_rare.
 @group(0) @binding(21) var<storage, read_write> rare: array<atomic<u32>>;
 @group(0) @binding(22) var<storage, read> listed: array<u32>;
 
-// Surfels that face away are left out.
+// Whether surfels that face away are left out.
 override CULL_BACK: bool;
 
 const QUEUE_GRID: u32 = 2u;
 const QUEUE_LISTING: u32 = 5u;
-// Large splats that a workgroup lists (bin.wgsl).
+// Large splats that one workgroup lists (bin.wgsl).
 const LISTED_AT_ONCE: u32 = 8u;
 const MOST_GROUPS: u32 = 65535u;
 
 var<workgroup> group_unseen: atomic<u32>;
 
-// World to camera.
+// Rotates from world to camera axes, in doubled precision.
 fn rotate(world: array<Double, 3>) -> array<Double, 3> {
     var camera: array<Double, 3>;
     for (var row = 0u; row < 3u; row++) {
@@ -46,12 +47,13 @@ fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
     );
 }
 
-// What became of a surfel.
+// The outcomes of projecting a surfel.
 const OUT_OF_VIEW: u32 = 0u;
 const IN_VIEW: u32 = 1u;
 const RARE: u32 = 2u;
 
-// Of a rare surfel the splat is written only if `every` kind is asked for.
+// Projects the surfel of a slot and writes its splat. If the surfel is rare and `every` is false,
+// writes nothing and returns RARE.
 fn project_into(slot: u32, every: bool) -> u32 {
     let place = place_for(slot);
     let index = surfel_of(place);
@@ -65,7 +67,8 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let cap = curve(&h, index, center, axes.s, axes.t);
     let filter_ = low_pass(&h);
 
-    // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
+    // The bounds are conservative: the margin covers the rounding of the extent, and the footprint
+    // decides which pixels are covered.
     let size = vec2<f32>(f32(held.width), f32(held.height));
     let margin = 0.01 + 1e-5 * (abs(h.low) + abs(h.high));
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
@@ -91,14 +94,14 @@ fn project_into(slot: u32, every: bool) -> u32 {
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     if (visible && is_large(splat)) {
-        // Places depend on the schedule, but nothing later depends on places.
+        // The order in the queue depends on the schedule, but nothing later depends on that order.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], slot);
     }
     splats[slot] = splat_record(splat, place, filter_);
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 
-// Most splats are in view, so those that are not are counted.
+// Counts the surfels out of view, which are fewer than those in view. Copies count too.
 fn count_unseen(local: u32, slot: u32, unseen: bool) {
     if (unseen) {
         atomicAdd(&group_unseen, copies_of(surfel_of(place_for(slot))));
@@ -144,7 +147,8 @@ fn project_rare(
     count_unseen(local, slot, fate == OUT_OF_VIEW);
 }
 
-// Between the two: a workgroup for WORKGROUP of the rare ones, in rows that no adapter finds too long.
+// Runs between project and project_rare: writes the grid of the latter, with one invocation per
+// rare surfel and at most MOST_GROUPS workgroups in a row.
 @compute @workgroup_size(1)
 fn arrange_rare() {
     let grid = rows_of(groups_of(atomicLoad(&rare[0])));
@@ -153,7 +157,7 @@ fn arrange_rare() {
     }
 }
 
-// Workgroups of an invocation each.
+// The number of workgroups that have at least so many invocations.
 fn groups_of(invocations: u32) -> u32 {
     return (invocations + WORKGROUP - 1u) / WORKGROUP;
 }
@@ -163,7 +167,7 @@ fn rows_of(groups: u32) -> vec3<u32> {
     return vec3<u32>((groups + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u);
 }
 
-// After all surfels.
+// Runs after all surfels are projected: writes the grids over the large splats.
 @compute @workgroup_size(1)
 fn arrange() {
     let large = atomicLoad(&queue[0]);

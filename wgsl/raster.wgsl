@@ -1,15 +1,16 @@
-// The path that compute is compared with (Botsch et al. 2005): a triangle or quad a splat, the rasteriser's depth test for the nearest
-// depth, its blender for the sums. Splats, footprint, kernel, attributes and resolve are those of the compute path.
-// Host side and what the variants mean: src/passes/raster.rs.
+// The rasteriser's path, the baseline for the compute kernels (Botsch et al. 2005): each splat is a
+// triangle or a quad, the depth test finds the nearest depth, and the blender makes the sums.
+// Splats, footprint, kernel, attributes and resolve are those of the compute path.
+// Host side and the meaning of the variants: src/passes/raster.rs.
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 
-// What a splat's fragments need is read once a corner and handed on unchanged: reading the record again at each fragment
-// took a software adapter twice as long.
+// The values that a splat's fragments need. They are read once per corner and passed on unchanged:
+// on a software adapter, reading the record again at each fragment took twice as long.
 struct ShapeCorner {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) index: u32,
-    // And bounds_last.
+    // The anchor, and the bits of bounds_last.
     @location(1) @interpolate(flat) anchor: vec3<i32>,
     @location(2) @interpolate(flat) a: vec3<f32>,
     @location(3) @interpolate(flat) b: vec3<f32>,
@@ -20,14 +21,17 @@ struct ShapeCorner {
     @location(8) @interpolate(flat) radius: f32,
 }
 
-// Vertices of a splat: 3 for one triangle, 6 for the two of a quad. A quad has fewer pixels that the splat misses, a
-// triangle half the cost of its own: so triangles where splats are many and small (src/passes/raster.rs).
+// Vertices per splat: 3 for a triangle, 6 for the two triangles of a quad. A quad covers fewer
+// pixels that the splat misses; a triangle costs half as much itself. So triangles serve scenes of
+// many small splats (src/passes/raster.rs).
 override VERTICES: u32;
 
-// How far the shape reaches past the disk, pixels: more than the rasteriser rounds corners.
+// How far the shape reaches past the disk, pixels. It exceeds the rounding of corners by the
+// rasteriser.
 const SHAPE_MARGIN: f32 = 0.05;
 
-// Corner `number` of the shape about the unit disk, in the disk's coordinates: a triangle, or a square.
+// Corner `number` of the shape around the unit disk (a triangle or a square), in the coordinates of
+// the disk.
 fn disk_corner(number: u32) -> vec2<f32> {
     if (VERTICES == 3u) {
         return vec2<f32>(select(f32(number) * 3.4641016 - 5.1961524, 0.0, number == 0u), select(-1.0, 2.0, number == 0u));
@@ -35,14 +39,16 @@ fn disk_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * 2.0 - 1.0;
 }
 
-// Corner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
+// Corner `number` of the shape around a box of pixels, relative to the first corner of the box, in
+// units of its sides.
 fn box_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * select(1.0, 2.0, VERTICES == 3u);
 }
 
-// The image point of a corner: of the triangle or parallelogram about the image of the splat's disk, or about its
-// bounds where that could leave out pixels: a thin splat's rows have too few digits, a disk much nearer at one side than
-// at the other has no such shape, and filters widen splats.
+// The image point of a corner. The shape is the triangle or parallelogram around the image of the
+// splat's disk, or around its bounding box where the former could miss pixels: the rows of a thin
+// splat have too few digits, a disk whose depth varies much has no such shape, and filters widen
+// splats.
 fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let extent = bounds(splat);
     let first = vec2<f32>(extent.first);
@@ -51,17 +57,19 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let a = vec3<f32>(splat.a[0], splat.a[1], splat.a[2]);
     let b = vec3<f32>(splat.b[0], splat.b[1], splat.b[2]);
     let c = homogeneous_row(splat);
-    // The columns of the rows' inverse, up to a factor; at the disk's centre u = v = 0.
+    // The columns of the inverse of the matrix of rows, up to a factor. At the disk's centre u and
+    // v are 0.
     let u = cross3(b, c);
     let v = cross3(c, a);
     let center = cross3(a, b);
     let thin = any(vec3<f32>(splat.a_low[0], splat.a_low[1], splat.a_low[2]) != vec3<f32>(0.0));
-    // Corners are within 2 of the centre: there the homogeneous coordinate stays within half of the centre's.
+    // Corners are within 2 of the centre, so the homogeneous coordinate there stays within half of
+    // its value at the centre.
     let level = 4.0 * (abs(u.z) + abs(v.z)) < abs(center.z);
     if (FACES || FILTERED || thin || !level || any(size > vec2<f32>(4096.0))) {
         return boxed;
     }
-    // A step of a pixel changes u and v by less than this, anywhere on such a disk.
+    // A bound on the change of u and v per pixel, anywhere on such a disk.
     let change = 2.0 * abs(center.z / dot3(a, u))
         * vec2<f32>(abs(a.x) + abs(a.y) + abs(c.x) + abs(c.y), abs(b.x) + abs(b.y) + abs(c.x) + abs(c.y));
     let corner = disk_corner(number) * (1.0 + SHAPE_MARGIN * max(change.x, change.y));
@@ -69,13 +77,14 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     return vec2<f32>(f32(splat.anchor_x), f32(splat.anchor_y)) + 0.5 + d.xy / d.z;
 }
 
-// A corner in clip space; a splat out of view has none.
+// A corner in clip space. The corners of a splat that is out of view coincide outside the clip
+// volume.
 fn shape_corner(vertex: u32) -> ShapeCorner {
     hold();
     let index = vertex / VERTICES;
     let place = vertex % VERTICES;
     let splat = splat_of(projected[index]);
-    // The quad's triangles are 0, 1, 2 and 3, 2, 1.
+    // The triangles of a quad are 0, 1, 2 and 3, 2, 1.
     let image = corner_image(splat, select(place, 6u - place, place > 2u));
     let clip = image / vec2<f32>(f32(held.width), f32(held.height)) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
     let extent = bounds(splat);
@@ -112,12 +121,12 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
 fn fragment_of(corner: ShapeCorner) -> Fragment {
     hold();
     let record = projected[corner.index];
-    // A constructor names every field, so that none is forgotten. The record's own are read only
-    // where there are any.
+    // A constructor names every field, so that none is forgotten. The optional parts of the record
+    // (clip, cap, fade) are read here only if there are any.
     let splat = Splat(
         corner.anchor.x,
         corner.anchor.y,
-        // corner_image() alone looks at bounds.
+        // Only corner_image() reads the first bounds.
         0u,
         bitcast<u32>(corner.anchor.z),
         array<f32, 3>(corner.a.x, corner.a.y, corner.a.z),
@@ -133,7 +142,7 @@ fn fragment_of(corner: ShapeCorner) -> Fragment {
 }
 
 fn carried(corner: ShapeCorner) -> Attributes {
-    // The rasteriser draws flat disks (src/plan/needs.rs).
+    // The rasteriser draws flat disks only (src/plan/needs.rs).
     var flat_: Bend;
     return attributes_without_place(corner.color, corner.normal, flat_, corner.radius);
 }

@@ -1,5 +1,5 @@
-// Depths are written and compared in the fragment shader, bit for bit as the compute path does: the rasteriser keeps the
-// nearest depth, the attribute pass reads it (raster_own_depths.wgsl).
+// Fragments write and compare their depths in the shader, bit for bit as in the compute path. The
+// depth test finds the nearest depth, and the attribute pass reads it (raster_own_depths.wgsl).
 
 // Scaling by a power of two is exact.
 @fragment

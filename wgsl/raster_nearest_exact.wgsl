@@ -1,5 +1,6 @@
-// The rasteriser's depth test alone, one pass: the nearest fragment's terms replace those of others. Fragments write their own depth. Of
-// those at one depth the first one drawn stays, so the order of the surfels shows.
+// One pass with the rasteriser's depth test alone: the nearest fragment's terms replace the others.
+// Fragments write their own depth. At equal depths the first one drawn stays, so the image depends
+// on the order of the surfels.
 
 // Scaling by a power of two is exact.
 @fragment

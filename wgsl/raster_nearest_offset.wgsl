@@ -1,5 +1,5 @@
-// The rasteriser's depth test alone, one pass, of depths that it interpolates itself: what it is fastest at. Same interface as
-// raster_nearest_exact.wgsl.
+// One pass with the rasteriser's depth test alone, by interpolated depths: the fastest use of the
+// rasteriser. Same interface as raster_nearest_exact.wgsl.
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     let d = vec3<f32>(image - 0.5 - vec2<f32>(f32(splat.anchor_x), f32(splat.anchor_y)), 1.0);

@@ -1,9 +1,9 @@
-// The classic depth test: the quads' own depths, interpolated by the rasteriser, with those of the visibility pass moved
-// away by epsilon (paper 000, section 5.3). Early depth tests stay on in the attribute pass; what they decide is not
-// exact. `depth_order` is linear over the image of a plane,
+// The classic depth test: the rasteriser interpolates the depths of the quads, and the visibility
+// pass moves its depths away by epsilon (paper 000, section 5.3). The attribute pass can use early
+// depth tests, but their decisions are not exact. `depth_order` is linear over the image of a plane
 // and largest in front.
 
-// The visibility pass, whose depths are moved.
+// Set in the visibility pass, which moves depths.
 override MOVED: bool;
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
@@ -25,7 +25,8 @@ fn raster_visibility(corner: ShapeCorner) {
 @fragment
 fn raster_attributes(corner: ShapeCorner) -> Targets {
     let fragment = fragment_of(corner);
-    // Outside the disk the sums gain nothing: no fragment is discarded, so that the depth test may come first.
+    // Fragments outside the disk add nothing to the sums. None is discarded, so the depth test may
+    // run before the shader.
     if (fragment.hit) {
         let pixel = vec2<u32>(corner.position.xy);
         blend(pixel_index(pixel.x, pixel.y), fragment, 0.0, carried(corner));
@@ -33,7 +34,7 @@ fn raster_attributes(corner: ShapeCorner) -> Targets {
     return targets();
 }
 
-// The nearest depth is not known here; depths are summed whole (depth_whole.wgsl).
+// The nearest depth is unknown here, so depths are summed whole (depth_whole.wgsl).
 fn front_at(pixel: u32) -> f32 {
     return 0.0;
 }

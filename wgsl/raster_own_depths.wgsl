@@ -1,5 +1,5 @@
-// Fragments write their own depths, and the nearest ones are read back from the depth buffer. Not as a `texture_depth_2d`: GLSL can only
-// compare with those.
+// Fragments write their own depths, and the nearest ones are read back from the depth buffer. It is
+// not bound as a `texture_depth_2d`, because GLSL can only compare with those.
 
 @group(0) @binding(19) var nearest_depth: texture_2d<f32>;
 

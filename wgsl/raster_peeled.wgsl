@@ -1,10 +1,12 @@
-// The fragments that layers before this one have, which are drawn no more (depth peeling: Everitt 2001).
+// Depth peeling (Everitt 2001): fragments that belong to earlier layers are not drawn again.
 // Host side: src/passes/peel.rs.
 
-// Per pixel, of peeled.wgsl: the nearest depths of the last fronts and of the last backs that were peeled, or 0.
+// The buffer `peeled` of peeled.wgsl, read-only. It has, per pixel, the nearest depth of the last
+// front and of the last back that were peeled, or 0.
 @group(0) @binding(48) var<storage, read> told: array<u32>;
 
-// Of the fragment's side: what lies farther than the last layer accepts is left.
+// Whether the fragment belongs to an earlier layer: it lies no farther than the last layer of its
+// side accepts.
 fn is_peeled(fragment: Fragment, radius: f32, pixel: vec2<u32>) -> bool {
     let side = select(0u, bitcast<u32>(fragment.depth) & SIDE_BIT, SIDES);
     let front = told[pixel_index(pixel.x, pixel.y) * PEELED_WORDS + PEELED_FRONTS + side];

@@ -1,4 +1,4 @@
-// One layer is drawn, before which there is none. Same interface as raster_peeled.wgsl.
+// One layer is drawn, and none comes before it. Same interface as raster_peeled.wgsl.
 
 fn is_peeled(fragment: Fragment, radius: f32, pixel: vec2<u32>) -> bool {
     return false;

@@ -1,4 +1,4 @@
-// The blended sums of up to four channels.
+// Blended sums of up to four channels, in one target.
 
 @group(0) @binding(20) var sums_0: texture_2d<f32>;
 
@@ -14,7 +14,7 @@ fn target_at(place: vec2<u32>, index: u32) -> vec4<f32> {
     return textureLoad(sums_0, place, 0);
 }
 
-// With the fragment's own depth.
+// The targets and the fragment's own depth.
 struct Seen {
     @location(0) sums_0: vec4<f32>,
     @builtin(frag_depth) depth: f32,

@@ -1,4 +1,4 @@
-// The blended sums of up to eight channels.
+// Blended sums of up to eight channels, in two targets. Same interface as raster_targets_1.wgsl.
 
 @group(0) @binding(20) var sums_0: texture_2d<f32>;
 @group(0) @binding(17) var sums_1: texture_2d<f32>;
@@ -23,7 +23,7 @@ fn target_at(place: vec2<u32>, index: u32) -> vec4<f32> {
     }
 }
 
-// With the fragment's own depth.
+// The targets and the fragment's own depth.
 struct Seen {
     @location(0) sums_0: vec4<f32>,
     @location(1) sums_1: vec4<f32>,

@@ -1,5 +1,6 @@
-// A splat's record: sixteen words, which say of which surfel it is where that is not its slot (cull.wgsl), and those of its low-pass
-// its lines, its cap and its fade where there are some (filter.wgsl, clip.wgsl, curved.wgsl, fade.wgsl).
+// The record of a splat: sixteen words, then the optional rows of its low-pass, its clip lines, its
+// cap and its fade (filter.wgsl, clip.wgsl, curved.wgsl, fade.wgsl). If slots are not in the order
+// of the surfels, spare bits of the anchor store the surfel's batch (cull.wgsl).
 
 alias SplatRecord = array<Words, 4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS + FADE_ROWS>;
 

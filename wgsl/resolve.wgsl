@@ -1,26 +1,29 @@
-// Stage 4: sums become the image: divide by the weight, shade, put over the background. Twin: src/passes/resolve.rs.
+// Stage 4: turns sums into the image: divides by the weight, shades, composites over the
+// background.
+// Twin: src/passes/resolve.rs.
 
-// Words of a pixel in the image (image_*.wgsl); the colour's four come first.
+// Words of a pixel in the image (image_*.wgsl); the four of the colour come first.
 override IMAGE_WORDS: u32;
 
-// What alphas are multiplied with.
+// The factor on every alpha.
 override OPACITY: f32;
 
-// Straight alpha over straight alpha.
+// Composites straight alpha over straight alpha.
 fn over(front: vec4<f32>, back: vec4<f32>) -> vec4<f32> {
     let behind = back.a * (1.0 - front.a);
     let alpha = front.a + behind;
     return select(vec4<f32>(0.0), vec4<f32>((front.rgb * front.a + back.rgb * behind) / alpha, alpha), alpha > 0.0);
 }
 
-// The straight colour and alpha of a surface of a premultiplied one, at the pixel (x, y).
+// Shades a premultiplied colour at the pixel (x, y). Returns straight colour and alpha.
 fn shaded(premultiplied: vec4<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec4<f32> {
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
     return vec4<f32>(shade_pixel(color, normal, x, y), alpha * OPACITY);
 }
 
-// Premultiplied, and rounded before it is added, however a compiler would join the two: whoever draws a sample, the bits are the same.
+// Premultiplies a straight colour. The product is rounded before it is added, whatever a compiler
+// would fuse, so that every kernel that draws a sample gets the same bits.
 fn premultiplied_sample(straight: vec4<f32>) -> vec4<f32> {
     let product = vec4<f32>(straight.rgb * straight.a, straight.a);
     return bitcast<vec4<f32>>(bitcast<vec4<u32>>(product) ^ vec4<u32>(held.zero));

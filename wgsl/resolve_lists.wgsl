@@ -1,17 +1,17 @@
-// A pixel whose surfaces show through each other: what layers.wgsl or sorted.wgsl composites of its list, over the background. Same
-// interface as resolve_surface.wgsl.
+// A pixel whose surfaces show through each other: composites its list (layers.wgsl or sorted.wgsl)
+// over the background. Same interface as resolve_surface.wgsl.
 // Twin: src/passes/layers.rs.
 
 // LEAST_TRANSMITTANCE in src/scene/composite.rs.
 const LEAST_TRANSMITTANCE: f32 = 9.31322574615478515625e-10;
 
-// What is composited so far, from front to back.
+// The result of compositing so far, from front to back.
 struct Shown {
     // Premultiplied.
     color: vec4<f32>,
     transmittance: f32,
     layers: u32,
-    // Of the last one, if it is a tail.
+    // How much the last layer shows, alpha times transmittance, if it is a tail; else 0.
     tail: f32,
 }
 
@@ -19,7 +19,7 @@ fn shown_nothing() -> Shown {
     return Shown(vec4<f32>(0.0), 1.0, 0u, 0.0);
 }
 
-// With a straight colour behind.
+// Composites a straight colour behind what is shown.
 fn with_behind(shown: Shown, straight: vec4<f32>) -> Shown {
     let shows = shown.transmittance * straight.a;
     return Shown(
@@ -30,7 +30,7 @@ fn with_behind(shown: Shown, straight: vec4<f32>) -> Shown {
     );
 }
 
-// Straight.
+// Returns a straight colour.
 fn over_background(shown: Shown) -> vec4<f32> {
     let alpha = shown.color.a;
     let color = select(vec3<f32>(0.0), shown.color.rgb / alpha, alpha > 0.0);
@@ -47,7 +47,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     write_no_surfaces(out, shown.layers);
 }
 
-// No maps are written beside samples.
+// Pictures with several samples have no maps, so this writes none.
 fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
     return premultiplied_sample(over_background(composite(sample, 0u, x, row + held_band.first_row)));
 }

@@ -1,7 +1,8 @@
-// Where each pixel has one sample: its colour and maps (resolve_surface.wgsl, resolve_lists.wgsl). One invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
+// One sample per pixel: writes the pixel's colour and maps (resolve_surface.wgsl,
+// resolve_lists.wgsl). Same interface as resolve_samples.wgsl. Twin: src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x1cce65108f45b35b
 
-// One workgroup a covered tile.
+// One workgroup per covered tile.
 @compute @workgroup_size(WORKGROUP)
 fn resolve(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -1,6 +1,6 @@
-// Where each pixel has several samples, which all other kernels take for pixels: the mean of their premultiplied colours
-// (resolve_surface.wgsl, resolve_lists.wgsl). One
-// invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
+// Several samples per pixel, which all other kernels treat as pixels: writes the mean of their
+// premultiplied colours (resolve_surface.wgsl, resolve_lists.wgsl). One workgroup per covered tile,
+// one invocation per pixel. Same interface as resolve_pixels.wgsl. Twin: src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x2159d9d77d8a1b37
 
 override SAMPLES_ACROSS: u32;
@@ -33,7 +33,8 @@ fn resolve(
     }
 }
 
-// The straight mean of the samples that start at `corner`, a column and row of the band.
+// Writes the straight mean of the samples whose first one is at `corner`, column and row in the
+// band.
 fn write_mean(corner: vec2<u32>, sum: vec4<f32>) {
     let pixel = corner.y / SAMPLES_DOWN * (held.width / SAMPLES_ACROSS) + corner.x / SAMPLES_ACROSS;
     let straight = select(vec3<f32>(0.0), sum.rgb / sum.a, sum.a > 0.0);

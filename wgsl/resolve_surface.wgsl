@@ -1,14 +1,16 @@
-// A pixel that shows its nearest surface alone: the mean of what is summed, or a triangle. Same interface as resolve_lists.wgsl.
+// A pixel that shows only its nearest surface: the mean of its sums, or a triangle. Same interface
+// as resolve_lists.wgsl.
 // Twin: src/passes/resolve.rs.
 
-// What a pixel shows.
+// The surface that a pixel shows.
 struct Surface {
-    // Straight.
+    // Straight alpha.
     color: vec4<f32>,
     normal: vec3<f32>,
     // Camera-space z, device units.
     depth: f32,
-    // Summed, and how many fragments that is of, and their mean place in a texture, as far as maps ask for them; of a triangle 1, 1 and none.
+    // The summed weight, the number of fragments and their mean texture coordinates, each only if a
+    // map needs it. A triangle has 1, 1 and (0, 0).
     weight: f32,
     count: f32,
     place: vec2<f32>,
@@ -17,7 +19,7 @@ struct Surface {
     exists: bool,
 }
 
-// The summed weight of a pixel, whose sums `sums_of` names: where nothing is, no sum need be read.
+// The summed weight of the pixel whose sums `sums_of` names. An empty pixel's sums are not read.
 fn shown_weight(sums_of: u32, front: f32) -> f32 {
     var weight = 0.0;
     if (bitcast<u32>(front) != NOTHING) {
@@ -27,7 +29,8 @@ fn shown_weight(sums_of: u32, front: f32) -> f32 {
     return weight;
 }
 
-// The surface of a pixel's splats, from what `sums_of` names its sums.
+// The surface of a pixel's splats. `sums_of` names its sums: by the pixel in storage, or by a slot
+// of a tile's registers.
 fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
     var surface: Surface;
     surface.front = front;
@@ -45,7 +48,8 @@ fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
     return surface;
 }
 
-// The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.
+// Resolves the pixel (x, y) of the image, the `pixel`th of the band, from the sums that `sums_of`
+// names.
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
     let surface = joined(blended_at(sums_of, pixel, x, y), pixel, x, y - held_band.first_row);
@@ -71,7 +75,8 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     write_layers(out, 1u);
 }
 
-// The premultiplied colour of the sample in a column and row of the band, its `sample`th, from what `sums_of` names its sums.
+// The premultiplied colour of a sample, the `sample`th of the band, at column `x` and row `row` of
+// the band.
 fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
     let surface = joined(blended_at(sums_of, sample, x, row + held_band.first_row), sample, x, row);
     var color = held.background;

@@ -1,39 +1,46 @@
-// Stage 0 of scenes with levels of detail: the cut that is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1), branch by
-// branch of the tree, and in each level by level from its roots down. The nodes of a level that are come to are a stretch of `frontier`: they
-// are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
-// depends on tree and camera alone. The first levels, which are small, are one workgroup's. Pages of surfels are drawn from where what was chosen lies.
-// Of cuts that fade into each other (select_fades.wgsl) all are made at once.
+// Stage 0 of scenes with levels of detail: chooses the cut that is drawn in place of all surfels
+// (Pajarola 2003, section 5.1, step 1). The branches of the tree are processed one after the other,
+// and each branch level by level from its roots down. The nodes that are reached in a level are a
+// range of `frontier`. They are judged, each workgroup counts what its nodes leave, and prefix sums
+// of these counts say where each node writes what it leaves. So the order of the cut, too, depends
+// only on the tree and the camera. One workgroup does all of the first levels, which are small.
+// Pages then draw the chosen surfels and nodes from where they lie in the branch. Cuts that fade
+// into each other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x737976e37d84fa2b
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
-// Numbers of nodes that are come to, level after level, and what becomes of each. Numbers have a second half where cuts fade (select_fades.wgsl).
+// The indices of the reached nodes, level after level, and the fate of each. With fades, a second
+// half of `frontier` stores how many cuts reach each node (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
 @group(0) @binding(76) var<storage, read_write> fates: array<u32>;
-// For each invocation of a level: how many surfels and how many children are left by what those before it in its workgroup judge.
+// For each invocation of a level: how many surfels to draw and how many children the invocations
+// before it in its workgroup leave.
 @group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
-// Of each workgroup: how many of both its nodes leave; then where these start.
+// For each workgroup: how many of both its nodes leave; then where it starts to write them.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
-// The attributes of this branch, and from branch.chosen on how many of its surfels are drawn, its nodes' among them, and then which: no kernel
-// that draws them needs another buffer, of which core WebGPU has eight.
+// The attributes of this branch; then, from branch.chosen on, the number of chosen surfels and
+// nodes, and their indices. They share a buffer so that the kernels that draw them need no further
+// one: core WebGPU grants eight.
 @group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
-// By how many cuts the roots of branches are come to.
+// For each root of a branch: how many cuts reach it.
 @group(0) @binding(79) var<storage, read_write> reached: array<u32>;
-// The words below.
+// The state of the cut, by the words below; `selected` is the same buffer, read-only.
 @group(0) @binding(80) var<storage, read_write> selection: array<u32>;
 @group(0) @binding(81) var<storage, read> selected: array<u32>;
 
-// The stretch of the frontier that is the level in work, and the next one.
+// The range of `frontier` that is the current level, and that of the next one.
 const LEVEL: u32 = 0u;
 const LEVEL_END: u32 = 1u;
 const NEXT: u32 = 2u;
 const NEXT_END: u32 = 3u;
-// Grids with an invocation for JUDGED nodes each of the level that is judged, and of that which is spread.
+// Grids over the nodes of the level to judge and of the level to spread, with one invocation for
+// JUDGED nodes.
 const JUDGE_GRID: u32 = 4u;
 const SPREAD_GRID: u32 = 7u;
 
-// Surfels of a run: whole batches.
+// Surfels per run; a run is a number of whole batches.
 const RUN: u32 = 512u;
 
 // Kinds of nodes.
@@ -44,22 +51,26 @@ const LEAF: u32 = 1u;
 const OTHER_BRANCH: u32 = 2u;
 const PART_OF_LEAF: u32 = 3u;
 
-// Nodes that an invocation judges, one after the other: barriers are dear on processors, and one costs the same however many nodes there are.
+// Nodes that one invocation judges in sequence. Barriers are expensive on a CPU adapter, and one
+// costs the same for any number of nodes.
 const JUDGED: u32 = 8u;
 
-// What becomes of a node: in how many cuts, the first of those that come to it, it is divided; or nothing.
+// The fate of a node: how many of the cuts that reach it divide it (the finest ones), or UNSEEN.
 const UNSEEN: u32 = 0x7fu;
 const CUTS_MASK: u32 = 0x7fu;
-// Beside that: its children are drawn, all of them, and not judged.
+// A flag beside that number: all children of the node are drawn without being judged.
 const CHILDREN_DRAWN: u32 = 0x80u;
 
-// A node's size is that of the ball by which it is in sight, as seen in the middle of the image, not that of its ellipse's image.
+// If set, the size of a node is that of its bounding ball, as seen in the middle of the image; else
+// that of the image of its ellipse.
 override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
 
-// Room for the rounding of a ball's place and size, of its distance; of bounds of children's balls, which lie off by 2e-6 of that distance, as a child is
-// less than twice as far as its parent where both are past the near depth, and whose sizes err by six roundings of 6e-8; and of sines.
+// Margins for rounding. BALL_ROUNDING: of a ball's position and radius, relative to its distance.
+// SINE_SLACK: of sines. BOUND_SLACK: of bounds on the balls of children. Such a ball is off by 2e-6
+// of its parent's distance, because it is less than twice as far away if both are past the near
+// depth; and its size errs by six roundings of 6e-8.
 const BALL_ROUNDING: f32 = 1e-6;
 const BOUND_SLACK: f32 = 1e-4;
 const SINE_SLACK: f32 = 1e-5;
@@ -68,17 +79,20 @@ var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
 var<workgroup> eights: array<vec2<u32>, WORKGROUP / 8u>;
 var<workgroup> first_end: u32;
 
-// Which of those that are chosen has a place of the page. Neighbours in a cut are neighbours in the image, and what is in work at the same time
-// should not be: atomics would wait for each other (src/passes/order.rs).
+// Maps a place of the page to an entry of the list of chosen surfels. Neighbours in a cut are
+// neighbours in the image, but surfels that are processed at the same time should not be: their
+// atomics would contend (src/passes/order.rs).
 fn drawn_at(place: u32) -> u32 {
     let run = place / RUN;
-    // A page has fewer than 2^16 runs, so no product is past 2^32, and the quotient in f32 errs by less than 2^16 * 6 * 2^-24 < 1: the
-    // remainder is right, or one whole too small or too large. Processors divide integers one by one.
+    // A page has fewer than 2^16 runs, so no product exceeds 2^32, and the f32 quotient errs by
+    // less than 2^16 * 6 * 2^-24 < 1: the remainder is right, or too small or too large by one
+    // multiple of `runs`. CPU adapters divide integers one lane at a time, so this avoids integer
+    // division.
     let runs = max(page.runs, 1u);
     let product = run * page.stride;
     let rest = bitcast<i32>(product - u32(f32(product) / f32(runs)) * runs);
     let turn = bitcast<u32>(rest + select(0, i32(runs), rest < 0) - select(0, i32(runs), rest >= i32(runs)));
-    // What is left of the last run stays.
+    // The incomplete last run stays in place.
     return page.first + select(run, turn, run < page.runs) * RUN + place % RUN;
 }
 
@@ -86,20 +100,21 @@ fn places_held() -> u32 {
     return page.surfels;
 }
 
-// The surfel, or the node's, at a place of the page; any where the cut has ended.
+// The surfel or node at a place of the page; any index past the end of the cut.
 fn surfel_of(place: u32) -> u32 {
     return attributes[page.chosen + 1u + CHOSEN_WORDS * drawn_at(place)];
 }
 
-// Whether a place has a surfel of the cut.
+// Whether a place of the page has a surfel of the cut.
 fn is_filled(place: u32) -> bool {
     return drawn_at(place) < attributes[page.chosen];
 }
 
-// Which word of a surfel's attributes.
+// The word of a surfel's attributes that holds its rank.
 override NUMBER_WORD: u32;
 
-// The place of a surfel among all of the tree, its nodes after them; where it is asked for.
+// The rank of a surfel among all surfels of the tree; nodes have the ranks after them. Only present
+// where a render needs it.
 fn rank_of(index: u32) -> u32 {
     return attribute_word(index, NUMBER_WORD);
 }
@@ -108,8 +123,9 @@ fn kind_of(node: TreeNode) -> u32 {
     return node.below >> KIND_SHIFT;
 }
 
-// Whether it is never divided: one surfel is itself, with its lines and its cap, which are the node's too (src/scene/hierarchy.rs, `settle`; src/passes/source.rs); and where the surfels of
-// a part of a tree are not there, no picture comes to them.
+// Whether the node is never divided. A leaf of one surfel is drawn as that surfel: the node has its
+// ellipse, clip lines and cap (`settle` in src/scene/hierarchy.rs; src/passes/source.rs). A leaf of
+// no surfels stands for a subtree that was not loaded, because no picture reaches it.
 fn is_whole(node: TreeNode) -> bool {
     return kind_of(node) == LEAF && (node.below & COUNT_MASK) <= 1u;
 }
@@ -118,11 +134,13 @@ fn vector(parts: array<f32, 3>) -> vec3<f32> {
     return vec3<f32>(parts[0], parts[1], parts[2]);
 }
 
-// The sine by which its plane faces away from the eye, and that past which all below it does.
+// The sine of the angle by which the node's plane faces away from the eye, and the sine past which
+// everything below the node faces away.
 fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32) -> vec2<f32> {
     let normal = cross3(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
     let turned = dot3(ray_to(relative), normal * inverseSqrt(max(dot3(normal, normal), 1e-38)));
-    // Of the cone's angle and the ball's together, if they are less than a right angle; else nothing is told.
+    // The sine of the sum of the cone's angle and the ball's half-angle, if that is less than a
+    // right angle; else 1, which is never exceeded.
     let ball = ball_sine(radius, norm3(relative));
     let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
     let ball_cosine = sqrt(max(1.0 - ball * ball, 0.0));
@@ -130,14 +148,15 @@ fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32)
     return vec2<f32>(turned, select(1.0, cone * ball_cosine + node.cone * ball, narrow) + SINE_SLACK);
 }
 
-// Square pixels that a ball of this radius, device units, is seen as at a depth in the middle of the image.
+// The area, in square pixels of the image, of a ball of this radius (device units) that is seen at
+// `depth` in the middle of the image.
 fn seen_disk(depth: f32, radius: f32) -> f32 {
     let across = axis_image(vec3<f32>(0.0, 0.0, depth), vec3<f32>(radius, radius, 0.0)) * held.levels.yz;
     let longest = max(across.x, across.y);
     return PI * longest * longest;
 }
 
-// Square pixels of the image that a node is seen at.
+// The area that a node covers, in square pixels of the image.
 fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
     if (MEASURES_EXTENT) {
         return seen_disk(center.z, node.radius * held.unit);
@@ -147,26 +166,29 @@ fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
     return PI * abs(s.x * t.y - s.y * t.x);
 }
 
-// Whether the children of a node are drawn wherever it is divided, however they lie in the ball around it: all are in sight, past the near depth, and
-// in no cut is one divided. Of most nodes of a cut this is told.
+// Whether every cut that divides the node draws all its children, wherever they lie in its ball:
+// all are in view and past the near depth, and no cut divides any of them. This holds for most
+// nodes of a cut.
 fn draws_children(node: TreeNode, ball: Ball) -> bool {
     let radius = node.children * held.unit * (1.0 + BOUND_SLACK);
     let nearest = ball.nearest - BOUND_SLACK * norm3(ball.center);
     let past = nearest - radius - growth(ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
-    // A ball of a negative radius lies beside the image where that of the positive one is not wholly within.
+    // A ball of negative radius is beside the image unless that of the positive radius lies wholly
+    // within it.
     let within = !is_beside(ball.center, -ball.radius, 0.0);
     return node.children >= 0.0 && past && within && cuts_that_divide(seen_disk(nearest, radius)) == 0u;
 }
 
-// What becomes of a node whose centre leaves out `low`, world units.
+// The fate of a node. `low` is the part of its centre that f32 leaves out, world units.
 fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
-    // In its own branch it is judged, or the whole leaf was.
+    // A root of another branch is judged there, and a part of a leaf was judged with the whole
+    // leaf.
     if (kind_of(node) == OTHER_BRANCH || kind_of(node) == PART_OF_LEAF) {
         return ALL_CUTS;
     }
-    // Leading parts cancel, and what is left is as exact as the trailing ones.
+    // The leading parts cancel, so the result is as exact as the trailing parts.
     let relative = (vector(node.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
-    // Ten roundings of f32 in this length.
+    // This length has ten roundings of f32.
     let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * norm3(relative));
     if (ball.farthest < held.near || is_beside(ball.center, ball.radius, FILTER_REACH + 2.0)) {
         return UNSEEN;
@@ -177,28 +199,30 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         if (away.x > away.y) {
             return UNSEEN;
         }
-        // The plane of one that faces away is left out, whatever is below it.
+        // A plane that faces away would be culled, whatever is below it, so such a node is divided.
         faces = away.x <= 0.0;
     }
     let divided = reaches_near(ball) || !faces;
     let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, is_whole(node));
-    // By its own place and size alone nothing is told of a child's area, or of its side.
+    // Neither the image area of a child's ellipse nor its side follows from the node's own position
+    // and size.
     let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
     return cuts | select(0u, CHILDREN_DRAWN, unjudged);
 }
 
-// Of the cuts that come to a node, the number in which it is divided.
+// The number of cuts that divide the node, among those that reach it; or UNSEEN.
 fn cuts_of(fate: u32) -> u32 {
     return fate & CUTS_MASK;
 }
 
-// Whether what is below a node is drawn if it is divided: its surfels, or its children.
+// Whether dividing the node draws what is below it, its surfels or its children.
 fn is_last(node: TreeNode, fate: u32) -> bool {
     let kind = kind_of(node);
     return kind == LEAF || kind == PART_OF_LEAF || (kind == INNER && (fate & CHILDREN_DRAWN) != 0u);
 }
 
-// How many surfels and nodes are drawn of a node that so many cuts come to, and how many children it leaves for the next level.
+// How many surfels and nodes are drawn for a node that `reached_in` cuts reach, and how many
+// children it leaves for the next level.
 fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
     let cuts = cuts_of(fate);
     if (cuts == UNSEEN) {
@@ -209,7 +233,8 @@ fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
     return select(vec2<u32>(itself, below), vec2<u32>(itself + below, 0u), is_last(node, fate));
 }
 
-// The sum of the counts of the invocations before this one: in its own eight, and of those before. Few barriers, as each is dear on processors.
+// The sum of the counts of all invocations before this one in the workgroup: within its group of
+// eight, plus the groups before. It takes two barriers, because each is expensive on a CPU adapter.
 fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     counted[local] = counts;
     workgroupBarrier();
@@ -230,7 +255,7 @@ fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     return before;
 }
 
-// Invocations that judge so many nodes.
+// The number of invocations that judge so many nodes.
 fn judges_of(nodes: u32) -> u32 {
     return (nodes + JUDGED - 1u) / JUDGED;
 }
@@ -242,14 +267,14 @@ fn set_grid(at: u32, nodes: u32) {
     }
 }
 
-// What becomes of a node in so many cuts that come to it.
+// The fate of a node that `reached_in` cuts reach.
 fn judged(node: TreeNode, index: u32, reached_in: u32) -> u32 {
     let record = branch.surfels + index;
     let fate = fate_of(node, surfel_at(record), low_part(record));
     return select((fate & CHILDREN_DRAWN) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
 }
 
-// Judges the nodes of a stretch of the frontier, and returns how much they leave.
+// Judges the nodes of a range of the frontier, and returns how much they leave.
 fn judge_run(first: u32, end: u32) -> vec2<u32> {
     var counts = vec2<u32>(0u);
     for (var place = first; place < end; place++) {
@@ -263,7 +288,7 @@ fn judge_run(first: u32, end: u32) -> vec2<u32> {
     return counts;
 }
 
-// Writes what a node leaves from `start` on, and returns how much that is.
+// Writes what a node leaves, from `start` on, and returns how much that is.
 fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
     let cuts = cuts_of(fate);
     let node = tree_nodes[index];
@@ -288,7 +313,7 @@ fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32>
     return counts;
 }
 
-// Writes what they leave from `start` on.
+// Writes what the nodes of a range leave, from `start` on.
 fn spread_run(first: u32, end: u32, start: vec2<u32>) {
     var at = start;
     for (var place = first; place < end; place++) {
@@ -296,7 +321,7 @@ fn spread_run(first: u32, end: u32, start: vec2<u32>) {
     }
 }
 
-// The roots of a branch that are come to are its first level; how many they are.
+// Makes the reached roots of a branch its first level, and returns their number.
 fn reach_roots() -> u32 {
     var end = 0u;
     for (var root = 0u; root < branch.roots; root++) {
@@ -313,7 +338,7 @@ fn reach_roots() -> u32 {
     return end;
 }
 
-// One workgroup: roots, and the levels that are small.
+// One workgroup: reaches the roots, and processes the small levels.
 @compute @workgroup_size(WORKGROUP)
 fn select_top(@builtin(local_invocation_index) local: u32) {
     hold_view();
@@ -333,7 +358,7 @@ fn select_top(@builtin(local_invocation_index) local: u32) {
         for (var k = 0u; k < WORKGROUP / 8u; k++) {
             start += eights[k];
         }
-        // What was spread is seen by all, and all have seen the sums.
+        // All invocations now see what was spread, and all have read the sums.
         storageBarrier();
         workgroupBarrier();
     }
@@ -345,7 +370,7 @@ fn select_top(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// One invocation for JUDGED nodes of the next level that follow each other.
+// Judges the next level. One invocation for JUDGED consecutive nodes.
 @compute @workgroup_size(WORKGROUP)
 fn select_judge(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -366,7 +391,8 @@ fn select_judge(
     }
 }
 
-// One workgroup: where the surfels and the children of each workgroup start, and the level after this one.
+// One workgroup: turns the counts of workgroups into the places where they write their surfels and
+// children, and moves LEVEL and NEXT on by one level.
 @compute @workgroup_size(WORKGROUP)
 fn select_sum(@builtin(local_invocation_index) local: u32) {
     let first = selection[NEXT];
@@ -386,7 +412,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
         group_counts[group] = start;
         start += counts;
     }
-    // All have read the old words before the barriers above.
+    // All invocations have read the old words before the barriers above.
     if (local == WORKGROUP - 1u) {
         let all = before + own;
         selection[LEVEL] = first;
@@ -399,7 +425,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// One invocation for JUDGED nodes of the level that was judged.
+// Spreads the level that was judged. One invocation for JUDGED consecutive nodes.
 @compute @workgroup_size(WORKGROUP)
 fn select_spread(
     @builtin(workgroup_id) workgroup: vec3<u32>,

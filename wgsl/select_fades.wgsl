@@ -1,9 +1,10 @@
-// Cuts that fade into each other (src/scene/fade.rs): what is come to is in the first so many of them, which the second half of the frontier says,
-// and what is chosen in those of its fade, which follows its number. Same interface as select_fades_absent.wgsl.
+// Cuts that fade into each other (src/scene/fade.rs), numbered from the finest. The second half of
+// `frontier` stores how many cuts, the first ones, reach a node. Each chosen surfel or node has a
+// second word: the range of the cuts that draw it. Same interface as select_fades_absent.wgsl.
 
 const ALL_CUTS: u32 = 64u;
 
-// Words of what is chosen.
+// Words of a chosen surfel or node.
 const CHOSEN_WORDS: u32 = 2u;
 
 fn cuts_that_reach(place: u32) -> u32 {
@@ -14,7 +15,8 @@ fn set_cuts_that_reach(place: u32, cuts: u32) {
     frontier[arrayLength(&frontier) / 2u + place] = cuts;
 }
 
-// In how many cuts, the first ones, a node that is seen so large is divided: their sizes are evenly far from each other, from half of the largest on.
+// The number of cuts, the first ones, that divide a node of this size. The sizes of the cuts are
+// evenly spaced, from half of the largest on.
 fn cuts_that_divide(size: f32) -> u32 {
     let steps = f32(ALL_CUTS);
     return u32(clamp(floor(steps * (2.0 * (size / held.levels.x) - 1.0) + 1.0), 0.0, steps));

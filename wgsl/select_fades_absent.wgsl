@@ -1,4 +1,4 @@
-// One cut. Same interface as select_fades.wgsl.
+// A single cut. Same interface as select_fades.wgsl.
 
 const ALL_CUTS: u32 = 1u;
 

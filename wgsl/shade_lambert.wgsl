@@ -1,8 +1,10 @@
-// color * sum of intensity * cosine over the lights. The headlight lights both sides of a surface, n . toward_eye in
-// absolute value; a directional light the side its normal is on. Twin: src/passes/resolve.rs.
+// color * sum of intensity * cosine over the lights. The headlight lights both sides of a surface,
+// with |n . toward_eye|; a directional light lights the side of the normal.
+// Twin: src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x12ab3e35b8fc6bc0
 
-// A constant, as some drivers compile a kernel whose loops end by a uniform again for every frame (Mesa's lavapipe).
+// A constant, because some drivers (Mesa's lavapipe) recompile a kernel for every frame if a
+// uniform ends one of its loops.
 override LIGHTS: u32;
 
 fn shade(color: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {

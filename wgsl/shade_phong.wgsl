@@ -1,12 +1,13 @@
-// Lambert's term as in shade_lambert.wgsl, and beside it white highlights where the eye is near a light's mirrored
-// direction r = 2 (n . l) n - l: sum of intensity * (n . l) * max(0, r . v)^SHININESS. Twin: src/passes/resolve.rs.
+// Lambert's term as in shade_lambert.wgsl, plus white highlights where the eye is near a light's
+// mirrored direction r = 2 (n . l) n - l: sum of intensity * (n . l) * max(0, r . v)^SHININESS.
+// Twin: src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xd91a88a63674e85e
 
 override SHININESS: f32;
-// As in shade_lambert.wgsl.
+// A constant for the reason in shade_lambert.wgsl.
 override LIGHTS: u32;
 
-// HIGHLIGHT of src/scene/options.rs.
+// HIGHLIGHT in src/scene/options.rs.
 const HIGHLIGHT: f32 = 0.3;
 
 fn shade(color: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {

@@ -1,4 +1,5 @@
-// How far a point comes before its plane, in radii, at a squared distance from its axis: a square or a circle is flat.
+// Squares and circles, which are flat. `rise` is how far a point's surface lies in front of its
+// plane, in radii, at a squared distance from its axis.
 
 fn rise(rho2: f32) -> f32 {
     return 0.0;

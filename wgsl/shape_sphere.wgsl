@@ -1,4 +1,4 @@
-// Same interface as shape_flat.wgsl.
+// A sphere. Same interface as shape_flat.wgsl.
 
 fn rise(rho2: f32) -> f32 {
     return sqrt(max(1.0 - rho2, 0.0));

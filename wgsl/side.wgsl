@@ -1,14 +1,15 @@
-// A pixel shows one side of a surface: that of its nearest fragment. What lies within epsilon behind it and faces the other way, at
-// an outline or in a thin part, is left out.
+// A pixel shows one side of a surface: that of its nearest fragment. Fragments within epsilon
+// behind it that show the other side, at an outline or in a thin part, are left out.
 // Twin: src/passes/accumulate.rs.
 
-// The last bit of a depth says on which side it is, so that the nearest depth says which side is nearest. Only where surfels have
-// sides, and both may be seen.
+// Whether the last bit of a depth stores the fragment's side, so that the nearest depth tells which
+// side is nearest. Set only if surfels have sides and both may be visible.
 override SIDES: bool;
 
 const SIDE_BIT: u32 = 1u;
 
-// Off by one unit in the last place at most. Of two depths that differ in this bit alone, the front's is nearer.
+// Stores the side in the last bit of a depth, which moves it by at most one unit in the last place.
+// Of two depths that differ in this bit alone, the front's is nearer.
 fn sided(depth: f32, away: bool) -> f32 {
     let bits = (bitcast<u32>(depth) & ~SIDE_BIT) | select(0u, SIDE_BIT, away);
     return select(depth, bitcast<f32>(bits), SIDES);
@@ -24,7 +25,7 @@ fn is_shown(fragment: Fragment, front: f32, radius: f32, pixel: vec2<u32>) -> bo
         && meets_front(fragment.depth, front, radius, image);
 }
 
-// -1 where a back is seen.
+// -1 if the back is visible, else 1.
 fn side_of(front: f32) -> f32 {
     return select(1.0, -1.0, SIDES && (bitcast<u32>(front) & SIDE_BIT) != 0u);
 }

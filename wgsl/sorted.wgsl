@@ -1,7 +1,8 @@
-// Stage 4: every fragment of a pixel by itself, from front to back. Twin: src/passes/sorted.rs.
+// Stage 4: composites every fragment of a pixel by itself, from front to back.
+// Twin: src/passes/sorted.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x296fe3b00e53d0eb
 
-// Rules in the twin.
+// The fields of Rules in the twin.
 override MOST_ALPHA: f32;
 override LEAST_SHOWN: f32;
 override LEAVES_LAST: bool;

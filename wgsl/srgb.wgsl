@@ -1,4 +1,4 @@
-// Decodes 8-bit sRGB by the host's table (src/scene/color.rs).
+// Decodes 8-bit sRGB with a table from the host (src/scene/color.rs).
 
 @group(0) @binding(12) var<uniform> srgb_to_linear: array<vec4<f32>, 64>;
 
@@ -6,7 +6,7 @@ fn linear_of(code: u32) -> f32 {
     return srgb_to_linear[code / 4u][code % 4u];
 }
 
-// Linear RGB premultiplied by alpha, and alpha, of four bytes of sRGB and straight alpha.
+// Decodes four bytes of sRGB and straight alpha to linear RGB premultiplied by alpha, and alpha.
 fn premultiplied_of(code: u32) -> vec4<f32> {
     let alpha = f32(code >> 24u) / 255.0;
     let linear = vec3<f32>(

@@ -1,15 +1,16 @@
-// The terms of the accumulator `fixed` for scenes in which they may be small (SceneNeeds::wide_sums): 40 to 56
-// fractional bits (wide_bits in src/plan/accumulator.rs).
+// The terms of the accumulator `fixed` for scenes in which terms may be small
+// (SceneNeeds::wide_sums): 40 to 56 fractional bits (wide_bits in src/plan/accumulator.rs). Same
+// interface as terms.wgsl.
 // Error bound: src/passes/accumulate.rs.
 
-// Their units as f32: a product is rounded once, as f32 sums would, and no more.
+// A term in units of the sums, as f32: a product is rounded once, as in f32 sums, and not again.
 alias Term = f32;
 const COUNT_ONE: Term = 1.0;
 
-// The units of a weight of 1, a power of two.
+// The value of a weight of 1, in units of the sums: a power of two.
 override ONE: f32;
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return weight / ONE;
 }
@@ -20,7 +21,8 @@ fn quantise(weight: f32) -> Term {
     return weight * ONE;
 }
 
-// A term's low and high word. Exact: both are whole bits of one f32, but for what lies below the unit.
+// The low and high word of a term. Both are exact, as consecutive bits of one f32, except for what
+// lies below one unit.
 fn term_words(value: Term) -> vec2<u32> {
     let whole = floor(value / WORD);
     return vec2<u32>(u32(value - whole * WORD), u32(whole));

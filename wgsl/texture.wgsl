@@ -1,18 +1,19 @@
-// Surfels that are painted by textures: what is summed of their places in them, and the lookup (textures.wgsl) at the mean of these.
+// Textured surfels: the sums of their texture coordinates, and the lookup at the mean coordinates
+// of a pixel (textures.wgsl). Same interface as texture_absent.wgsl.
 // Twin: src/scene/texture.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x72c5d58f37fbc572
 
 override PLACE_CHANNEL: u32;
 
-// Texture coordinates are in units of their range.
+// Texture coordinates, in units of their range.
 struct Place {
-    // Of the surfel's centre, mapped to [0, 1].
+    // The coordinates of the surfel's centre, mapped to [0, 1].
     center: vec2<f32>,
-    // Mapped to [0, 1] from its own range.
+    // The squared reach, mapped to [0, 1] from its own range.
     reach_2: f32,
-    // The centre itself, relative to the eye, device units.
+    // The position of the centre relative to the eye, device units.
     position: vec3<f32>,
-    // What the coordinates gain for a world unit along each axis.
+    // The change of u and of v per world unit along each axis.
     u_slope: vec3<f32>,
     v_slope: vec3<f32>,
 }
@@ -22,34 +23,36 @@ fn place_of(index: u32) -> Place {
     let at = color_part(index, 1u);
     let u_slope = color_part(index, 2u);
     let v_slope = color_part(index, 3u);
-    // What the f32 centre leaves out comes last in each.
+    // The parts of the centre that f32 leaves out are the last entries of the rows.
     let low = vec3<f32>(at.w, u_slope.w, v_slope.w);
     let position = (vec3<f32>(center[0], center[1], center[2]) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
     return Place(at.xy, at.z, position, u_slope.xyz, v_slope.xyz);
 }
 
-// A fragment of the image's pixel `at`, whose sums are `pixel`.
+// Adds a fragment at the pixel `at` of the image to the sums of `pixel`.
 fn accumulate_place(pixel: u32, weight: Term, place: Place, at: vec2<u32>, depth: f32) {
     let point = seen_at(at.x, at.y, depth);
     let step = (point - place.position) * held.world;
     let seen = place.center + vec2<f32>(dot3(step, place.u_slope), dot3(step, place.v_slope));
     let offset = seen - 0.5;
     add_pair(pixel, PLACE_CHANNEL, term(weight, seen.x), term(weight, seen.y));
-    // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.
+    // For coordinates in [0, 1] the squared distance from the middle is at most 1/2.
     add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot2(offset, offset)), term(weight, place.reach_2));
-    // Of the whole texture what a pixel covers; with slopes for a device unit, so that no square overflows.
+    // The part of the whole texture that a pixel covers. The slopes are converted to device units,
+    // so that no square overflows.
     let area = cross3(place.u_slope * held.world, place.v_slope * held.world);
     let covered_part = area_in_pixel(area, point, depth) * held.place.z * held.place.z;
     add(pixel, PLACE_CHANNEL + 4u, term(weight, covered_part));
 }
 
-// Of a pixel of the band, whose sums are stored.
+// Adds a fragment at a pixel of the band, whose sums are in storage.
 fn accumulate_stored_place(pixel: u32, weight: Term, place: Place, depth: f32) {
     let at = vec2<u32>(pixel % held.width, pixel / held.width + held_band.first_row);
     accumulate_place(pixel, weight, place, at, depth);
 }
 
-// The column and row of the texture that a place of their plane lies in. Twin: src/scene/atlas.rs.
+// The cell (column, row) in which a point of the textures' common plane lies.
+// Twin: src/scene/atlas.rs.
 fn cell_of(place: vec2<f32>) -> vec2<f32> {
     return clamp(floor((place - held.atlas.xy) / held.atlas.z), vec2<f32>(0.0), vec2<f32>(held.atlas.w - 1.0));
 }
@@ -61,7 +64,8 @@ fn mean_place(pixel: u32, weight: f32) -> vec2<f32> {
     return place - cell_of(place) * held.atlas.z;
 }
 
-// The premultiplied colour of a pixel: by the texture where the places agree and have one, else as blended.
+// The premultiplied colour of a pixel: from the texture if the fragments' coordinates agree and lie
+// in a texture, else the blended colour.
 fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     var mean: vec4<f32>;
     for (var k = 0u; k < 4u; k++) {

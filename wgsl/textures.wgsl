@@ -1,17 +1,19 @@
-// Textures at all scales, looked up as a pixel sees them that covers so many of their texels. Twin: src/scene/mipmap.rs.
+// Mipmapped textures: the lookup for a pixel that covers a part of a texture.
+// Twin: src/scene/mipmap.rs.
 
-// Where each texture's head is, those of surfels first and then those of triangles; a head has the number of its levels, and of each its width, its
-// height and where its texels are: rows from the top, four bytes of sRGB and straight alpha each.
+// Where the header of each texture starts, those of surfels before those of triangles; then headers
+// and texels. A header has the number of levels and, for each, its width, its height and where its
+// texels start: rows from the top, four bytes of sRGB and straight alpha per texel.
 @group(0) @binding(65) var<storage, read> textures: array<u32>;
 
 struct Level {
     size: vec2<i32>,
     texels: u32,
-    // Beyond [0, 1] the edges go on; else the image is repeated.
+    // Whether coordinates outside [0, 1] take the edge texels; otherwise the image repeats.
     clamps: bool,
 }
 
-// Beside a width.
+// The flag for clamped edges, in the highest bit of a width.
 const CLAMPS: u32 = 0x80000000u;
 
 fn level_at(head: u32, level: u32) -> Level {
@@ -27,8 +29,8 @@ fn level_texel(level: Level, column: i32, row: i32) -> vec4<f32> {
     return premultiplied_of(textures[level.texels + u32(at.y * level.size.x + at.x)]);
 }
 
-// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated
-// or clamped; origin bottom left.
+// The bilinear colour at `place`, origin bottom left: premultiplied, linear. Outside [0, 1] the
+// image repeats, or takes its edge texels.
 fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
     let turns = vec2<f32>(place.x, 1.0 - place.y);
     let within = select(fract(turns), clamp(turns, vec2<f32>(0.0), vec2<f32>(1.0)), level.clamps);
@@ -42,7 +44,8 @@ fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
     return between(above, below, share.y);
 }
 
-// Of a texture by its number, where a pixel covers a `part` of it: between the two levels whose texels are the next smaller and larger ones.
+// The colour of texture `number` at `place`, for a pixel that covers a `part` of the whole texture:
+// interpolated between the two levels with the next smaller and larger texels.
 fn seen_texture(number: u32, place: vec2<f32>, part: f32) -> vec4<f32> {
     let head = textures[number];
     let whole = level_at(head, 0u);

@@ -4,7 +4,7 @@ fn place_of_sums(sums_of: u32, weight: f32) -> vec2<f32> {
     return mean_place(sums_of, weight);
 }
 
-// The depth in device units.
+// `depth` is in device units.
 fn write_texz(out: u32, place: vec2<f32>, depth: f32) {
     image[out + TEXZ_IMAGE] = place.x;
     image[out + TEXZ_IMAGE + 1u] = place.y;

@@ -1,15 +1,17 @@
-// Stages 2 to 4 by tiles of the image, whose lists bin.wgsl made. An invocation keeps a column of a tile's pixels in registers,
-// eight of them a tile. Where a splat's fetch costs as much as its pixels, tiles are twice as high as wide; their upper and lower
-// eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
-// and accumulate.wgsl.
+// Stages 2 to 4 by tiles of the image, from the lists that bin.wgsl made. Each tile has eight
+// invocations, and each of them keeps one column of the tile's pixels in registers. Where fetching
+// a splat costs as much as drawing its pixels, tiles are twice as high as wide; the upper and the
+// lower eight rows are then drawn separately, each with the splats that reach them. Every bit of
+// the result is that of visibility.wgsl and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0x123395bc59143c44
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
 
-// The pixels of this invocation, from (x, y) down; `pixel` is the first one's place in the band. Those past the image's edge
-// have nothing. `large` and `small`: where its tile's lists start and end.
+// The pixels of this invocation, from (x, y) down. `pixel` is the index of the first one in the
+// band, `pixels` their number without those past the edge of the image. `large` and `small` say
+// where the lists of its tile start and end.
 struct Column {
     x: u32,
     y: u32,
@@ -19,8 +21,8 @@ struct Column {
     small: vec2<u32>,
 }
 
-// The column that is the invocation's of eight tiles, which are each eight invocations'; of a number that is no tile one without
-// pixels.
+// The column of `tile` that invocation `local` draws: a workgroup has eight tiles, of eight
+// invocations each. A number that is no tile gives a column without pixels.
 fn column_of(tile: u32, local: u32) -> Column {
     let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
     let row = tile / tiles_across() * TILE_ROWS;
@@ -35,18 +37,19 @@ fn column_of(tile: u32, local: u32) -> Column {
     return column;
 }
 
-// This invocation's column where every eight invocations have a tile of their own.
+// The column of this invocation in a dispatch over all tiles.
 fn column_of_all(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> Column {
     return column_of(linear_index(workgroup, workgroups, local) / TILE_WIDTH, local);
 }
 
-// What this invocation fetched.
+// The splat that this invocation has fetched.
 var<private> own_surfel: u32;
 var<private> own_splat: Splat;
 var<private> own_filter: Filter;
 
-// Fetches of the first `listed` splats, of which the large come first, those from `place` on; a bit for each that could have a
-// fragment no deeper than `deepest`, of the tile's upper and lower half.
+// Fetches the splats from `place` on, of a list of `listed` in which the large ones come first.
+// Returns, for the upper and the lower half of the tile, a bit for each fetched splat that may have
+// a fragment no deeper than `deepest`.
 fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u32> {
     let at = place + fetcher();
     let large = column.large.y - column.large.x;
@@ -84,13 +87,13 @@ fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
     );
 }
 
-// The splat that a footprint is made of. A constructor names every field, so that none is
+// The parts of a splat that the footprint needs. A constructor names every field, so that none is
 // forgotten.
 fn handed_splat(from_: u32) -> Splat {
     return Splat(
         bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_)),
         bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_y), from_)),
-        // The fetcher alone looks at bounds, in reaches().
+        // Only the invocation that fetched the splat looks at its bounds, in reaches().
         0u,
         handed_side(own_splat.bounds_last, from_),
         handed_row(own_splat.a, from_),
@@ -119,7 +122,7 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     );
 }
 
-// Four pixels, from row `y` down.
+// The nearest depths of the four pixels from row `y` down, with the splat's fragments.
 fn nearer(front: vec4<f32>, splat: Splat, filter_: Filter, x: u32, y: u32) -> vec4<f32> {
     var nearest_ = front;
     for (var k = 0u; k < 4u; k++) {
@@ -135,7 +138,8 @@ fn farthest_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     return farthest_in_tile(max(max(m.x, m.y), max(m.z, m.w)));
 }
 
-// The nearest depths of four pixels from the column's `first` on. Those past its end are as near as can be.
+// The nearest depths of four pixels, from the column's `first` on. Those past its end are 0, the
+// nearest possible depth.
 fn load(column: Column, first: u32) -> vec4<f32> {
     var depths = vec4<f32>(0.0);
     for (var k = 0u; k < 4u; k++) {
@@ -196,7 +200,8 @@ fn tile_visibility(
     store(column, 12u, d);
 }
 
-// A pixel without anything is 0, which no fragment is within epsilon of.
+// The nearest depth at pixel `k` of the column; 0, in front of every fragment, if the pixel is
+// empty or past the end of the column.
 fn front_of(column: Column, k: u32) -> f32 {
     if (k >= column.pixels) {
         return 0.0;
@@ -211,7 +216,8 @@ fn fronts_of(column: Column, k: u32) -> vec4<f32> {
 
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
-    // Selected, as a branch would select what is stored of each sum.
+    // A rejected fragment adds a weight of 0. With a branch, a compiler would select each stored
+    // sum instead.
     let at = vec2<u32>(column.x, column.y + slot);
     let accepted = is_shown(fragment, front, attributes.radius, at);
     let weight = select(Term(0), weight_of(fragment), accepted);
@@ -221,8 +227,8 @@ fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, fron
     blend_weighted(slot, weight, depth, front, normal, attributes);
 }
 
-// The column's pixels from `slot` on, four with each of `a` and `b`. Written out, so that no register is indexed by a number
-// that only the device knows.
+// Sums the fragments of a splat at eight pixels of the column, from `slot` on; `a` and `b` have
+// their nearest depths. Written out, so that no register is indexed by a run-time value.
 fn gather_eight(slot: u32, next: u32, own_attributes: Attributes, a: vec4<f32>, b: vec4<f32>, column: Column) {
     let splat = handed_splat(next);
     let filter_ = handed_filter(own_filter, next);
@@ -237,7 +243,7 @@ fn gather_eight(slot: u32, next: u32, own_attributes: Attributes, a: vec4<f32>, 
     gather(slot + 7u, splat, filter_, attributes, b.w, column);
 }
 
-// Sums the fragments of the tile's splats in registers.
+// Sums the fragments of all splats of the tile, in registers.
 fn sum_tile(column: Column) {
     let a = fronts_of(column, 0u);
     let b = fronts_of(column, 4u);
@@ -261,7 +267,7 @@ fn sum_tile(column: Column) {
     }
 }
 
-// Adds what the splats of this page and of some sizes sum to.
+// Adds the sums of the listed splats of this page to those in storage.
 @compute @workgroup_size(WORKGROUP)
 fn tile_accumulate(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -281,7 +287,8 @@ fn tile_accumulate(
     }
 }
 
-// Where the tiles have all splats there are, their sums need not be stored; those that nothing covers are not looked at.
+// Sums and resolves at once, without storing the sums, where the lists have all splats. Runs over
+// covered tiles only.
 @compute @workgroup_size(WORKGROUP)
 fn tile_resolve(
     @builtin(workgroup_id) workgroup: vec3<u32>,

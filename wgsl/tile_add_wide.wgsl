@@ -1,5 +1,6 @@
-// The sums of accumulator_fixed_wide.wgsl, bit for bit, of the pixels of an invocation of tile.wgsl: in registers, and
-// added to those in storage at the end, if they are stored. `pixel` is which of them.
+// The sums of accumulator_fixed_wide.wgsl, bit for bit, in the registers of a tile (tile.wgsl).
+// They are added to the sums in storage at the end, if those exist. `pixel` is the pixel's slot in
+// the column. Same interface as tile_add.wgsl.
 
 @group(0) @binding(8) var<storage, read_write> sums: array<u32>;
 

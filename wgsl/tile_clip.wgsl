@@ -1,4 +1,4 @@
-// The lines of a clipped disk in tiles: of a splat that another invocation fetched (tile.wgsl).
+// Clipped disks in tiles: the clip lines of a splat that another invocation fetched (tile.wgsl).
 
 fn handed_clip(own: Clip, from_: u32) -> Clip {
     let turn = handed_vector(vec3<f32>(own.turn, 0.0), from_).xy;

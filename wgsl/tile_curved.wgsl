@@ -1,7 +1,8 @@
-// Caps in tiles: of a splat that another invocation fetched (tile.wgsl).
+// Caps in tiles: the cap of a splat that another invocation fetched (tile.wgsl). Same interface as
+// tile_flat.wgsl.
 
-// bounds_last, whose AWAY bit softened() reads wherever there is a low-pass; without one sides are
-// those of the roots.
+// bounds_last, whose AWAY bit softened() reads if there is a low-pass. Without one the root of the
+// intersection tells the side.
 fn handed_side(own: u32, from_: u32) -> u32 {
     var last = 0u;
     if (FILTERED) {
@@ -16,7 +17,7 @@ fn handed_cap(own: Cap, from_: u32) -> Cap {
         handed_number(own.spread, from_),
         handed_number(own.radius, from_),
         handed_number(own.depth, from_),
-        // Asked for by the one that fetched it alone.
+        // Only the invocation that fetched the splat reads `nearest`.
         0.0,
     );
 }
@@ -27,9 +28,9 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
 
 // Whether the splat has no fragment at `pixels`, which lie in its bounds. A ray meets the plane of
 // a height h over the disk's plane where (u, v) (D_w + spread W) = (U, V) D_w - W (D_u, D_v) + h N,
-// N = (D_u, D_v) + spread (U, V): both sides are affine in the pixel. The cap lies between its
-// least and its largest height, so the side at the middle of these is off by half their difference
-// times N at most.
+// with N = (D_u, D_v) + spread (U, V); both sides are affine in the pixel. The cap lies between its
+// least and its largest height, so the right side at their mean is off by at most half their
+// difference times N.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
@@ -49,14 +50,14 @@ fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
         low,
         high,
     );
-    // These rows are differences, which round by the products' magnitudes.
+    // These rows are differences, which round relative to the magnitude of the products.
     let most = max(abs(low), abs(high));
     let size = abs(x) * most.x + abs(y) * most.y + abs(rest);
     let sideways = abs(along.x) + abs(along.y);
     at.slack += 4e-6 * (size.x + size.y) * (abs(along.z) + abs(middle) * spread)
         + 4e-6 * sideways * (size.z + abs(middle));
-    // Where a ray touches the cap its root is exact to the root of f32's precision: a thousandth is
-    // left for that.
+    // Where a ray touches the cap, its root is exact only to the square root of f32's precision: a
+    // margin of a thousandth covers that.
     return exceeds(at, 1.001 * (longest(scale) + 0.5 * (heights.y - heights.x) * longest(turn)))
         && filter_misses(filter_, low, high);
 }

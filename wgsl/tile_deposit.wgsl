@@ -1,4 +1,4 @@
-// Stored sums of two words each, low and high.
+// Stored sums of two words each, low and high. Same interface as tile_deposit_pairs.wgsl.
 
 fn deposit_one(word: u32, value: vec2<u32>) {
     let sum = sum_words(vec2<u32>(sums[word], sums[word + 1u]), value);

@@ -1,5 +1,5 @@
-// Stored sums as accumulator_fixed_pairs.wgsl has them: the low words of two sums in a u64, and in the next what wrapped of
-// each; the second sum also counts what wrapped of the first.
+// Stored sums in the layout of accumulator_fixed_pairs.wgsl: one u64 has the low words of two sums,
+// the next one counts the carries of each. The second sum also includes the carries of the first.
 
 fn deposit_sums(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>) {
     let word = 2u * (pixel * CHANNELS + channel);

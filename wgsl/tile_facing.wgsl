@@ -1,4 +1,4 @@
-// Points that face the camera in tiles. Same interface as tile_flat.wgsl.
+// Points that face the camera, in tiles. Same interface as tile_flat.wgsl.
 
 // Points have no sides.
 fn handed_side(own: u32, from_: u32) -> u32 {
@@ -13,7 +13,8 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
     return own;
 }
 
-// Whether the splat has no fragment at `pixels`, which lie in its bounds: of a few pixels that is not looked at.
+// Whether the splat has no fragment at `pixels`, which lie in its bounds. Points are not tested, as
+// the test would save only a few pixels.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     return false;
 }

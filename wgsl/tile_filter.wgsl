@@ -1,4 +1,5 @@
-// The low-pass in tiles: of a splat that another invocation fetched (tile.wgsl), and where it adds nothing (tile_reach.wgsl).
+// The low-pass in tiles: the filter of a splat that another invocation fetched (tile.wgsl), and the
+// pixels where it adds nothing (tile_reach.wgsl).
 
 fn handed_filter(own: Filter, from_: u32) -> Filter {
     return Filter(
@@ -13,7 +14,7 @@ fn handed_filter(own: Filter, from_: u32) -> Filter {
     );
 }
 
-// Whether the filter adds no fragment between the pixels `low` and `high`, relative to the anchor's.
+// Whether the filter adds no fragment between the pixels `low` and `high`, relative to the anchor.
 fn filter_misses(filter_: Filter, low: vec2<f32>, high: vec2<f32>) -> bool {
     let center = vec2<f32>(filter_.center_x, filter_.center_y);
     let across = vec2<f32>(filter_.r_xx, 0.0);

@@ -1,6 +1,6 @@
 // Disks in tiles. Same interface as tile_curved.wgsl.
 
-// bounds_last, whose AWAY bit is_away reads where a pixel shows one side.
+// bounds_last, whose AWAY bit is_away() reads if a pixel shows one side.
 fn handed_side(own: u32, from_: u32) -> u32 {
     var last = 0u;
     if (SIDES) {
@@ -17,7 +17,8 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
     return own;
 }
 
-// Whether the splat has no fragment at `pixels`, which lie in its bounds: its ellipse can leave out their corners.
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: its ellipse may miss the
+// corners of these.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));

@@ -1,4 +1,5 @@
-// The pixels, or samples, of a tile's column, where inputs are kept apart. Same interface as tile_pixels.wgsl.
+// The pixels or samples of a tile's column, for pictures whose inputs are kept separate. Same
+// interface as tile_pixels.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0x2644c463de12ae18
 
 fn resolve_column(column: Column, local: u32) {

@@ -1,4 +1,4 @@
-// The pixels of a tile's column, where each has one sample. Same interface as tile_samples.wgsl.
+// The pixels of a tile's column, with one sample per pixel. Same interface as tile_samples.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0x580a95c3715cde77
 
 fn resolve_column(column: Column, local: u32) {

@@ -1,4 +1,4 @@
-// Tiles of surfels that no texture paints. Same interface as tile_texture.wgsl.
+// Tiles of surfels without textures. Same interface as tile_texture.wgsl.
 
 const MOST_CHANNELS: u32 = 12u;
 

@@ -1,11 +1,13 @@
-// Which rows of a tile a splat can have fragments in: conservative, so that no image depends on it.
+// Which rows of a tile a splat may have fragments in. The tests are conservative, so no image
+// depends on them.
 
-// An affine map at the middle of a rectangle of pixels, and what it changes by toward the right and the lower edge.
+// An affine map over a rectangle of pixels: its value at the middle, and its changes toward the
+// right and the lower edge.
 struct Span {
     middle: vec2<f32>,
     right: vec2<f32>,
     down: vec2<f32>,
-    // Bounds its rounding at any of the pixels.
+    // A bound on its rounding at any of the pixels.
     slack: f32,
 }
 
@@ -17,26 +19,27 @@ fn span(x: vec2<f32>, y: vec2<f32>, rest: vec2<f32>, low: vec2<f32>, high: vec2<
     return Span(x * middle.x + y * middle.y + rest, x * half.x, y * half.y, 4e-6 * (magnitude.x + magnitude.y));
 }
 
-// The longer of the ways from the middle to two corners: no value is farther from that of the
-// middle, as the map is affine.
+// The largest distance of a value of the map from its value at the middle: the map is affine, so it
+// occurs at a corner.
 fn half_width(s: Span) -> f32 {
     let one = s.right + s.down;
     let other = s.right - s.down;
     return s.slack + sqrt(max(dot2(one, one), dot2(other, other)));
 }
 
-// No value of the map is longer.
+// An upper bound on the length of the map's values.
 fn longest(s: Span) -> f32 {
     return (sqrt(dot2(s.middle, s.middle)) + half_width(s)) * (1.0 + 2e-6);
 }
 
-// Whether the map's values are nowhere as short as `length`.
+// Whether all values of the map are longer than `length`.
 fn exceeds(s: Span, length: f32) -> bool {
     let shortest = length + half_width(s);
     return dot2(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
 }
 
-// Of eight rows of the tile from `row` on: whether the splat could have a fragment there no deeper than `deepest`.
+// Whether the splat may have a fragment no deeper than `deepest` in the eight rows of the tile from
+// `row` on.
 fn reaches(splat: Splat, filter_: Filter, column: Column, row: u32, deepest: f32) -> bool {
     let extent = reach(splat);
     let first = vec2<u32>(column.x / TILE_WIDTH * TILE_WIDTH, column.y + row);

@@ -1,5 +1,5 @@
-// The samples of a tile's column, which belong to pixels with those of the columns beside it: added in the order of
-// resolve_samples.wgsl.
+// The samples of a tile's column. A pixel also has samples in the columns beside it; all are added
+// in the order of resolve_samples.wgsl. Same interface as tile_pixels.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0xe8f9843fa8bb0301
 
 var<workgroup> of_column: array<vec4<f32>, WORKGROUP>;

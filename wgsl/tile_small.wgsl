@@ -1,8 +1,9 @@
-// Where tiles have the small splats too: their lists, a cell a tile.
+// Lists of small splats, one per tile, where tiles draw these too. Same interface as
+// tile_small_absent.wgsl.
 
 @group(0) @binding(28) var<storage, read> small_lists: array<u32>;
 
-// Where the list of a tile starts and ends.
+// The start and the end of a tile's list.
 fn small_list(tile: u32) -> vec2<u32> {
     let end = LIST_ENDS + 1u + tile;
     let list = vec2<u32>(small_lists[end - 1u], small_lists[end]) + lists_start(tile_size());

@@ -1,4 +1,4 @@
-// Tiles have large splats only. Same interface as tile_small.wgsl.
+// Tiles draw large splats only. Same interface as tile_small.wgsl.
 
 fn small_list(tile: u32) -> vec2<u32> {
     return vec2<u32>(0u);

@@ -1,5 +1,5 @@
-// The registers of tile.wgsl's sums: of sixteen pixels and at most as many channels as tile_plain.wgsl or tile_texture.wgsl say, low and high
-// word.
+// The registers for the sums of tile.wgsl: low and high words of up to MOST_CHANNELS channels
+// (tile_plain.wgsl, tile_texture.wgsl) of sixteen pixels.
 // All loops end, by 1 of src/gpu/loops.rs: 0x341f38aad74f5326
 
 override CHANNELS: u32;
@@ -21,7 +21,7 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 
 fn settle(pixel: u32) {}
 
-// The sums of the pixel that is shown.
+// The sums of the pixel that show() has read.
 var<private> shown_low: array<u32, MOST_CHANNELS>;
 var<private> shown_high: array<u32, MOST_CHANNELS>;
 
@@ -52,8 +52,8 @@ fn show_pair(slot: u32, channel: u32) {
     show_channel(slot, channel + 1u);
 }
 
-// Takes the sums of a pixel out of the registers. Written out, so that no register is indexed by a number that only the
-// device knows.
+// Reads the sums of a pixel from the registers. Written out, so that no register is indexed by a
+// run-time value.
 fn show(slot: u32) {
     show_pair(slot, 0u);
     if (CHANNELS > 2u) { show_pair(slot, 2u); }
@@ -73,7 +73,7 @@ fn weight_at(slot: u32) -> f32 {
     return sum_at(slot, WEIGHT_CHANNEL) / ONE;
 }
 
-// Adds the sums of the shown pixel to those that are stored of `pixel`.
+// Adds the sums of the shown pixel to the stored ones of `pixel`.
 fn deposit(pixel: u32) {
     for (var channel = 0u; channel < CHANNELS; channel += 2u) {
         let first = vec2<u32>(shown_low[channel], shown_high[channel]);
@@ -82,7 +82,7 @@ fn deposit(pixel: u32) {
     }
 }
 
-// The sum of two 64-bit numbers, each low and high word.
+// The sum of two 64-bit numbers (low word, high word).
 fn sum_words(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     let low = a.x + b.x;
     return vec2<u32>(low, a.y + b.y + select(0u, 1u, low < a.x));

@@ -1,8 +1,9 @@
-// Tiles of surfels that a texture paints: more sums, and the place in it of a surfel that another invocation fetched (tile.wgsl).
+// Tiles of textured surfels: more channels, and the texture coordinates of a surfel that another
+// invocation fetched (tile.wgsl). Same interface as tile_plain.wgsl.
 
 const MOST_CHANNELS: u32 = 18u;
 
-// Of the pixels' channels those that others than painted surfels have not.
+// Reads the channels that only textured surfels have.
 fn show_rest(slot: u32) {
     if (CHANNELS > 12u) { show_pair(slot, 12u); }
     if (CHANNELS > 14u) { show_pair(slot, 14u); }

@@ -1,6 +1,7 @@
-// A triangle at a pixel: the one place where coverage, depth and the corners' parts are decided. Twin: src/passes/triangles.rs.
+// A triangle at a pixel: the only place where coverage, depth and barycentric coordinates are
+// decided. Twin: src/passes/triangles.rs, which explains the method.
 
-// Three words a triangle: its corners.
+// The indices of each triangle's three corners.
 @group(0) @binding(54) var<storage, read> triangles: array<u32>;
 @group(0) @binding(55) var<storage, read> corners: array<array<f32, 9>>;
 
@@ -25,15 +26,16 @@ fn triangle_at(number: u32) -> Triangle {
     return Triangle(numbers, corner_at(numbers.x), corner_at(numbers.y), corner_at(numbers.z));
 }
 
-// The farthest image coordinate of a corner whose edges are told by f32.
+// Image coordinates of plain corners are below this, pixels.
 const PLAIN_REACH: f32 = 65536.0;
 
-// Whether the corner's edges to others that are plain too are told by f32, whichever triangle looks at them.
+// Whether the corner is plain: an edge between two plain corners gets its sides from f32, in every
+// triangle.
 fn is_plain(corner: Corner) -> bool {
     return is_before(corner) && max(abs(corner.x.high), abs(corner.y.high)) < PLAIN_REACH;
 }
 
-// A corner relative to the point p: of its difference all digits are right.
+// The corner relative to the image point p. No digit of the difference is lost.
 fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(
         keep(corner.x.high - p.x) + corner.x.low,
@@ -41,14 +43,14 @@ fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
     );
 }
 
-// The doubled area between two corners and the point that they are seen from. Rounded alike in each kernel: the other way round the same
-// number with the other sign.
+// Twice the signed area of the triangle of two corners and the point p that they are relative to.
+// Every kernel rounds it alike, and swapping the corners changes its sign and nothing else.
 fn plain_area(from_: vec2<f32>, to: vec2<f32>) -> f32 {
     return keep(from_.x * to.y) - keep(from_.y * to.x);
 }
 
-// On which side of the edge the point lies: 1, -1, or 0 of an edge without a length. On it a point lies where the one right of it does, or
-// of a level edge the one below.
+// The side of an edge on which the point lies: 1 or -1, or 0 if the edge has no length. A point on
+// the edge counts as slightly to the right of it; on a level edge, as slightly below.
 fn side_by(area: f32, right: f32, below: f32) -> f32 {
     return sign(select(select(below, right, right != 0.0), area, area != 0.0));
 }
@@ -57,23 +59,24 @@ fn plain_side(area: f32, from_: vec2<f32>, to: vec2<f32>) -> f32 {
     return side_by(area, from_.y - to.y, to.x - from_.x);
 }
 
-// What of a triangle is at a pixel.
+// A triangle at a pixel.
 struct Crossing {
     hit: bool,
     // Camera-space z, device units.
     depth: f32,
-    // The corners' parts, whose sum is 1.
+    // The barycentric coordinates, whose sum is 1.
     parts: vec3<f32>,
-    // How much of them a pixel has.
+    // The barycentric area of a pixel.
     spread: f32,
 }
 
-// Whether the point is in the triangle, by the sides of its edges, and the depth is one that shows; not of what is no number.
+// Whether the point is in the triangle, by the sides of its edges, and not nearer than the near
+// depth. False for NaN.
 fn is_hit(sides: vec3<f32>, depth: f32) -> bool {
     return sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z && depth >= held.near;
 }
 
-// Of a triangle all of whose corners are plain, and that is not is_ill_formed.
+// For triangles whose corners are all plain and that are not ill-formed (is_ill_formed()).
 fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let a = plain_spoke(triangle.a, p);
     let b = plain_spoke(triangle.b, p);
@@ -89,7 +92,7 @@ fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
 
 // An edge seen from a point of the image.
 struct Edge {
-    // Without a sign: 0 if it has another one than the side.
+    // The area times the side, so not negative; 0 if the sign of the area differs from the side.
     area: Double,
     side: f32,
 }
@@ -98,7 +101,9 @@ fn spoke(corner: Corner, p: f32, image: Double) -> Double {
     return sum(image, product(corner.w, single(-p)));
 }
 
-// In doubled arithmetic, by the numbers that both triangles have of it: from the corner of the lower number, and turned.
+// An edge in doubled arithmetic. It is evaluated from the corner of the lower index on, so both of
+// its triangles get the same numbers; `turned` is -1 for the triangle that has it the other way
+// round.
 fn doubled_edge(from_: Corner, to: Corner, p: vec2<f32>, turned: f32) -> Edge {
     let a_x = spoke(from_, p.x, from_.x);
     let a_y = spoke(from_, p.y, from_.y);
@@ -127,7 +132,7 @@ fn precise_edge(from_: Corner, to: Corner, numbers: vec2<u32>, p: vec2<f32>) -> 
     return edge;
 }
 
-// Of any triangle: parts and depth in doubled arithmetic, and sides where f32 does not tell them.
+// For any triangle: areas and depth in doubled arithmetic, and sides too where f32 is not enough.
 fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let a = precise_edge(triangle.b, triangle.c, triangle.numbers.yz, p);
     let b = precise_edge(triangle.c, triangle.a, triangle.numbers.zx, p);
@@ -140,7 +145,8 @@ fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
         sum(product(a.area, shared_depth(triangle.a)), product(b.area, shared_depth(triangle.b))),
         product(c.area, shared_depth(triangle.c)),
     );
-    // Of a sliver whose areas all have other signs than f32 gives their sides, each corner has as much.
+    // In a sliver all areas may have other signs than their sides, which come from f32. Then each
+    // corner has an equal part.
     let is_told = whole.high > 0.0;
     let told = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
     let parts = select(vec3<f32>(1.0 / 3.0), told, is_told);

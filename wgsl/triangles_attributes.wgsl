@@ -1,15 +1,17 @@
-// Triangles, their attribute pass: what the nearest one of each pixel shows there. One workgroup a tile in which any shows. Twin: src/passes/triangles.rs.
+// The attribute pass of triangles: shades the nearest triangle of each pixel. One workgroup per
+// tile in which a triangle shows. Twin: src/passes/triangles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xccb9f67a456abcdd
 
-// A record a triangle: its corners' normals, if it has some, then their premultiplied colours, then their places in a texture and its number. If all
-// have one colour, that is before the
-// records, and in none.
+// A record per triangle: the normals of its corners, their premultiplied colours, and their texture
+// coordinates with the texture's number, each only if the mesh has it. If all triangles have the
+// same colours, these come once, before the records.
 @group(0) @binding(60) var<storage, read> triangle_attributes: array<f32>;
-// What triangles show at a pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, camera-space z in device
-// units, 0 where nothing is. Then what triangles_tiles.wgsl tells of tiles.
+// Two rows per pixel: the straight, shaded colour; then the normal (world space, unit length) and
+// the depth (camera-space z in device units, 0 where no triangle is). Then a row per tile
+// (triangles_tiles.wgsl).
 @group(0) @binding(61) var<storage, read_write> triangle_pixels: array<vec4<f32>>;
 
-// Words of a record; of its normals; and before the first one.
+// Words of a record, words of its normals, and words before the first record.
 override TRIANGLE_WORDS: u32;
 override TRIANGLE_COLORS: u32;
 override TRIANGLE_RECORDS: u32;
@@ -20,7 +22,7 @@ fn triangle_vector(word: u32) -> vec3<f32> {
     return vec3<f32>(triangle_attributes[word], triangle_attributes[word + 1u], triangle_attributes[word + 2u]);
 }
 
-// World space, as long as it comes.
+// World space, not normalised.
 fn normal_of_triangle(number: u32, triangle: Triangle, parts: vec3<f32>) -> vec3<f32> {
     if (!TRIANGLE_NORMALS) {
         return facet_of(triangle.numbers);
@@ -63,7 +65,8 @@ fn shade_triangles(
     let number = named.x;
     let triangle = triangle_at(number);
     let crossed = cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5);
-    // Lengths of facets are squares of small ones.
+    // A facet's normal is as long as a product of two edges, which may be short, so it is scaled
+    // before it is squared.
     let long = normal_of_triangle(number, triangle, crossed.parts);
     let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
     let normal = scaled * inverseSqrt(max(dot3(scaled, scaled), 1e-12));

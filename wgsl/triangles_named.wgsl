@@ -1,6 +1,7 @@
-// The nearest triangle of each pixel, as the compute path's visibility pass left it. Same interface as triangles_raster.wgsl.
+// The nearest triangle of each pixel, from the visibility pass of the compute path. Same interface
+// as triangles_raster.wgsl.
 
-// Two words a pixel: the nearest triangle's number, and its depth.
+// Two words per pixel: the index of the nearest triangle, and its kept depth.
 @group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
 
 fn nearest_triangle(pixel: u32, x: u32, y: u32) -> vec2<u32> {

@@ -1,7 +1,8 @@
-// The visibility pass of triangles by the rasteriser, for comparison: its coverage, its interpolated depths, its depth test. What is nearest
-// is shaded as that of the compute path is. Same interface as triangles_named.wgsl.
+// The visibility pass of triangles by the rasteriser, for comparison: its coverage, its
+// interpolated depths and its depth test. The nearest triangle is shaded as in the compute path.
+// Same interface as triangles_named.wgsl.
 
-// The nearest triangle's number and one more; 0 of none.
+// One plus the index of the nearest triangle; 0 where there is none.
 @group(0) @binding(69) var drawn_triangles: texture_2d<u32>;
 
 struct DrawnCorner {
@@ -25,7 +26,7 @@ fn drawn_triangle(corner: DrawnCorner) -> @location(0) u32 {
     return corner.number + 1u;
 }
 
-// The nearest triangle of the pixel (x, y), the band's `pixel`th, and whether there is one.
+// The nearest triangle of the pixel (x, y), the `pixel`th of the band, and 1 if there is one.
 fn nearest_triangle(pixel: u32, x: u32, y: u32) -> vec2<u32> {
     let drawn = textureLoad(drawn_triangles, vec2<u32>(x, y), 0).x;
     return vec2<u32>(drawn - 1u, min(drawn, 1u));

@@ -1,9 +1,11 @@
-// The tiles of the image in which triangles show: no other pixel is shaded, or looked at when splats and triangles are joined. Host side:
-// src/passes/triangles.rs.
+// The list of image tiles in which triangles show. Other pixels are not shaded, and not looked at
+// when splats and triangles are joined. Same interface as triangles_tiles_absent.wgsl.
+// Host side: src/passes/triangles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x5a024c5f69138886
 
-// How many are listed; a grid of workgroups with one for each; from TRIANGLE_TILES on, the tiles, of 8 by 8 pixels. After the pixels of
-// triangle_pixels each tile of the band says whether it is one of them.
+// The number of listed tiles, a grid with one workgroup for each, and from TRIANGLE_TILES on the
+// tiles, 8 x 8 pixels each. After the pixels, triangle_pixels has a row for each tile of the band
+// that says whether the tile is listed.
 @group(0) @binding(70) var<storage, read_write> triangle_tiles: array<atomic<u32>>;
 @group(0) @binding(71) var<storage, read> tiles_of_triangles: array<u32>;
 
@@ -18,7 +20,7 @@ fn triangle_tiles_in_band() -> u32 {
     return triangle_tiles_across() * ((held_band.rows + TRIANGLE_TILE - 1u) / TRIANGLE_TILE);
 }
 
-// One invocation a tile.
+// One invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn list_triangle_tiles(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -38,7 +40,7 @@ fn list_triangle_tiles(
     if (tile < triangle_tiles_in_band()) {
         triangle_pixels[2u * band_pixels() + tile] = vec4<f32>(f32(shows));
         if (shows != 0u) {
-            // Places depend on the schedule, but tiles share no pixel.
+            // The order of the list depends on the schedule, but tiles share no pixel.
             atomicStore(&triangle_tiles[TRIANGLE_TILES + atomicAdd(&triangle_tiles[0], 1u)], tile);
         }
     }
@@ -53,7 +55,7 @@ fn arrange_triangle_tiles() {
     }
 }
 
-// The tile at a place of the list; past its end a number that is no tile.
+// The tile at a place of the list; a number that is no tile past its end.
 fn triangle_tile(place: u32) -> u32 {
     return select(0xffffffffu, tiles_of_triangles[TRIANGLE_TILES + place], place < tiles_of_triangles[0]);
 }
@@ -62,12 +64,13 @@ fn tile_has_triangles(tile: u32) -> bool {
     return beside[2u * band_pixels() + tile].x != 0.0;
 }
 
-// Whether triangles show in the tile in which the pixel in a column and row of the band is.
+// Whether triangles show in the tile of a pixel, at column `x` and row `row` of the band.
 fn shows_triangles(x: u32, row: u32) -> bool {
     return tile_has_triangles(row / TRIANGLE_TILE * triangle_tiles_across() + x / TRIANGLE_TILE);
 }
 
-// Whether they do in a tile of covered.wgsl, which is one tile here, or two.
+// Whether triangles show in a tile of covered.wgsl, which is one tile here, or two, one above the
+// other.
 fn has_triangles(tile: u32) -> bool {
     let upper = tile / triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE) * triangle_tiles_across() + tile % triangle_tiles_across();
     let below = upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u);

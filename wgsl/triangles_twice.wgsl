@@ -1,10 +1,11 @@
-// The nearest triangle of a pixel, its depth first and, in a second pass over the fragments, its number. Both passes evaluate the same
-// crossing, so a nearest fragment has the very bits of the depth that it left. Same interface as triangles_once.wgsl.
+// Finds the nearest triangle of a pixel in two passes over the fragments: its depth, then its
+// index. Both passes evaluate the same crossing, so the nearest fragment has exactly the stored
+// depth. Same interface as triangles_once.wgsl.
 
-// Cleared: nothing anywhere. A number, then a depth.
+// Per pixel the index, then the kept depth. Cleared words mean an empty pixel.
 @group(0) @binding(58) var<storage, read_write> nearest_triangles: array<atomic<u32>>;
 
-// The pass that keeps numbers.
+// Whether this is the pass that stores indices.
 var<private> names: bool;
 
 fn keep_triangle(pixel: u32, kept: u32, number: u32) {

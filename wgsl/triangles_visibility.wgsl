@@ -1,17 +1,20 @@
-// Triangles, their visibility pass: the nearest one at every pixel, of those at one depth the one of the greatest number. One invocation a
-// triangle, one workgroup a large one, or a rare one that f32 does not tell. Twin: src/passes/triangles.rs.
+// The visibility pass of triangles: the nearest one at every pixel; at equal depths, the one with
+// the greatest index. One invocation per triangle; one workgroup for each large triangle, and for
+// each rare one, for which f32 is not enough. Twin: src/passes/triangles.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0xbcd81421c0e56bd5
 
-// In the form of the queue of large splats (project.wgsl): how many there are, a grid with a workgroup for each, and their numbers.
+// Queues, in the layout of the queue of large splats (project.wgsl): the number of triangles, a
+// grid with one workgroup for each, and their indices.
 @group(0) @binding(56) var<storage, read_write> large_triangles: array<atomic<u32>>;
 @group(0) @binding(57) var<storage, read> queued_triangles: array<u32>;
 @group(0) @binding(63) var<storage, read_write> rare_triangles: array<atomic<u32>>;
 @group(0) @binding(64) var<storage, read> listed_triangles: array<u32>;
 
-// Those with more pixels get a workgroup.
+// Triangles that may touch more pixels get a workgroup.
 const LARGE_TRIANGLE: u32 = 1024u;
 
-// The part of an image axis that the triangle reaches, in pixels; of one that is cut at the near depth, the ends of the cut too.
+// The range of image coordinates that the triangle reaches along an axis, pixels. If the near depth
+// cuts the triangle, the ends of the cut count too.
 fn reach_along(triangle: Triangle, axis: u32) -> vec2<f32> {
     let a = place_along(triangle.a, axis);
     let b = place_along(triangle.b, axis);
@@ -30,7 +33,8 @@ fn place_along(corner: Corner, axis: u32) -> f32 {
     return select(corner.y.high, corner.x.high, axis == 0u);
 }
 
-// With the part of an edge before the near depth. Where it is cut, the blur is that of a sum of these magnitudes.
+// Extends the range by the part of an edge past the near depth. The margin at a cut covers the
+// rounding of a sum of these magnitudes.
 fn with_edge(reach: vec2<f32>, from_: Corner, to: Corner, places: vec2<f32>) -> vec2<f32> {
     var wider = reach;
     if (is_before(from_)) {
@@ -46,7 +50,7 @@ fn with_edge(reach: vec2<f32>, from_: Corner, to: Corner, places: vec2<f32>) -> 
     return wider;
 }
 
-// The pixels of the band that the triangle can reach; empty if a first lies past a last.
+// The pixels of the band that the triangle can reach; empty if a first one lies past a last one.
 fn reach_of(triangle: Triangle) -> Rectangle {
     let across = reach_along(triangle, 0u);
     let down = reach_along(triangle, 1u);
@@ -54,15 +58,15 @@ fn reach_of(triangle: Triangle) -> Rectangle {
     let high = vec2<f32>(f32(held.width), f32(held_band.first_row + held_band.rows)) - 1.0;
     let first = clamp(ceil(vec2<f32>(across.x, down.x) - 0.5), low, high + 1.0);
     let last = clamp(floor(vec2<f32>(across.y, down.y) - 0.5), low - 1.0, high);
-    // Not of what is no number.
+    // Negated, so that NaN gives an empty range.
     if (!all(first <= last)) {
         return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
     }
     return Rectangle(vec2<u32>(first), vec2<u32>(last));
 }
 
-// Whether the parts of f32, which err by 2^-23 of the square of its length over its area, make depths that err by more than f32 may, or are
-// none.
+// Whether f32 is not enough for the barycentric coordinates: they err by 2^-23 times the squared
+// length over twice the area, which would move depths by more than f32 may, or they are arbitrary.
 fn is_ill_formed(triangle: Triangle) -> bool {
     let a = vec2<f32>(triangle.a.x.high, triangle.a.y.high);
     let b = vec2<f32>(triangle.b.x.high, triangle.b.y.high) - a;
@@ -85,7 +89,7 @@ fn keep_crossing(crossed: Crossing, number: u32, x: u32, y: u32) {
     }
 }
 
-// Places in a queue depend on the schedule, but nothing later depends on places.
+// The order in a queue depends on the schedule, but nothing later depends on that order.
 fn draw_small(number: u32, queues: bool) {
     if (number >= triangles_held()) {
         return;

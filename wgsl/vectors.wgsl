@@ -1,5 +1,7 @@
-// Products of vectors, whose terms are added in the order that stands here. Of the built-in dot, cross, length, normalize and mix WGSL leaves the
-// order, and with it the rounding, to the driver, which NVIDIA's chooses by what stands around: src/gpu/spirv.rs. A test looks for them.
+// Products of vectors whose terms are added in the order that is written here. For the built-in
+// dot, cross, length, normalize and mix WGSL leaves the order, and so the rounding, to the driver;
+// that of NVIDIA chooses by the surrounding code (src/gpu/spirv.rs). A test checks that kernels use
+// none of them.
 
 fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.x + a.y * b.y;

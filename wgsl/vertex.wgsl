@@ -1,8 +1,8 @@
-// A vertex of triangles as a camera sees it: three f32. Same interface as vertex_doubled.wgsl.
+// Vertices of triangles, as three f32. Same interface as vertex_doubled.wgsl.
 // Twin: src/passes/triangles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x311a93ed066321eb
 
-// Relative to the eye, device units.
+// The position relative to the eye, device units.
 fn relative_vertex(vertex: u32) -> array<Double, 3> {
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
@@ -16,7 +16,7 @@ fn vertex_at(number: u32) -> vec3<f32> {
     return vec3<f32>(vertices[3u * number], vertices[3u * number + 1u], vertices[3u * number + 2u]);
 }
 
-// The normal of the triangle's plane, as long as it comes.
+// The normal of the triangle's plane, not normalised.
 fn facet_of(numbers: vec3<u32>) -> vec3<f32> {
     let a = vertex_at(numbers.x);
     return cross3((vertex_at(numbers.y) - a) * held.unit, (vertex_at(numbers.z) - a) * held.unit);

@@ -1,9 +1,10 @@
-// A vertex of triangles as a camera sees it, where f32 has too few digits for some corners: a mesh
-// far from the scene's origin, or a needle. Six words: the place as f32, and the rest after
-// rounding. Same interface as vertex.wgsl. Twin: Triangles::place in src/scene/triangles.rs.
+// Vertices of triangles where f32 has too few digits for some corners: a mesh far from the scene's
+// origin, or a needle. A vertex has six words: the position as f32, then the part that f32 leaves
+// out. Same interface as vertex.wgsl. Twin: Triangles::place in src/scene/triangles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x4ea43420cf41c34b
 
-// Relative to the eye, device units. Where leading parts cancel, the trailing ones may be larger.
+// The position relative to the eye, device units. Where the leading parts cancel, the trailing
+// parts may be larger than their difference.
 fn relative_vertex(vertex: u32) -> array<Double, 3> {
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
@@ -14,7 +15,7 @@ fn relative_vertex(vertex: u32) -> array<Double, 3> {
     return relative;
 }
 
-// From one vertex to another, device units.
+// The vector from one vertex to another, device units.
 fn edge_between(from_: u32, to: u32) -> array<Double, 3> {
     var edge: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
@@ -25,8 +26,8 @@ fn edge_between(from_: u32, to: u32) -> array<Double, 3> {
     return edge;
 }
 
-// The normal of the triangle's plane, as long as it comes. Edges are scaled to about one, so that
-// no product of a small triangle underflows.
+// The normal of the triangle's plane, not normalised. The edges are scaled to about 1, so that no
+// product underflows for a small triangle.
 fn facet_of(numbers: vec3<u32>) -> vec3<f32> {
     let b = near_one(edge_between(numbers.x, numbers.y));
     let c = near_one(edge_between(numbers.x, numbers.z));
@@ -37,7 +38,7 @@ fn facet_of(numbers: vec3<u32>) -> vec3<f32> {
     );
 }
 
-// Times a power of two, by which its largest coordinate becomes one to two.
+// Scales an edge by a power of two, so that its largest coordinate is in [1, 2).
 fn near_one(edge: array<Double, 3>) -> array<Double, 3> {
     let largest = max(max(abs(edge[0].high), abs(edge[1].high)), max(abs(edge[2].high), 1e-30));
     let scale = bitcast<f32>(0x7f000000u - (bitcast<u32>(largest) & 0x7f800000u));

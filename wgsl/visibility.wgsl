@@ -1,5 +1,7 @@
-// Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
-// The least depth is the greatest kept one (layout.wgsl).
+// Stage 2: the nearest depth at every pixel. One invocation per splat, one workgroup per large
+// splat. Depths are stored so that the nearest one is the greatest number (kept_depth in
+// layout.wgsl).
+// Twin: src/passes/visibility.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x0036556a3decb52f
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;

@@ -1,11 +1,11 @@
-// Where the nearest fragment alone shows: a pixel has nothing to sum, and its one fragment weighs 1. In place of blend.wgsl, a kernel's
-// weights, an accumulator and the sums of colours.
+// Pictures in which only the nearest fragment shows: it has weight 1, and nothing is summed. Joined
+// in place of blend.wgsl, the weights of a kernel, an accumulator and the sums of colours.
 // Twin: src/passes/winner.rs.
 
 alias Term = u32;
 
 struct Attributes {
-    // The colour, as surfels have it.
+    // The colour, as in the surfel's attributes.
     word: u32,
     radius: f32,
 }

@@ -1,7 +1,8 @@
-// Without 64-bit atomics: a second pass over the fragments keeps the colour of those at the nearest depth, of several the greatest word.
-// Both passes evaluate the same footprint, so a nearest fragment has the very bits of the depth that it left.
+// Without 64-bit atomics: a second pass over the fragments stores the colour of those at the
+// nearest depth; among several, the greatest word. Both passes evaluate the same footprint, so the
+// nearest fragment has exactly the stored depth.
 
-// Cleared.
+// The colour of each pixel's nearest fragment; cleared before.
 @group(0) @binding(43) var<storage, read_write> winners: array<atomic<u32>>;
 
 fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {

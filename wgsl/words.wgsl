@@ -1,5 +1,5 @@
-// How kernels read and write records: four words at a time, and surfels, which have nine, as they are. Same interface as
-// words_long.wgsl.
+// How kernels read and write records: four words at a time; and surfels, as structs of nine words.
+// Same interface as words_long.wgsl.
 
 alias Words = vec4<u32>;
 

@@ -1,5 +1,6 @@
-// The same by 64 bits at a time, for adapters that have such integers: half as many accesses for the same bits. Software
-// adapters pay for each access, not for its bytes.
+// Records and surfels read and written by 64 bits at a time, on adapters with 64-bit integers: half
+// as many accesses for the same bits. Software adapters pay for each access, not for its bytes.
+// Same interface as words.wgsl.
 
 alias Words = vec2<u64>;
 
@@ -19,17 +20,17 @@ fn each_word(four: Words) -> vec4<u32> {
     return vec4<u32>(low_word(four.x), high_word(four.x), low_word(four.y), high_word(four.y));
 }
 
-// Two words each; the host fills up the last.
+// Two 32-bit words of surfels in each; the host pads the last one.
 @group(0) @binding(2) var<storage, read> surfels: array<u64>;
 
-// Two words that start with the first, or at its middle.
+// Two consecutive f32 that start in the low half of `first`, or in its high half if `odd`.
 fn shifted(first: u64, second: u64, odd: bool) -> vec2<f32> {
     let low = select(low_word(first), high_word(first), odd);
     let high = select(high_word(first), low_word(second), odd);
     return vec2<f32>(bitcast<f32>(low), bitcast<f32>(high));
 }
 
-// A surfel has nine words, so every other one starts at the middle of a long one.
+// A surfel has nine words, so every other surfel starts in the middle of a 64-bit word.
 fn surfel_at(index: u32) -> Surfel {
     let odd = (index & 1u) == 1u;
     let at = (9u * index) >> 1u;

@@ -1,4 +1,4 @@
-//! Whether surfels have holes: what they leave uncovered of the surface that they stand for, seen from all around.
+//! The coverage of a surface by its surfels: the holes that they leave, seen from all around.
 
 use std::f64::consts::TAU;
 
@@ -12,65 +12,72 @@ use crate::scene::{Camera, Lens, Scene, Up};
 use crate::surfels::analytic::{Shape, generate};
 use crate::truth::{DiskTree, TriangleTree};
 
-/// Views when nobody says how many.
+/// The default number of views.
 pub const DEFAULT_VIEWS: u32 = 64;
 
-/// Rays along each side of a view when nobody says how many.
+/// The default number of rays along each side of a view.
 pub const DEFAULT_SIDE: u32 = 512;
 
-/// How far before or behind the surface, along the ray, a disk may lie to cover it: this many of its own shorter half-axes,
-/// as with the epsilon `radius:1`, within which a renderer takes depths for one surface. A disk on the far side of the
-/// body is no cover, however many lie there; one that is off by the sag of a curved surface is.
+/// The largest distance along the ray, before or behind the surface, of a disk that covers it, in
+/// the disk's shorter half-axes.
+///
+/// It corresponds to the epsilon `radius:1`, within which a renderer takes depths for one surface.
+/// So disks on the far side of the body do not cover it, however many there are, but a disk that is
+/// off by the sag of a curved surface does.
 pub const REACH: f64 = 1.0;
 
-/// The width of the strip along an outline that flat disks may cut off, in longer half-axes of the disk that is nearest there.
+/// The width of the strip along an outline that flat disks may cut off, in longer half-axes of the
+/// nearest disk.
 const EDGE: f64 = 0.5;
 
-/// The surface has a step between two rays if one meets it deeper than the plane through the other's hit by more than so
-/// many times their distance.
+/// The surface has a step between two rays if one hits it deeper than the plane through the other's
+/// hit by more than this many times their distance.
 const STEP: f64 = 2.0;
 
-/// What surfels leave uncovered of a mesh.
+/// The parts of a mesh that surfels leave uncovered.
 ///
-/// The mesh is seen from `views` directions (a Fibonacci lattice on the sphere), each an orthographic image of `side` x
-/// `side` rays that shows the ball around its bounds. The first hit of a ray is *covered* if the ray meets a disk within
-/// [`REACH`] of it. What is not covered is a *hole* where the surface goes on around it, and an *edge* where it ends, or steps
-/// back, within half the radius of the disk nearest to it: flat disks do not reach into the ridge that makes an outline, so
-/// they draw it a little further in, which is an error of shape and no gap between disks. A gap at an outline of one view
-/// is none of another, which sees it from the front.
+/// The mesh is seen from `views` directions (a Fibonacci lattice on the sphere). Each view is an
+/// orthographic image of `side` x `side` rays that shows the ball around its bounds. The first hit
+/// of a ray is *covered* if the ray meets a disk within [`REACH`] of it.
 ///
-/// Shares are of rays, so of the visible surface as it is seen: parts that face a view count by their area, parts aslant
-/// by less, and hidden ones not at all. Without holes there is none, in these views, in which a circle of diameter
-/// `sqrt(2) * ray_spacing` has room.
+/// An uncovered hit is an *edge* if the surface ends or steps back within half the radius of the
+/// nearest disk, and a *hole* if the surface continues around it. Flat disks do not reach into the
+/// ridge that forms an outline, so they draw it a little further in: an error of shape, not a gap
+/// between disks. A gap at the outline of one view is not at the outline of another, which sees it
+/// from the front.
+///
+/// Shares are of rays, so of the visible surface as seen: parts that face a view count by their
+/// area, oblique parts by less, and hidden parts not at all. If there are no holes, none of these
+/// views shows a gap that holds a circle of diameter `sqrt(2) * ray_spacing`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Coverage {
-    /// Directions of view.
+    /// The number of views.
     pub views: u32,
-    /// Rays along each side of a view's image.
+    /// Rays along each side of a view.
     pub side: u32,
-    /// Distance of neighbouring rays, world units.
+    /// The distance of neighbouring rays, world units.
     pub ray_spacing: f64,
-    /// What all views see.
+    /// The counts over all views.
     #[serde(flatten)]
     pub seen: Seen,
-    /// `uncovered / rays`; None where no ray meets the mesh.
+    /// `uncovered / rays`; None if no ray meets the mesh.
     pub uncovered_share: Option<f64>,
-    /// `holes / rays`; None where no ray meets the mesh.
+    /// `holes / rays`; None if no ray meets the mesh.
     pub hole_share: Option<f64>,
-    /// Views that see a hole.
+    /// The number of views with a hole.
     pub views_with_holes: u32,
     /// The view with the largest share of holes, if any has one.
     pub worst_view: Option<WorstView>,
 }
 
-/// Rays, counted.
+/// Counts of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Seen {
-    /// Those that meet the mesh.
+    /// Rays that meet the mesh.
     pub rays: u64,
-    /// Of these, those that no disk covers.
+    /// Rays among these that no disk covers.
     pub uncovered: u64,
-    /// Of these, those that are not at an edge.
+    /// Rays among the uncovered ones that are not at an edge.
     pub holes: u64,
 }
 
@@ -88,27 +95,27 @@ impl Seen {
     }
 }
 
-/// Where to look at the holes from.
+/// The view that shows most holes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WorstView {
-    /// The unit vector from the mesh toward the viewer.
+    /// The unit vector from the mesh towards the viewer.
     pub from: [f64; 3],
     /// Holes over rays that meet the mesh, in this view.
     pub hole_share: f64,
 }
 
 impl Coverage {
-    /// Whether the mesh was seen, and no hole.
+    /// Whether some ray meets the mesh, and none finds a hole.
     pub fn is_hole_free(&self) -> bool {
         self.seen.rays > 0 && self.seen.holes == 0
     }
 }
 
-/// Looks at `mesh` from all around and counts where no disk of `scene` covers it.
+/// Casts rays at `mesh` from all around and counts hits that no disk of `scene` covers.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for no views, an image of no rays, or more than a camera can have.
+/// [`Error::Usage`] if `views` is 0, or a camera cannot have `side` pixels, as 0 or too many.
 pub fn coverage(
     mesh: &TriangleTree,
     scene: &Scene,
@@ -119,7 +126,7 @@ pub fn coverage(
     if views == 0 {
         return Err(Error::Usage("coverage is measured from at least one view".into()));
     }
-    // A mesh of one point has no ball; no ray meets it, whatever the camera.
+    // A mesh of one point has no extent; no ray meets it, whatever the camera.
     let radius = if mesh.radius() > 0.0 { mesh.radius() } else { 1.0 };
     let toward: Vec<DVec3> =
         generate(Shape::Sphere, views.into()).map(|sample| DVec3::from_array(sample.position)).collect();
@@ -170,23 +177,23 @@ pub fn coverage(
     })
 }
 
-/// Where a ray first meets the mesh.
+/// The first hit of a ray.
 struct Meeting {
     point: DVec3,
-    /// Of the ray, unit.
+    /// Unit direction of the ray.
     direction: DVec3,
-    /// Of the triangle that is met, unit.
+    /// Unit normal of the triangle.
     normal: DVec3,
 }
 
-/// By the ray of pixel (x, y).
+/// The first hit of the ray through pixel (x, y).
 fn meet(mesh: &TriangleTree, camera: &Camera, x: f64, y: f64) -> Option<Meeting> {
     let (start, direction) = (camera.ray_start(x + 0.5, y + 0.5), camera.ray(x + 0.5, y + 0.5));
     let hit = mesh.first_hit(start, direction, 0.0)?;
     Some(Meeting { point: start + direction * hit.distance, direction, normal: hit.facet })
 }
 
-/// By rays around that of pixel (x, y), in eight directions, at half the width of the strip and at its whole.
+/// Tests rays around pixel (x, y), in eight directions, at half and at the full width of the strip.
 fn is_at_edge(mesh: &TriangleTree, disks: &DiskTree, camera: &Camera, hit: &Meeting, x: f64, y: f64) -> bool {
     let Some(radius) = disks.radius_near(hit.point) else { return false };
     (0..16).any(|k| {
@@ -194,7 +201,7 @@ fn is_at_edge(mesh: &TriangleTree, disks: &DiskTree, camera: &Camera, hit: &Meet
         let (sin, cos) = (TAU * f64::from(k) / 8.0).sin_cos();
         let (dx, dy) = (across * cos * camera.fx, across * sin * camera.fy);
         let Some(beside) = meet(mesh, camera, x + dx, y + dy) else { return true };
-        // How much deeper the ray beside goes than the plane through the hit.
+        // The depth by which the neighbouring ray goes beyond the plane through the hit.
         let below = (beside.point - hit.point).dot(hit.normal) / hit.direction.dot(hit.normal);
         below > STEP * across
     })

@@ -1,4 +1,4 @@
-//! How far surfels lie from the surface that they stand for.
+//! Distances between surfels and the surface that they stand for.
 
 use std::f64::consts::TAU;
 
@@ -13,16 +13,16 @@ use crate::scene::Scene;
 use crate::surfels::sampling::{Method, sample};
 use crate::truth::{DiskTree, TriangleTree};
 
-/// Points at which a rim is measured, one at each end of both half-axes.
+/// The number of points at which a disk's rim is measured; four of them are ends of half-axes.
 const RIM_POINTS: u32 = 8;
 
-/// Points of the mesh at which its distance from the surfels is measured.
+/// The number of points of the mesh at which its distance from the surfels is measured.
 pub const MESH_POINTS: usize = 200_000;
 
-/// Of those points; another one than that of any sampling.
+/// The seed of those points, different from that of any sampling.
 const SEED: u64 = 0x6d65_6173_7572_6521;
 
-/// Distances of points from a surface, world units, none negative.
+/// Statistics of the distances of points from a surface, world units, none negative.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Distances {
     /// Mean.
@@ -35,22 +35,28 @@ pub struct Distances {
     pub max: f64,
 }
 
-/// How far the surfels are from a mesh: the distance of a point is that from the nearest point of any triangle.
+/// Distances between the surfels and a mesh. The distance of a point from the mesh is that from the
+/// nearest point of any triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SurfaceDistances {
-    /// Of the surfels' centres from the mesh.
+    /// From the surfels' centres to the mesh.
     pub centers_to_mesh: Option<Distances>,
-    /// Of eight points on each disk's rim from the mesh, where lines cut it of those at which it ends on the way to them, but for
-    /// one whose centre lines leave out: a disk on a curved surface leaves it toward the rim.
+    /// From eight points on each disk's rim to the mesh: a disk on a curved surface leaves it
+    /// towards the rim.
+    ///
+    /// Where clip lines cut the disk, the points on the lines count instead; disks whose centre is
+    /// clipped away are left out.
     pub rims_to_mesh: Option<Distances>,
-    /// Of [`MESH_POINTS`] random points of the mesh, evenly by area, from the nearest surfel's centre: how finely it is sampled.
+    /// From [`MESH_POINTS`] random points of the mesh, uniform by area, to the nearest surfel's
+    /// centre: the fineness of the sampling.
     pub mesh_to_centers: Option<Distances>,
-    /// Of the same points from the nearest disk: 0 where a disk passes through them, so what the surfels miss of the shape.
+    /// From the same points to the nearest disk: the shape that the surfels miss. 0 where a disk
+    /// passes through the point.
     pub mesh_to_disks: Option<Distances>,
 }
 
 impl Distances {
-    /// None for no values.
+    /// None if there are no values.
     pub fn of(values: Vec<f64>) -> Option<Self> {
         let count = values.len() as f64;
         let (sum, squares) = values.iter().fold((0.0, 0.0), |(sum, squares), d| (sum + d, squares + d * d));
@@ -65,11 +71,12 @@ impl Distances {
 }
 
 impl SurfaceDistances {
-    /// Measures all surfels against `mesh`, of which `triangles` is the tree; without surfels there are no distances.
+    /// Measures all surfels against `mesh`; `triangles` is its tree. Without surfels there are no
+    /// distances.
     ///
     /// # Errors
     ///
-    /// As [`sample`] for a mesh that has no area.
+    /// The errors of [`sample`], such as for a mesh without area.
     pub fn of(scene: &Scene, mesh: &Mesh, triangles: &TriangleTree) -> Result<Self> {
         let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let center = |index: usize| scene.origin + scene.center(index);

@@ -1,32 +1,36 @@
-//! Where two surfaces meet in an image: which of them shows on either side of the curve, and how far off that is.
+//! The curve at which two surfaces meet in an image: which surface shows on either side, and how
+//! far off the curve is.
 
 use rayon::prelude::*;
 
 use crate::scene::Camera;
 use crate::truth::Surface;
 
-/// How near to the curve pixels are asked for the share of wrong ones, pixels.
+/// Pixels within this distance of the curve count for the share of wrong ones, pixels.
 pub const BESIDE: f64 = 3.0;
 
-/// How near to the curve pixels count for its offset, pixels: a surface that ends elsewhere is not displaced, but another one.
+/// Pixels within this distance of the curve count for its offset, pixels. A wrong pixel farther
+/// away is due to a surface that ends elsewhere, not to a displaced curve.
 const FARTHEST: f64 = 32.0;
 
-/// What shows of two surfaces beside the curve at which they meet.
+/// The error of an image near the curve at which two surfaces meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    /// Share of the pixels within [`BESIDE`] of the curve that show the surface that is farther.
+    /// Share of the pixels within [`BESIDE`] of the curve that show the farther surface.
     pub wrong_rate: f64,
-    /// Root of the mean squared distance of the curve that shows from the one that rays see, pixels.
+    /// Root mean square distance of the visible curve from the true one, pixels.
     pub offset_px: f64,
 }
 
-/// Measures `first_shows`, pixel by pixel, against the rays of `camera` that meet the first and the second surface. None if they meet nowhere
-/// in the image.
+/// Measures, pixel by pixel, whether `first_shows` agrees with the rays of `camera` to the first
+/// and the second surface. None if they meet nowhere in the image.
 ///
-/// The curve goes between neighbours of which rays meet both surfaces in another order each, at the place where the difference of the two
-/// depths is 0 if it is linear between them. A curve of length L that shows d(s) off leaves pixels wrong over an area whose integral of
-/// their distance from it is that of `d^2 / 2` over s, so `rms^2 = 2 / L sum of distances`, and L is the area of the pixels within
-/// [`BESIDE`] over its width.
+/// The true curve runs between neighbouring pixels whose rays hit the two surfaces in opposite
+/// order, at the point where the difference of the two depths, linearly interpolated, is 0. If the
+/// visible curve, of length L, is d(s) off, the wrong pixels lie between the two curves. The
+/// integral of their distances from the true curve is that of `d^2 / 2` over s, so
+/// `rms^2 = 2 / L * sum of distances`. L is the area of the pixels within [`BESIDE`] of the curve
+/// over the width of that strip.
 pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> Option<Joint> {
     let difference = |pixel: usize| {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
@@ -51,8 +55,8 @@ pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> 
     (beside > 0.0).then(|| Joint { wrong_rate: wrong / beside, offset_px: (2.0 * moment / length).sqrt() })
 }
 
-/// The distance of each pixel of rows of `width` from the nearest place where `differences` are 0, pixels; more than [`FARTHEST`] if that
-/// is farther.
+/// Returns the distance of each pixel, in rows of `width`, from the nearest place where
+/// `differences` are 0, pixels; more than [`FARTHEST`] if that is farther.
 fn distances(differences: &[Option<f64>], width: usize) -> Vec<f64> {
     let mut distances = vec![f64::INFINITY; differences.len()];
     let height = differences.len() / width.max(1);
@@ -90,7 +94,7 @@ mod tests {
     use crate::scene::{Lens, Up};
     use crate::surfels::analytic::{Shape, mesh};
 
-    /// Two planes cross in a line down the image; one that shows some pixels off is measured to be so.
+    /// Two planes cross in a line down the image; the visible line is a known number of pixels off.
     #[test]
     fn an_offset_is_measured_in_pixels() {
         let eye = DVec3::new(0.0, 0.0, 5.0);
@@ -100,7 +104,7 @@ mod tests {
         tilted.positions.iter_mut().for_each(|p| p[2] = 0.7 * p[0]);
         let surfaces = [Surface::Analytic(Shape::Plane), Surface::mesh(&tilted).unwrap()];
         let of = |off: u32| {
-            // The tilted one is nearer to the right of the middle.
+            // The tilted plane is nearer on the right of the middle.
             let shown: Vec<bool> = (0..100 * 100).map(|pixel| pixel % 100 < 50 + off).collect();
             joint(&shown, &camera, surfaces.each_ref()).unwrap()
         };
@@ -109,7 +113,7 @@ mod tests {
             assert!((offset_px - f64::from(off)).abs() < 0.01, "{off}: {offset_px}");
             assert!((wrong_rate - f64::from(off.min(3)) / 6.0).abs() < 0.01, "{off}: {wrong_rate}");
         }
-        // Away from one another they meet nowhere.
+        // In this view the planes do not meet.
         let far = Camera { eye: eye + 3.0 * DVec3::X, ..camera.clone() };
         assert_eq!(joint(&vec![true; 100 * 100], &far, surfaces.each_ref()), None);
     }

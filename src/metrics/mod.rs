@@ -1,6 +1,9 @@
-//! Error measures: of one image against another ([`numeric`]), of a render against the surface that its surfels stand for
-//! ([`reconstruction`](mod@reconstruction)), and of the surfels themselves against it, without any render: what they leave
-//! uncovered ([`coverage`](mod@coverage)), and how far they lie from it ([`distance`]).
+//! Error measures of images and surfels.
+//!
+//! They compare one image with another ([`numeric`]), a render with the surface that its surfels
+//! stand for ([`reconstruction`](mod@reconstruction)), and the surfels with that surface without
+//! any render: the holes that they leave ([`coverage`](mod@coverage)) and their distances from it
+//! ([`distance`]).
 
 pub mod coverage;
 pub mod distance;
@@ -29,7 +32,7 @@ struct ColorError {
 }
 
 impl ColorError {
-    /// Of pairs of pixels of four values each.
+    /// Compares pairs of pixels of four values each.
     fn of(pixels: impl ParallelIterator<Item = ([f64; 4], [f64; 4])>) -> Self {
         let in_pixel = |(a, b): ([f64; 4], [f64; 4])| {
             let squared: f64 = a.iter().zip(&b).map(|(a, b)| difference(*a, *b).powi(2)).sum();
@@ -56,7 +59,8 @@ impl Sorted {
         Self(values)
     }
 
-    /// The least value that this share of them does not exceed (nearest rank); None for no values.
+    /// The smallest value that at least this share of the values do not exceed (nearest rank); None
+    /// if there are none.
     fn percentile(&self, share: f64) -> Option<f64> {
         let rank = (self.0.len() as f64 * share).ceil() as usize;
         self.0.get(rank.max(1) - 1).copied()
@@ -70,8 +74,8 @@ fn same_size(a: &Frame, b: &Frame) -> Result<()> {
     Err(Error::Usage(format!("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height)))
 }
 
-/// The absolute difference. A value that is not finite against any other counts as the largest f32: it must neither pass
-/// for equality nor make the other measures meaningless.
+/// The absolute difference. A value that is not finite differs from any other by the largest f32:
+/// it must neither count as equal nor make the other measures meaningless.
 fn difference<T: Into<f64>>(a: T, b: T) -> f64 {
     let (a, b) = (a.into(), b.into());
     if a == b {

@@ -8,16 +8,18 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::scene::{MAPS, Map};
 
-/// Fragments nearer than this (relative) to a decision may rightly be decided otherwise in f32; their pixels are
-/// excused in [`Comparison::rmse_decided`] and [`Comparison::max_abs_decided`].
+/// The relative margin within which f32 may rightly decide a fragment otherwise. Pixels with a
+/// fragment nearer to a decision are excluded from [`Comparison::rmse_decided`] and
+/// [`Comparison::max_abs_decided`].
 pub const DECISION_MARGIN: f32 = 1e-6;
 
-/// What [`compare`] takes of memory beside the images, bytes a pixel at most.
+/// Memory that [`compare`] takes in addition to the images, bytes per pixel at most.
 pub const BYTES_PER_PIXEL: u64 = 48;
 
-/// The error of image A against image B. Colours are compared as linear RGBA. A value that is not finite against any other is as
-/// far from it as the largest f32; [`MapError::not_finite`] says whether there are any, and
-/// [`Comparison::is_finite`] whether there are none.
+/// The error of image A against image B. Colours are compared as linear RGBA.
+///
+/// A value that is not finite differs from any other by the largest f32. [`MapError::not_finite`]
+/// counts such pixels, and [`Comparison::is_finite`] tells that there are none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Largest absolute difference of a value.
@@ -30,20 +32,21 @@ pub struct Comparison {
     pub coverage_mismatch: f64,
     /// 99.9th percentile over pixels of the largest absolute difference in the pixel.
     pub percentile_99_9: f64,
-    /// The maps that both images have; of the colour, RGB and alpha apart.
+    /// The errors of the maps that both images have; the colour counts as two, RGB and alpha.
     pub maps: Vec<MapError>,
-    /// The maps that only A has, which nothing is said of.
+    /// The maps that only A has; they are not compared.
     pub only_in_a: Vec<&'static str>,
-    /// The maps that only B has.
+    /// The maps that only B has; they are not compared.
     pub only_in_b: Vec<&'static str>,
-    /// Only if A or B has a `decision` map: share of pixels that are excused because a fragment lies within
-    /// [`DECISION_MARGIN`] of a decision.
+    /// Share of pixels that are excused because a fragment lies within [`DECISION_MARGIN`] of a
+    /// decision; only if A or B has a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excused: Option<f64>,
-    /// [`rmse`](Self::rmse) over the pixels that are not excused; only if there is a `decision` map.
+    /// [`rmse`](Self::rmse) over the pixels that are not excused; only if there is a `decision`
+    /// map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_decided: Option<f64>,
-    /// [`max_abs`](Self::max_abs) over the same.
+    /// [`max_abs`](Self::max_abs) over the same pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_abs_decided: Option<f64>,
 }
@@ -51,38 +54,43 @@ pub struct Comparison {
 /// The error of one map, relative to the range that B's values span.
 #[derive(Clone, Debug, Serialize)]
 pub struct MapError {
-    /// color (RGB), alpha, depth, normal, weight or count.
+    /// The name of the map, such as color (RGB), alpha, depth or normal.
     pub map: &'static str,
-    /// Largest minus smallest finite value of B; where they are nearly one, a range under 1/1000 of
-    /// the largest magnitude, that magnitude.
+    /// Largest minus smallest finite value of B. If that is under 1/1000 of the largest magnitude,
+    /// it is the largest magnitude.
     pub range: f64,
-    /// Pixels in which a value that is not finite stands against another, and none of both says
-    /// that nothing is there.
+    /// Pixels where two values differ and one of them is not finite, except those of
+    /// [`in_one`](Self::in_one).
     pub not_finite: u64,
-    /// Pixels in which one image has the values of a pixel where nothing is, an infinite depth, and
-    /// the other has something.
+    /// Pixels where one image has the map's background values, which include an infinite depth, and
+    /// the other has finite values.
     pub in_one: u64,
-    /// Largest absolute difference, over pixels of which neither of these is said.
+    /// Largest absolute difference over all pixels but those of [`in_one`](Self::in_one).
     pub max_abs: f64,
-    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values are
-    /// all 0.
+    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error if B's values are all
+    /// 0.
     pub max_of_range: f64,
-    /// [`max_of_range`](Self::max_of_range) over the pixels that are not excused; only if there is a `decision` map.
+    /// [`max_of_range`](Self::max_of_range) over the pixels that are not excused; only if there is
+    /// a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_of_range_decided: Option<f64>,
 }
 
 impl Comparison {
-    /// No value that is not finite stands against another: all measures mean something.
+    /// Whether no differing value is infinite or NaN, so that all measures are meaningful.
     pub fn is_finite(&self) -> bool {
         self.maps.iter().all(|map| map.not_finite == 0)
     }
 }
 
-/// B's values are nearly one if they span no more than this part of the largest.
+/// B's values are nearly equal if they span less than this fraction of the largest.
 const NEARLY_ONE: f64 = 1e-3;
 
-/// Compares `a` with `b`, which must have the same size.
+/// Compares `a` with `b`.
+///
+/// # Errors
+///
+/// [`Error::Usage`](crate::Error::Usage) if they differ in size.
 pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     same_size(a, b)?;
     let pixels = a.color.len();
@@ -127,8 +135,8 @@ fn only_in(a: &Frame, b: &Frame) -> Vec<&'static str> {
     a.maps().iter().filter(|map| !b.maps().has(*map)).map(|map| map.row().name).collect()
 }
 
-/// The error of a map of which `at` gives the values of A and of B in each of the `pixels`, and
-/// that has the values `nothing` where nothing is.
+/// The error of a map. `at` returns the values of A and of B in each of the `pixels`, and `nothing`
+/// are the map's values in the background.
 fn map_error<'a>(
     map: &'static str,
     pixels: usize,
@@ -226,7 +234,8 @@ mod tests {
         let b = b.with(Map::Decision, vec![1e-8, 1.0, 1.0]);
         let c = compare(&a, &b).unwrap();
         assert_eq!(c.maps[0].max_of_range_decided, Some(0.5));
-        // One value of the eight in two pixels differs by one half; over all three the first pixel counts too.
+        // One value of the eight in two pixels differs by one half; over all three pixels the first
+        // counts too.
         assert_eq!((c.max_abs, c.max_abs_decided), (1.0, Some(0.5)));
         assert!((c.rmse_decided.unwrap() - (0.25f64 / 8.0).sqrt()).abs() < 1e-12 && c.rmse > 0.3);
         let b = b.with(Map::Decision, vec![1e-8; 3]);
@@ -246,13 +255,14 @@ mod tests {
         b = b.with(Map::Depth, vec![1.5, 1.5]).with(Map::Count, vec![1.0, 1.0]);
         let c = compare(&a, &b).unwrap();
         assert_eq!((c.only_in_a, c.only_in_b), (vec!["weight"], vec!["count"]));
-        // The background counts for itself, not for the depth; all depths of B are one.
+        // Pixels that are background in one image do not count as depth errors. All depths of B are
+        // equal.
         let depth = &c.maps[2];
         assert_eq!((depth.map, depth.range, depth.max_abs, depth.max_of_range), ("depth", 1.5, 0.5, 0.5 / 1.5));
         assert_eq!((depth.in_one, compare(&b, &a).unwrap().maps[2].in_one, depth.not_finite), (1, 1, 0));
         assert!(c.maps.iter().all(|map| map.not_finite == 0 && map.max_of_range <= 1.0), "{:?}", c.maps);
         assert_eq!(compare(&a, &a).unwrap().maps[2].max_of_range, 0.0);
-        // An alpha that hardly varies is no map of errors.
+        // An alpha that hardly varies must not have a large relative error.
         let [one, other] = [1.0, 1.0 - f32::EPSILON].map(|alpha| {
             Frame::of_colors(2, 1, vec![[0.5, 0.5, 0.5, alpha], [0.5, 0.5, 0.5, 1.0 - 0.5 * f32::EPSILON]])
         });

@@ -1,4 +1,4 @@
-//! The error of a render against the surface itself, which knows no splats.
+//! The error of a render against the surface itself.
 
 use std::f64::consts::PI;
 
@@ -16,40 +16,49 @@ use crate::truth::Truth;
 
 /// The error of a render against the [`Truth`] of the same camera, lights and background.
 ///
-/// The render *covers* a pixel where its depth is finite, the truth where the ray through the pixel's centre meets the
-/// surface. Alpha does not say it: before an opaque background it is 1 everywhere. A pixel is *inside* where the truth
-/// covers it and all its samples meet the surface; the others that the truth covers, or some of whose samples meet the
-/// surface, are its silhouette. Only the outline against the background is silhouette so: an edge before another
-/// part of the surface is inside.
+/// The render *covers* a pixel where its depth is finite, the truth where the ray through the
+/// pixel's centre meets the surface. Alpha would not do: before an opaque background it is 1
+/// everywhere. A pixel is *inside* if the truth covers it and all its samples meet the surface.
+/// Other pixels that the truth covers, or with samples that meet the surface, are its silhouette.
+/// Only the outline against the background counts as silhouette: an edge in front of another part
+/// of the surface is inside.
 ///
-/// Colours are linear RGBA over the background, premultiplied by alpha, so that the colour of what is not there counts
-/// for nothing. A measure over no pixels at all is null.
+/// Colours are linear RGBA over the background, premultiplied by alpha, so that transparent colours
+/// do not count. A measure over no pixels is null.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reconstruction {
-    /// Peak signal-to-noise ratio for a peak of 1, dB, over the four values of every pixel; null for equal images.
+    /// Peak signal-to-noise ratio for a peak of 1, dB, over the four values of every pixel; null if
+    /// the images are equal.
     pub psnr_db: Option<f64>,
     /// Largest absolute difference of these values.
     pub max_abs: f64,
     /// 99.9th percentile over all pixels of the largest such difference in the pixel.
     pub percentile_99_9: f64,
-    /// Mean structural similarity (Wang et al. 2004: Gaussian windows of 11 x 11 pixels, sigma 1.5, K1 = 0.01, K2 = 0.03)
-    /// in [-1, 1], over all windows that lie in the image, of the luma of the premultiplied sRGB-coded colours with the
-    /// weights of Rec. 709; 1 for equal images, null where a side is below 11 pixels.
+    /// Mean structural similarity in [-1, 1] (Wang et al. 2004: Gaussian windows of 11 x 11 pixels,
+    /// sigma 1.5, K1 = 0.01, K2 = 0.03), over all windows that lie in the image; 1 for equal
+    /// images, null if a side is below 11 pixels.
+    ///
+    /// It compares the luma of the premultiplied, sRGB-encoded colours, with the weights of Rec.
+    /// 709.
     pub ssim: Option<f64>,
-    /// Depth, over the pixels inside that the render covers.
+    /// Errors of depth over the inside pixels that the render covers.
     pub depth_relative: Option<DepthError>,
-    /// Normals, over the same pixels.
+    /// Errors of normals over the same pixels; null if the render has no normals.
     pub normal_degrees: Option<NormalError>,
-    /// Share of the pixels inside that the render does not cover.
+    /// Share of the inside pixels that the render does not cover.
     pub hole_rate: Option<f64>,
-    /// Share, of the pixels inside that the render covers, of those whose depth lies beyond the middle between the first
-    /// surface on the centre ray and the second: the render shows, or blends in, what is hidden. A pixel
-    /// without a second surface is no leak.
+    /// Share of the covered inside pixels whose depth is beyond the middle between the first and
+    /// the second surface on the centre ray: the render shows, or blends in, hidden parts.
+    ///
+    /// A pixel without a second surface is no leak.
     pub leak_rate: Option<f64>,
     /// Pixels that both cover over pixels that either covers.
     pub silhouette_iou: Option<f64>,
-    /// Mean distance between the two outlines against the background, pixels: the area that one covers and not the other over the
-    /// length of the true outline, that by the steps between covered pixels and others along rows and columns (Crofton).
+    /// Mean distance between the two outlines against the background, pixels.
+    ///
+    /// It is the area that only one of the two covers, over the length of the true outline. The
+    /// length follows from the steps between covered and other pixels along rows and columns
+    /// (Crofton).
     pub outline_px: Option<f64>,
 }
 
@@ -64,8 +73,8 @@ pub struct DepthError {
     pub percentile_99: f64,
 }
 
-/// The angle between a normal and the true one, degrees. The side counts: a normal turned over is off by 180. So does a
-/// normal that is zero or not finite.
+/// The angle between a normal and the true one, degrees. The side counts: a flipped normal is off
+/// by 180, and so is a normal that is zero or not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NormalError {
     /// Mean.
@@ -74,17 +83,18 @@ pub struct NormalError {
     pub percentile_99: f64,
 }
 
-/// Measures `frame`, which must have the map of depth; of one without normals these are not measured.
+/// Measures `frame`, which must have a depth map. Normals are measured if it has any.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if it lacks that, or the truth one of both, or the two differ in size.
+/// [`Error::Usage`] if `frame` lacks the depth map, if `truth` lacks the depth or normal map, or if
+/// the two differ in size.
 pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
     same_size(frame, &truth.frame)?;
-    let lacks = |what: &str| Error::Usage(format!("{what} that its error is measured by"));
-    let depth = frame.map(Map::Depth).ok_or_else(|| lacks("the render lacks the map of depth"))?;
+    let lacks = |what: &str| Error::Usage(format!("{what}, which this comparison needs"));
+    let depth = frame.map(Map::Depth).ok_or_else(|| lacks("the render lacks the depth map"))?;
     let (Some(true_depth), Some(true_normal)) = (truth.frame.map(Map::Depth), truth.frame.normals()) else {
-        return Err(lacks("the truth lacks the maps of depth and normal"));
+        return Err(lacks("the truth lacks the depth or the normal map"));
     };
 
     let colors = frame.color.par_iter().zip(&truth.frame.color);
@@ -122,8 +132,10 @@ pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
     })
 }
 
-/// The length of the outline of what has a depth, pixels; none if nothing has one. A line crosses rows and columns of pixels in
-/// `|sin| + |cos|` steps a pixel of its length, `4 / pi` over all directions.
+/// The length of the outline of the pixels with a depth, pixels; None if there is no outline.
+///
+/// A line crosses rows and columns of pixels in `|sin| + |cos|` steps per pixel of its length,
+/// `4 / pi` on average over all directions.
 fn outline(depth: &[f32], width: usize) -> Option<f64> {
     let covered = |pixel: usize| depth[pixel].is_finite();
     let steps = (0..depth.len()).map(|pixel| {
@@ -156,7 +168,8 @@ fn share(part: usize, of: usize) -> Option<f64> {
     (of > 0).then(|| part as f64 / of as f64)
 }
 
-/// Degrees, by the arc tangent: the arc cosine of unit vectors in f32 cannot tell small angles from none.
+/// The angle between two normals in degrees. It uses the arc tangent, as the arc cosine of f32 unit
+/// vectors cannot tell small angles from zero.
 fn angle(a: [f32; 3], b: [f32; 3]) -> f64 {
     let (a, b) = (DVec3::from(a.map(f64::from)), DVec3::from(b.map(f64::from)));
     let usable = |v: DVec3| v.is_finite() && v != DVec3::ZERO;
@@ -168,7 +181,7 @@ fn premultiplied(color: &[f32; 4]) -> [f64; 4] {
     [r * alpha, g * alpha, b * alpha, alpha]
 }
 
-/// The luma of what the colour is over black: the Rec. 709 mean of its sRGB codes, in [0, 1].
+/// The luma of a colour over black: the Rec. 709 mean of its sRGB codes, in [0, 1].
 fn luma(color: &[f32; 4]) -> f64 {
     let [r, g, b, _] = premultiplied(color).map(linear_to_srgb);
     0.2126 * r + 0.7152 * g + 0.0722 * b
@@ -184,18 +197,19 @@ mod tests {
     use crate::truth::Surface;
 
     const SIDE: usize = 64;
-    /// Of a pixel inside.
+    /// A pixel inside.
     const CENTER: usize = SIDE * SIDE / 2 + SIDE / 2;
 
     fn truth() -> Truth {
         let (side, eye) = (SIDE as u32, DVec3::new(0.5, 1.0, 5.0));
         let camera = Camera::look_at((side, side), Lens::Fov(30.0), eye, DVec3::ZERO, None, Up::Y, 0.01).unwrap();
-        // Opaque, so that alpha is 1 everywhere and says nothing of what is covered.
+        // The background is opaque, so that alpha is 1 everywhere and does not tell coverage.
         let options = RenderOptions { background: [0.1, 0.2, 0.3, 1.0], ..RenderOptions::default() };
         Truth::cast(&Surface::Analytic(Shape::Sphere), &camera, &options, 4, &()).unwrap()
     }
 
-    /// The measures of the perfect frame with a fault, and how many pixels are inside and covered.
+    /// Returns the measures of the perfect frame with a fault, and the numbers of inside and
+    /// covered pixels.
     fn with(fault: impl Fn(&mut Frame, &Truth)) -> (Reconstruction, f64, f64) {
         let truth = truth();
         let mut frame = truth.frame.clone();
@@ -213,7 +227,7 @@ mod tests {
         bytemuck::cast_slice_mut(frame.map_mut(Map::Normal).unwrap())
     }
 
-    /// An outline that lies two pixels outside the true circle, all around.
+    /// The outline lies two pixels outside the true circle, all around.
     #[test]
     fn outlines_are_as_far_apart_as_they_were_moved() {
         let covered = truth().frame.map(Map::Depth).unwrap().iter().filter(|depth| depth.is_finite()).count();
@@ -228,7 +242,7 @@ mod tests {
             }
         };
         let found = with(widen).0.outline_px.unwrap();
-        // A ring is longer outside.
+        // The outer edge of a ring is longer.
         let expected = 2.0 * (1.0 + 1.0 / (wider - 2.0));
         assert!((found / expected - 1.0).abs() < 0.05, "{found} for {expected}");
         assert_eq!(with(|_, _| ()).0.outline_px, Some(0.0));
@@ -260,7 +274,7 @@ mod tests {
             assert!(error.leak_rate == Some(0.0) && error.psnr_db.is_some() && error.max_abs > 0.05);
             assert!(error.ssim.unwrap() < 0.9999);
         }
-        // What is drawn too much is no hole.
+        // A pixel that is drawn in excess is no hole.
         let (error, _, covered) = with(|frame, _| depths(frame)[0] = 1.0);
         assert_eq!((error.hole_rate, error.silhouette_iou), (Some(0.0), Some(covered / (covered + 1.0))));
         let (empty, ..) = with(|frame, _| depths(frame).fill(f32::INFINITY));
@@ -292,7 +306,8 @@ mod tests {
         let depth = error.depth_relative.unwrap();
         assert!(near(depth.mean, 0.01) && near(depth.rmse, 0.01) && near(depth.percentile_99, 0.01), "{depth:?}");
         assert_eq!((error.normal_degrees, error.psnr_db), (NO_NORMAL_ERROR, None));
-        // One pixel moves the mean and the root, by as much as it is one of many, and not the percentile.
+        // One pixel changes the mean and the root by its share of all pixels, and the percentile
+        // not at all.
         let (error, inside, _) = with(|frame, _| depths(frame)[CENTER] *= 1.1);
         let depth = error.depth_relative.unwrap();
         assert!(near(depth.mean, 0.1 / inside) && near(depth.rmse, 0.1 / inside.sqrt()) && depth.percentile_99 == 0.0);

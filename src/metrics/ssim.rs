@@ -8,12 +8,14 @@ const WINDOW: usize = 11;
 /// The standard deviation of a window's Gaussian weights, pixels.
 const SIGMA: f64 = 1.5;
 
-/// `(K1 L)^2` and `(K2 L)^2` for values that span L = 1.
+/// `(K1 L)^2` and `(K2 L)^2` for values with the range L = 1.
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
-/// The mean over all windows that lie in the images of Eq. 13, in [-1, 1]. Rows from the top, `width` values each. None for
-/// images without a whole window. A window with a value that is not a number counts as -1.
+/// Returns the mean of Eq. 13 over all windows that lie in the images, in [-1, 1]; None if no
+/// window fits.
+///
+/// The images are rows from the top, `width` values each. A window with a NaN counts as -1.
 pub(super) fn mean_ssim(a: &[f64], b: &[f64], width: usize) -> Option<f64> {
     let mean = |value: &(dyn Fn(usize) -> f64 + Sync)| {
         let values: Vec<f64> = (0..a.len()).map(value).collect();
@@ -32,7 +34,8 @@ pub(super) fn mean_ssim(a: &[f64], b: &[f64], width: usize) -> Option<f64> {
     (windows > 0).then(|| (0..windows).map(similarity).sum::<f64>() / windows as f64)
 }
 
-/// The weighted mean over each window: the weights are a product, so rows first and columns then.
+/// The weighted mean over each window. The weights are separable, so rows are summed first, then
+/// columns.
 fn windowed(values: &[f64], width: usize) -> Vec<f64> {
     let weights: [f64; WINDOW] = std::array::from_fn(|k| {
         let from_middle = k as f64 - (WINDOW / 2) as f64;

@@ -1,24 +1,29 @@
-//! Disks of a part of a cloud, which end where the cloud does.
+//! Clips the disks of a part of a cloud where the whole cloud ends.
 //!
-//! The fewer points are taken of a cloud the larger are their disks, and the farther those at its borders stand out past them. Clouds of
-//! surveys end at the faces of a box, as they are cut into tiles, and files tell the box of all their points.
+//! The fewer points of a cloud are used, the larger are their disks, and the farther the disks at
+//! its borders stand out past them. Surveys are cut into tiles, so their clouds end at the faces of
+//! a box, and the files state the box of all their points.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::scene::{Bounds, Clip, Scene, Surfel};
 
-/// A face cuts the disks that stand up on it: those whose plane's normal has at most this cosine with its own. Where a surface touches a face
-/// it does not end there.
+/// A face clips only disks whose unit normal has at most this component along the face's normal. A
+/// surface that merely touches a face does not end there.
 const MOST_ALONG: f64 = 0.5;
 
-/// How far outside a face, in a disk's own reach across it, a centre may lie that is of the box: places are rounded, in files and in f32, but
-/// by less than disks show.
+/// A centre counts as inside the box up to this fraction of the disk's reach across the face
+/// outside it. Positions are rounded, in files and in f32, but by less than is visible at the
+/// disk's size.
 const ROUNDED: f64 = 1.0 / 128.0;
 
-/// Cuts the disks of a part of a cloud near the faces of the box of all its points, world coordinates. Past a face they reach as far as disks of all points would around a
-/// point in it, of which `part` says, at their centres, how large they are in the unit of these. Lines are of disks' planes: caps end with them. Where disks end at edges
-/// already nothing is done.
+/// Clips the disks of a part of a cloud near the faces of `bounds`, the box of all its points.
+///
+/// `bounds` is in world coordinates. `part` returns the radius that a disk of all points would have
+/// at a centre, as a fraction of the radius of the disk there: past a face, disks are kept as far
+/// as a disk of all points around a point on the face would reach. The clip lines lie in the disks'
+/// planes and clip their caps too. A scene that already has clip lines is left unchanged.
 pub fn end_at(scene: &mut Scene, bounds: &Bounds, part: impl Fn(DVec3) -> f64 + Sync) {
     if bounds.is_empty() || !scene.clips.is_empty() {
         return;
@@ -30,7 +35,7 @@ pub fn end_at(scene: &mut Scene, bounds: &Bounds, part: impl Fn(DVec3) -> f64 + 
     }
 }
 
-/// The lines of a disk at the faces that cut most of it.
+/// The clip lines at the two faces that clip most of the disk.
 fn ending(surfel: &Surfel, center: DVec3, bounds: &Bounds, part: impl Fn(DVec3) -> f64) -> Clip {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let normal = s.cross(t).normalize_or_zero();
@@ -39,7 +44,7 @@ fn ending(surfel: &Surfel, center: DVec3, bounds: &Bounds, part: impl Fn(DVec3) 
         let reach = s[axis].hypot(t[axis]);
         for (side, inside) in [(1.0, bounds.max[axis] - center[axis]), (-1.0, center[axis] - bounds.min[axis])] {
             if inside < -ROUNDED * reach {
-                // No point of the box.
+                // The centre lies outside the box.
                 return Clip::NONE;
             }
             if inside < reach && normal[axis].abs() <= MOST_ALONG {
@@ -75,16 +80,17 @@ mod tests {
         let up = |x: f32, y: f32| Surfel::ellipse(Vec3::new(x, y, 0.0), Vec3::X * 2.0, Vec3::Y);
         let mut scene = scene(vec![up(0.0, 0.0), up(9.0, 0.0), up(-9.5, 9.75), up(12.0, 0.0)]);
         end_at(&mut scene, &bounds(), |_| 0.25);
-        // In the middle, and of a point outside, which is none of the box, nothing is cut.
+        // A disk in the middle is not clipped, nor is one whose centre is outside the box.
         assert!(scene.clips[0].is_none() && scene.clips[3].is_none());
-        // 1 inside, and a quarter of 2 past it: 1.5 of 2.
+        // Along x, disk 1 reaches 2. It is kept to 1 inside the face and 2 / 4 past it: u <= 0.75.
         let inside = |surfel: usize, u: f64, v: f64| scene.clips[surfel].inside(u, v);
         assert!(inside(1, 0.749, 0.6) > 0.0 && inside(1, 0.751, 0.0) < 0.0 && inside(1, -1.0, 0.0) > 0.0);
-        // At a corner both lines cut: 0.5 and a half of 2 along x, 0.25 and a quarter of 1 along y.
+        // At a corner both lines clip: x at 0.5 + 2 / 4 of 2, and y at 0.25 + 1 / 4 of 1.
         assert!(inside(2, -0.499, 0.499) > 0.0 && inside(2, -0.501, 0.0) < 0.0 && inside(2, 0.0, 0.501) < 0.0);
     }
 
-    /// A row of points at a face lies on it, wherever f32 puts it; and where everything was taken nothing is cut.
+    /// A row of points on a face is inside the box, however f32 rounds it. If all points are used,
+    /// nothing is clipped.
     #[test]
     fn a_row_at_a_face_is_of_the_box() {
         let face = 500.01;

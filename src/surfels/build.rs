@@ -1,4 +1,4 @@
-//! From points to the scene that is rendered.
+//! Builds the scene that is rendered from points.
 
 use std::sync::Arc;
 
@@ -22,34 +22,39 @@ use crate::scene::scene::{low_parts, shows};
 use crate::scene::{Atlas, Bounds, Cap, Clip, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
-/// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
-/// on it are as exact as others.
+/// The largest radius of a disk, in extents of the scene. Seen from anywhere near the scene, such a
+/// disk is an infinite plane, and depths on it are as exact as on any other disk.
 pub(super) const LARGEST_IN_EXTENTS: f64 = 1e6;
 
-/// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
+/// The largest absolute texture coordinate: larger f32 values have too few fractional bits for a
+/// texture.
 pub(super) const LARGEST_PLACE: f32 = 1e4;
 
-/// Makes one scene of the points of all inputs, within the default [`Limits`].
+/// Builds one scene from the points of all inputs, within the default [`Limits`].
 ///
-/// Surfels keep the order of the points. Each is the ellipse of its half-axes where they are given, else a disk. What a point lacks
-/// is estimated from its neighbours among all points; the result for a point does not depend on the order the points come in, to
-/// the last bit.
+/// Surfels keep the order of the points. A point with half-axes becomes that ellipse, one with a
+/// normal and a radius a disk. Missing attributes are estimated from the neighbours among all
+/// points. The result for a point is the same to the bit for any order of the points.
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`] if no input holds a usable point, and
-/// [`Error::Usage`] if normals or radii are missing and there are more than 2^32 - 1 points.
+/// [`Error::EmptyScene`] if no input holds a usable point, and [`Error::Usage`] if normals or radii
+/// are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     build_within(inputs, Vec::new(), &Limits::default(), progress)
 }
 
-/// Makes one scene of the points of all inputs, painted with `textures` at the points' texture coordinates, instead of their colours: one
-/// for all, or in the order of the inputs one for each, or as many as its [`Points::texture_numbers`] name.
+/// Builds one scene from the points of all inputs, painted with `textures` at the points' texture
+/// coordinates instead of their colours.
+///
+/// There is one texture for all inputs, or one for each input in their order, or as many as the
+/// inputs' [`Points::texture_numbers`] name. Points of inputs without coordinates keep their
+/// colours.
 ///
 /// # Errors
 ///
-/// The errors of [`build`], and [`Error::Usage`] if no input has texture coordinates, or there are
-/// more or fewer textures. Points of inputs without coordinates keep their colours.
+/// The errors of [`build`], and [`Error::Usage`] if no input has texture coordinates, or the number
+/// of textures is none of these.
 pub fn build_textured(
     inputs: Vec<Points>,
     textures: Vec<Texture>,
@@ -58,12 +63,14 @@ pub fn build_textured(
     build_within(inputs, textures, &Limits::default(), progress)
 }
 
-/// [`build`], or with textures [`build_textured`], within other limits than the default ones. Radii and half-axes that are given,
-/// those of a mesh's vertices too, are no matter of [`Limits::largest_ratio`].
+/// Builds a scene as [`build`] does, or [`build_textured`] if there are textures, within `limits`.
+///
+/// [`Limits::largest_ratio`] does not apply to given radii and half-axes, nor to those of a mesh's
+/// vertices.
 ///
 /// # Errors
 ///
-/// Those of [`build`] and [`build_textured`], and [`Error::Usage`] for limits out of range.
+/// The errors of [`build`] and [`build_textured`], and [`Error::Usage`] for limits out of range.
 pub fn build_within(
     inputs: Vec<Points>,
     textures: Vec<Texture>,
@@ -82,7 +89,8 @@ pub fn build_within(
     painting::painted(inputs, textures.into_iter().map(Arc::new).collect(), limits, progress)
 }
 
-/// The scene of points with texture coordinates, and these, of which unusable ones are replaced, in the plane of so many textures at least.
+/// Builds the scene of points with texture coordinates, and returns the coordinates in the common
+/// plane of at least `textures` textures. Unusable coordinates become 0 and are counted.
 pub(super) fn built_in_texture(
     mut gathered: Gathered,
     textures: u32,
@@ -100,12 +108,13 @@ pub(super) fn built_in_texture(
     Ok((scene, preparation, Coordinates { atlas, ..places }))
 }
 
-/// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface. With the
-/// texture coordinates of the surfels, if all inputs have some.
+/// Builds a scene as [`build`] does, but always with the surfels of a mesh at its vertices, for
+/// algorithms that use surfels as samples of a surface. Also returns the surfels' texture
+/// coordinates if all inputs have some.
 ///
 /// # Errors
 ///
-/// Those of [`build`].
+/// The errors of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
     let mut inputs = inputs;
     settle_colors(&mut inputs);
@@ -118,7 +127,7 @@ pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result
         (gathered.points.texture, gathered.points.texture_slopes) = (None, None);
     }
     gathered.points = std::mem::take(&mut gathered.points).in_light();
-    // Samples are where the surfels are, however those curve.
+    // Only the samples' positions matter, not how their surfels curve.
     let flat = Limits { curved: false, ..Limits::default() };
     built_in_texture(gathered, 1, &flat, progress)
 }
@@ -126,21 +135,24 @@ pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result
 /// The texture coordinates of surfels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coordinates {
-    /// At their centres, origin bottom left, in the plane of their textures; none of a scene without any.
+    /// Coordinates (u, v) at the surfels' centres, origin bottom left, in the common plane of the
+    /// textures; empty for a scene without any.
     pub centers: Vec<[f32; 2]>,
-    /// What they gain for a world unit along x, y and z, where the points say it; all zero of those that do not.
+    /// The gradients of u and of v along x, y and z, per world unit; all zero where they are
+    /// unknown.
     pub slopes: Vec<[[f32; 3]; 2]>,
-    /// How their textures lie in that plane.
+    /// The layout of the textures in that plane.
     pub atlas: Atlas,
 }
 
-/// The scene, and the texture coordinates of its surfels.
+/// The scene, its preparation, and the texture coordinates of its surfels.
 pub(super) type Built = ((Scene, Preparation), Coordinates);
 
 pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
     let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(gathered.points.positions.len(), |index| DVec3::from_array(gathered.points.positions[index]));
-    // That of the file's nodes, or else of the points, which may be rounded about that one.
+    // Points of a file with levels of detail may be rounded relative to the origin that the file
+    // states, so that origin is used. Otherwise it is computed from the points.
     let of_tree = gathered.points.whole.as_ref().filter(|whole| gathered.points.tree.is_some() && whole.is_near());
     let origin = of_tree.map_or_else(|| origin_for(&body), |whole| whole.origin);
     let up = gathered.points.up.unwrap_or_else(|| guess_up(&body));
@@ -172,7 +184,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
         None
     };
     let mut surfels = given.surfels(estimated.as_ref(), origin);
-    // Nobody says which side of a Gaussian is its front.
+    // Gaussians have no front side.
     let oriented = preparation.estimated_normals == 0
         && !preparation.has_random_sides()
         && !gathered.points.encoded
@@ -193,7 +205,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let Points { colors, encoded, closed, clips, texture, texture_slopes, tree, .. } = points;
     let (centers, slopes) = (texture.unwrap_or_default(), texture_slopes.unwrap_or_default());
     let (colors, closed) = (colors::folded(colors), closed && oriented);
-    // Most scenes have no disk that ends before its rim.
+    // Most scenes have no clipped disk, and then no list of clip lines.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
@@ -201,19 +213,20 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     hierarchy.iter_mut().for_each(|tree| tree.settle(&surfels, &of_disks.low));
     let hierarchy = hierarchy.map(Arc::new);
     let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, hierarchy, ..of_disks };
-    // As the default view sees it.
+    // The points that the default view leaves out.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), Coordinates { centers, slopes, atlas: Atlas::ONE }))
 }
 
-/// The caps of these surfels; none where all are flat, as they are in most scenes.
+/// The caps of these surfels, limited to usable heights; empty if all are flat, as in most scenes.
 fn usable_caps(caps: Vec<Cap>, surfels: &[Surfel]) -> Vec<Cap> {
     let caps = caps.into_iter().zip(surfels);
     let caps: Vec<Cap> = caps.map(|(cap, surfel)| cap.usable(surfel.radius().into())).collect();
     if caps.iter().all(Cap::is_flat) { Vec::new() } else { caps }
 }
 
-/// The ellipse of these half-axes, turned into the plane across a unit normal; its half-axes keep their lengths.
+/// The ellipse with the half-axes `axes` turned into the plane across `normal`: s is projected onto
+/// that plane, and both keep their lengths.
 fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
     let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
     let normal = normal.as_dvec3().normalize();
@@ -222,22 +235,23 @@ fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
     Surfel::ellipse(center, s.as_vec3(), t.as_vec3())
 }
 
-/// A given normal that is turned by less from the half-axes' is theirs, radians.
+/// A given normal that differs from the half-axes' by less than this angle, radians, equals it.
 const LEAST_TURN: f32 = 1e-3;
 
-/// The unit normal of a surfel's plane.
+/// The unit normal of a surfel's plane; +z if it is degenerate.
 pub(super) fn plane_of(surfel: &Surfel) -> Vec3 {
     unit(surfel.normal().to_array()).unwrap_or(Vec3::Z)
 }
 
-/// The normal that is given beside half-axes, if it is another one than theirs; else that of their plane.
+/// The given normal of point `i` if it also has half-axes and their normal is another one; else the
+/// normal of the surfel's plane.
 pub(super) fn own_normal(given: &Given<'_>, i: usize, surfel: &Surfel) -> [f32; 3] {
     let normal = given.axes(i).and_then(|_| given.normal(i));
     let plane = plane_of(surfel);
     normal.filter(|normal| normal.angle_between(plane) > LEAST_TURN).unwrap_or(plane).to_array()
 }
 
-/// The normals that are given beside half-axes, where they are others than theirs.
+/// The normal of each surfel, if any given normal differs from that of its half-axes; else empty.
 fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
     let own = |(i, surfel): (usize, &Surfel)| own_normal(given, i, surfel);
     let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane_of(surfel).to_array();
@@ -248,7 +262,7 @@ fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
     surfels.par_iter().enumerate().map(own).collect()
 }
 
-/// What points have that is usable.
+/// The attributes of points, of which unusable ones count as missing.
 pub(super) struct Given<'a>(pub(super) &'a Gathered);
 
 impl Given<'_> {
@@ -264,18 +278,18 @@ impl Given<'_> {
         usable_radius(*self.0.points.radii.as_ref()?.get(i)?)
     }
 
-    /// How the disk of its half-axes curves.
+    /// The given cap, if there are usable half-axes.
     fn cap(&self, i: usize) -> Option<Cap> {
         self.axes(i).and(self.0.points.caps.as_ref()?.get(i).copied())
     }
 
-    /// Those that are given; none where no input has any.
+    /// The given caps, flat where they are missing; empty if no input has any.
     pub(super) fn caps(&self) -> Vec<Cap> {
         let count = self.0.points.caps.as_ref().map_or(0, Vec::len);
         (0..count).map(|i| self.cap(i).unwrap_or_default()).collect()
     }
 
-    /// The points' surfels, of which what is lacking was `estimated`, about `origin`.
+    /// The surfels of all points relative to `origin`, with missing attributes from `estimated`.
     pub(super) fn surfels(&self, estimated: Option<&Estimated>, origin: DVec3) -> Vec<Surfel> {
         let estimate_of = |i: usize| estimated.map_or_else(Estimate::default, |all| all.of_point(i));
         let surfel = |(i, position): (usize, &[f64; 3])| {
@@ -306,7 +320,7 @@ impl Given<'_> {
     }
 }
 
-/// What was estimated for the points that lack something.
+/// The estimates for points that lack attributes.
 pub(super) struct Estimated {
     distinct: DistinctPositions,
     of_position: Vec<Estimate>,
@@ -318,7 +332,8 @@ impl Estimated {
         self.of_position[self.distinct.of_point()[i] as usize]
     }
 
-    /// The caps of surfels of points whose sizes are estimated; normals tell sides if they are `sided`.
+    /// The cap of each surfel: the given one, or where the size was estimated, the curvature of the
+    /// surface. `sided` says whether the normals tell its two sides apart.
     fn caps(&self, given: &Given<'_>, surfels: &[Surfel], sided: bool) -> Vec<Cap> {
         let of_point = self.distinct.of_point();
         let normals = normals_at(&self.distinct, |i| given.normal(i));
@@ -336,7 +351,9 @@ impl Estimated {
     }
 }
 
-/// Estimates what is not `given`, with the direction of up and the largest ratio of a radius to those around it.
+/// Estimates the missing attributes, with the direction of `up` and the largest ratio of a radius
+/// to those of its neighbours. Returns the estimate for each position and the neighbours, and fills
+/// in the counts of `preparation`.
 fn estimated(
     given: &Given<'_>,
     distinct: &DistinctPositions,
@@ -365,7 +382,8 @@ fn estimated(
     (of_position, graph)
 }
 
-/// Limits disks to [`LARGEST_IN_EXTENTS`] and says how many were larger.
+/// Shortens half-axes to [`LARGEST_IN_EXTENTS`] times the scene's size; returns how many surfels
+/// changed.
 ///
 /// # Errors
 ///
@@ -375,17 +393,17 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     if extent >= SMALLEST_SCENE && f64::from(largest) <= LARGEST_IN_EXTENTS * extent {
         return Ok(0);
     }
-    // Where most disks are larger than the box of their centres, they are the scene.
+    // If most disks are larger than the box of their centres, their size is that of the scene.
     let typical = estimate::median(&mut surfels.par_iter().map(|surfel| surfel.radius().into()).collect::<Vec<_>>());
     let size = extent.max(2.0 * typical.unwrap_or(0.0));
     if size < SMALLEST_SCENE {
         return Err(Error::EmptyScene(format!(
-            "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
+            "the scene is {size:.1e} world units wide, but only scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} can be drawn: scale it"
         )));
     }
     let most = LARGEST_IN_EXTENTS * size;
     let limit = |surfel: &mut Surfel| {
-        // Each half-axis by itself, so that a thin ellipse stays one.
+        // Each half-axis is limited by itself, so that a thin ellipse stays one.
         let shortened = |axis: [f32; 3]| {
             let axis = DVec3::from_array(axis.map(f64::from));
             axis.clamp_length_max(most).as_vec3().to_array()
@@ -397,7 +415,8 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     Ok(surfels.par_iter_mut().map(limit).sum())
 }
 
-/// The largest error of a centre, `center` with all its digits, where it shows at its disk's size.
+/// The largest rounding error of a centre's coordinate, world units, among surfels at whose size it
+/// is visible; None if there are none. `center` returns exact centres relative to the origin.
 fn rounding(surfels: &[Surfel], low: &[[f32; 3]], center: impl Fn(usize) -> DVec3 + Sync) -> Option<f64> {
     let error = |(index, low): (usize, &[f32; 3])| {
         let surfel = &surfels[index];

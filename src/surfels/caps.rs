@@ -1,4 +1,4 @@
-//! Caps of points: how the surface curves around each, as its neighbours say.
+//! Caps of points: the curvature of the surface around each, estimated from its neighbours.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -13,7 +13,8 @@ use crate::io::Points;
 use crate::scene::{Bounds, Cap, body};
 use crate::{Progress, Result};
 
-/// The caps of points of these normals, which tell sides if they are `sided`, and half-axes.
+/// The caps of surfels with these `normals` and half-axes; `sided` says whether the normals tell
+/// the two sides of the surface apart.
 pub(super) fn caps_of(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     (normals, sided): (&[[f32; 3]], bool),
@@ -26,10 +27,13 @@ pub(super) fn caps_of(
     axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
 }
 
-/// Gives points with half-axes the caps of the surface that their planes touch, whatever normals it is lit by. Points without half-axes
-/// stay as they are.
+/// Gives points with half-axes the caps of the surface that is tangent to their planes.
+///
+/// The normals of the half-axes count, not those that the points are lit by. Points without
+/// half-axes are returned unchanged.
 ///
 /// # Errors
+///
 /// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 points.
 pub fn curve(points: Points, progress: &dyn Progress) -> Result<Points> {
     let Some(axes) = &points.axes else { return Ok(points) };

@@ -1,10 +1,11 @@
-//! The colours of several inputs as one.
+//! Joins the colours of several inputs.
 
 use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb};
 use crate::scene::harmonics::terms_of;
 use crate::scene::{Colors, Harmonics};
 
-/// The colours of inputs, until all have come. 8-bit colours stay so if nothing else comes.
+/// Collects the colours of all inputs before they are joined. If all of them are 8-bit codes, the
+/// result is too.
 #[derive(Default)]
 pub(crate) struct ColorGatherer {
     inputs: Vec<Input>,
@@ -12,31 +13,33 @@ pub(crate) struct ColorGatherer {
 
 struct Input {
     colors: Option<Colors>,
-    /// Its points, with colours or without.
+    /// The number of its points, with or without colours.
     count: usize,
-    /// Colours are codes ([`Scene::encoded`](crate::scene::Scene::encoded)).
+    /// The colours are sRGB codes of Gaussians ([`Scene::encoded`](crate::scene::Scene::encoded)).
     encoded: bool,
 }
 
-/// Those of all points.
+/// The colours of all points.
 pub(crate) struct GatheredColors {
-    /// None if none came with any.
+    /// None if no input has any.
     pub colors: Option<Colors>,
-    /// They are codes: those of an input were.
+    /// The colours are sRGB codes, because those of an input are.
     pub encoded: bool,
-    /// How many were not usable and became [`DEFAULT_COLOR`], or lost terms of their harmonics.
+    /// The number of unusable colours, which became [`DEFAULT_COLOR`], plus the number of points
+    /// with unusable coefficients of harmonics, which became 0.
     pub replaced: u64,
-    /// How many had an alpha outside of [0, 1].
+    /// The number of colours whose alpha was outside [0, 1].
     pub clamped: u64,
 }
 
 impl ColorGatherer {
-    /// Adds `count` points and their colours, codes if `encoded`; missing ones get the default, surplus ones are ignored.
+    /// Adds the colours of `count` points, codes if `encoded`. Missing ones become the default,
+    /// surplus ones are ignored.
     pub fn append(&mut self, colors: Option<Colors>, count: usize, encoded: bool) {
         self.inputs.push(Input { colors, count, encoded });
     }
 
-    /// The colours of all points.
+    /// Joins the colours of all points.
     pub fn finish(self) -> GatheredColors {
         let encoded = self.inputs.iter().any(|input| input.encoded && input.count > 0);
         let mut all = GatheredColors { colors: None, encoded, replaced: 0, clamped: 0 };
@@ -67,11 +70,12 @@ impl ColorGatherer {
     }
 }
 
-/// The degree of harmonics, and their terms.
+/// The degree of spherical harmonics, and their coefficients.
 type Terms = (u32, Vec<f32>);
 
 impl Input {
-    /// A straight colour each, as the scene has it, and the harmonics' terms with their degree.
+    /// A colour per point with straight alpha, encoded if the scene's colours are, and the
+    /// coefficients of its harmonics with their degree.
     fn linear(self, all: &mut GatheredColors) -> (Vec<[f32; 4]>, Option<Terms>) {
         let (mut colors, terms) = match self.colors {
             None => (Vec::new(), None),
@@ -80,7 +84,7 @@ impl Input {
                 ((0..of_file.min(self.count)).map(|i| codes.linear(i)).collect(), None)
             }
             Some(Colors::Linear(colors)) => (colors, None),
-            // The inputs of a scene may have different textures: the means over the disks.
+            // Inputs may have different textures, so each disk gets the mean of its texture.
             Some(Colors::Textured(textured)) => (textured.colors().to_vec(), None),
             Some(Colors::Constant(color)) => (vec![color; self.count], None),
             Some(Colors::Harmonics(harmonics)) => {
@@ -109,7 +113,7 @@ impl Input {
     }
 }
 
-/// Puts `added` behind `all`; what is first is moved.
+/// Appends `added` to `all`; the first vector is moved, not copied.
 fn append<T>(all: &mut Vec<T>, mut added: Vec<T>) {
     if all.is_empty() {
         *all = added;
@@ -118,7 +122,8 @@ fn append<T>(all: &mut Vec<T>, mut added: Vec<T>) {
     }
 }
 
-/// The terms of `count` points at a degree that may be higher than their own; those that are no numbers become 0.
+/// Extends the coefficients of `count` points to the possibly higher `degree` with zeros. Unusable
+/// coefficients become 0 and are counted.
 fn widened(terms: Option<Terms>, (count, degree): (usize, u32), replaced: &mut u64) -> Vec<f32> {
     let each = 3 * terms_of(degree);
     let Some((own_degree, mut terms)) = terms else { return vec![0.0; count * each] };
@@ -140,7 +145,7 @@ fn widened(terms: Option<Terms>, (count, degree): (usize, u32), replaced: &mut u
     wide
 }
 
-/// The 8-bit codes of inputs that have nothing else.
+/// The 8-bit codes of all points, for inputs that have only codes or no colours.
 fn codes(inputs: Vec<Input>) -> Vec<[u8; 4]> {
     let mut all = Vec::new();
     for input in inputs {
@@ -151,7 +156,7 @@ fn codes(inputs: Vec<Input>) -> Vec<[u8; 4]> {
     all
 }
 
-/// The same colours, as [`Colors::Constant`] where there is one only. The default where there are none.
+/// The same colours, as [`Colors::Constant`] if all are equal; [`DEFAULT_COLOR`] if there are none.
 pub(crate) fn folded(colors: Option<Colors>) -> Colors {
     let Some(colors) = colors else { return Colors::Constant(DEFAULT_COLOR) };
     let first = match &colors {
@@ -165,14 +170,15 @@ pub(crate) fn folded(colors: Option<Colors>) -> Colors {
     first.map_or(colors, Colors::Constant)
 }
 
-/// The largest channel of a colour, whose products and differences on the way through f32 stay finite.
+/// The largest magnitude of a colour channel: products and differences of such f32 values stay
+/// finite.
 const LARGEST: f32 = 1e18;
 
 fn is_held(value: f32) -> bool {
     value.abs() <= LARGEST
 }
 
-/// NaN is not usable.
+/// Whether all channels are within [`LARGEST`]; false for NaN.
 fn is_usable(color: &[f32; 4]) -> bool {
     color.iter().all(|c| is_held(*c))
 }

@@ -1,4 +1,5 @@
-//! Surfels of points that lack nothing: as [`build`](super::build()) makes them, of any part of the points by itself.
+//! Builds surfels from points that lack no attribute, as [`build`](super::build()) does, but from
+//! any part of the points by itself.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,19 +12,20 @@ use crate::io::Points;
 use crate::scene::whole::Has;
 use crate::scene::{Cap, Clip, Colors, Scene};
 
-/// What some points were.
+/// The points that were added to a scene.
 #[derive(Default)]
 pub(super) struct Added {
-    /// World coordinates of those that are surfels.
+    /// World coordinates of the points that became surfels.
     pub positions: Vec<[f64; 3]>,
-    /// What was done to them.
+    /// The counts of their preparation.
     pub preparation: Preparation,
 }
 
-/// Adds the surfels of the usable points of `inputs` to a scene, about its origin, with what all of its surfels have; None if one lacks what would have to be
+/// Adds the surfels of the usable points of `inputs` to a scene, relative to its origin, with the
+/// optional lists in `has`. Returns None if a point lacks an attribute that would have to be
 /// estimated.
 ///
-/// Colours are added where the scene has a list of the same kind.
+/// Colours are added if the scene has a list of the same kind.
 pub(super) fn add(scene: &mut Scene, inputs: Vec<Points>, has: Has) -> Option<Added> {
     let points = inputs.iter().map(|input| input.positions.len() as u64).sum();
     let gathered = match gather(inputs) {
@@ -58,7 +60,7 @@ pub(super) fn add(scene: &mut Scene, inputs: Vec<Points>, has: Has) -> Option<Ad
     Some(Added { positions: points.positions, preparation })
 }
 
-/// Puts the surfels of a part behind those of another one.
+/// Appends the surfels of `part` to `scene`.
 pub(super) fn append(scene: &mut Scene, mut part: Scene) {
     scene.surfels.append(&mut part.surfels);
     scene.low.append(&mut part.low);
@@ -68,7 +70,7 @@ pub(super) fn append(scene: &mut Scene, mut part: Scene) {
     match (&mut scene.colors, part.colors) {
         (Colors::Srgb8(all), Colors::Srgb8(mut own)) => all.append(&mut own),
         (Colors::Linear(all), Colors::Linear(mut own)) => all.append(&mut own),
-        // One for all.
+        // One colour for all surfels.
         _ => {}
     }
 }

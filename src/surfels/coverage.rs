@@ -1,4 +1,4 @@
-//! Whether the surfels of a scene close its surface.
+//! Measures whether the surfels of a scene leave gaps in its surface.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -12,57 +12,63 @@ use super::sizes::{Surroundings, surroundings};
 use crate::scene::{Clip, Scene, Surfel};
 use crate::{Progress, Result};
 
-/// Neighbours that gaps are looked for between. In a random sampling 16 know too few of the wide
-/// ones; aslant, heights move others in between.
+/// The number of neighbours between which gaps are searched. In random samples, 16 neighbours do
+/// not bound the wide gaps; seen aslant, points at other heights shift in between.
 const NEIGHBOURS: usize = 64;
 
-/// The part of what neighbours bound in the plane that they bound aslant, too.
+/// For oblique lines of sight, the cell is only known within this fraction of the radius within
+/// which the neighbours bound it in the plane.
 const KNOWN_ASLANT: f64 = 0.7;
 
-/// The cosine of the angle between surfels of one side: 60 degrees.
+/// The least cosine between the normals of two surfels of the same side: 60 degrees.
 const SAME_SIDE: f64 = 0.5;
 
-/// A gap is closed by a disk that reaches it but for rounding.
+/// Relative rounding tolerance: a disk that misses a gap by less than this still closes it.
 const ROUNDING: f64 = 1e-5;
 
-/// The angle between a line of sight aslant and a surfel's plane, degrees.
+/// The angle between an oblique line of sight and a surfel's plane, degrees.
 pub const ASLANT: f64 = 10.0;
 
-/// Positions that are looked at aslant, at most: of more, evenly many are left out.
+/// At most this many positions are examined along oblique lines of sight; a cloud with more is
+/// sampled regularly.
 const MOST_ASLANT: usize = 50_000;
 
-/// Lines of sight aslant, from as many sides of a surfel.
+/// The number of oblique lines of sight, evenly distributed around a surfel's normal.
 const SIDES: usize = 4;
 
-/// Directions in which there has to be a surfel next to a place, so that it lies among them and not
-/// past an outline.
+/// A point lies among surfels, and not past an outline, if in each of this many directions there is
+/// a surfel beyond it.
 const OUTWARD: usize = 8;
 
-/// The sine of the angle under which a disk has to be seen to close a gap: 3 degrees.
+/// A disk can close a gap only if the sine of the angle between its plane and the line of sight is
+/// larger than this: 3 degrees.
 const EDGE_ON: f64 = 0.05;
 
-/// How dense a scene's surfels are, and how much of the surface they cover.
+/// The density of a scene's surfels, and the fraction of the surface that they cover.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Coverage {
-    /// Median distance from a surfel to the nearest one elsewhere, world units.
+    /// Median distance from a surfel's centre to the nearest other centre, world units.
     pub spacing: f64,
-    /// Share of the surfels that a surface surrounds around which no gap is open.
+    /// The fraction of surfels without an open gap around them, among those that lie on a surface.
     pub covered: f64,
-    /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the
-    /// surfel's plane, is a place that neither its own disk nor one of its 64 nearest neighbours'
-    /// reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary
-    /// such a place may lie outside.
+    /// The number of surfels with an open gap around them.
+    ///
+    /// A gap is open if a point between the centre and a corner of its Voronoi cell in the surfel's
+    /// plane is covered neither by a disk at the centre nor by one of the 64 nearest neighbours'.
+    /// Beyond a clip line at which the surface ends, nothing has to be covered. At a ragged
+    /// boundary, such a point may lie outside the surface.
     pub open: u64,
-    /// Surfels that no surface surrounds, such as those of leaves and wires: of them nothing is
-    /// said.
+    /// The number of surfels that do not lie on a surface, such as those of leaves and wires. They
+    /// are not examined for gaps.
     pub lone: u64,
-    /// The share of the surfels that a surface surrounds around which no gap is open to eyes that
-    /// look along [`ASLANT`] degrees over the surfel's plane, from any of four sides; measured at
-    /// 50,000 positions. Disks are taken as flat.
+    /// The fraction of surfels without an open gap, among those that lie on a surface, seen at
+    /// [`ASLANT`] degrees to the surfel's plane from four sides. Disks count as flat, and at most
+    /// 50,000 positions are examined.
     pub covered_aslant: f64,
 }
 
-/// Measures how well the surfels of `scene` cover its surface. None if all are at one position.
+/// Measures how well the surfels of `scene` cover its surface. Returns None if all are at one
+/// position.
 ///
 /// # Errors
 ///
@@ -108,16 +114,16 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     Ok(spacing.map(|spacing| Coverage { spacing, covered, open, lone, covered_aslant }))
 }
 
-/// The finding around a position.
+/// The result for a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Found {
     /// No gap is open.
     Closed,
-    /// One is.
+    /// A gap is open in the surfel's plane.
     Open,
-    /// None is but seen aslant.
+    /// A gap is open, but only seen aslant.
     OpenAslant,
-    /// There is no surface.
+    /// The position does not lie on a surface.
     Lone,
 }
 
@@ -125,29 +131,30 @@ impl Found {
     const OF_SURFACES: [Self; 3] = [Self::Closed, Self::Open, Self::OpenAslant];
 }
 
-/// A position among its neighbours, and the disks at all of them.
+/// A position, its neighbours, and the disks at all of them.
 struct Gaps<'a, 'n, At> {
     distinct: &'a DistinctPositions,
     near: &'n [Neighbour],
     at: At,
-    /// The disks at the position, and the largest of them.
+    /// All disks at the position, and then the largest of them.
     here: &'a [(&'a Surfel, Clip)],
     own: (&'a Surfel, Clip),
     /// From the position to its neighbours, scaled units.
     offsets: Vec<DVec3>,
-    /// The surface ends at the own disk's lines.
+    /// Whether the surface ends at the own disk's clip lines.
     ends: bool,
     normal: DVec3,
 }
 
 impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
-    /// None where no disk is at the position.
+    /// Returns None if there is no disk at the position.
     fn new(distinct: &'a DistinctPositions, position: u32, near: &'n [Neighbour], at: At) -> Option<Self> {
         let here = at(position);
         let own = *here.first()?;
         let offset = |other: &Neighbour| distinct.position(other.index) - distinct.position(position);
         let offsets: Vec<DVec3> = near.iter().map(offset).collect();
-        // Past its lines there is no surface, unless the next surfel of the same side is there.
+        // The surface ends at the clip lines, unless there is a surfel of the same side beyond
+        // them.
         let same_side = |disk: &(&Surfel, Clip)| side(disk).dot(side(&own)) > SAME_SIDE;
         let goes_on = |(other, offset): (&Neighbour, &DVec3)| {
             is_past(own, *offset / distinct.scale()) && at(other.index).iter().any(same_side)
@@ -168,17 +175,19 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         }
     }
 
-    /// Within half the distance of the farthest neighbour all that bounds the cell is known.
+    /// The radius within which the neighbours fully bound the cell: half the distance of the
+    /// farthest.
     fn known(&self) -> f64 {
         0.5 * self.offsets.last().map_or(0.0, |farthest| farthest.length())
     }
 
-    /// The own disk's longer half-axis, and a little more.
+    /// The length of the own disk's longer half-axis, plus rounding.
     fn rim(&self) -> f64 {
         (1.0 + 10.0 * ROUNDING) * f64::from(self.own.0.radius()) * self.distinct.scale()
     }
 
-    /// Whether one of the disks fits, given with the offset of its centre, scaled units.
+    /// Whether `fits` holds for any disk; it is called with the disk and the offset of its centre,
+    /// scaled units.
     fn any_disk(&self, fits: impl Fn(&(&Surfel, Clip), DVec3) -> bool) -> bool {
         let near = self.near.iter().zip(&self.offsets);
         self.here.iter().any(|disk| fits(disk, DVec3::ZERO))
@@ -197,7 +206,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         corners.any(|corner| !closed(corner) || !closed(corner.clamp_length_max(self.rim())))
     }
 
-    /// Whether one is open to an eye aslant.
+    /// Whether a gap is open along any oblique line of sight.
     fn is_any_open_aslant(&self) -> bool {
         let (along, across) = self.normal.any_orthonormal_pair();
         let (sine, cosine) = ASLANT.to_radians().sin_cos();
@@ -207,14 +216,16 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         })
     }
 
-    /// Whether an eye that looks against `sight`, a unit vector, sees past all disks in a corner of
-    /// the cell that the surfels have as they lie in the image: each is moved along the line of
-    /// sight into the own one's plane. Corners count that lie among surfels that face the eye;
-    /// others may lie past an outline.
+    /// Whether a line of sight along `sight`, a unit vector, passes all disks at a corner of the
+    /// cell in the image.
+    ///
+    /// For this cell, the neighbours are projected along the line of sight into the own disk's
+    /// plane. Only corners count that lie among surfels that face the eye; others may lie past an
+    /// outline.
     fn is_open_along(&self, sight: DVec3) -> bool {
         let scale = self.distinct.scale();
         let into_plane = |offset: DVec3| offset - sight * (offset.dot(self.normal) / sight.dot(self.normal));
-        // Normals may have no side: the one that is nearer to the own one counts.
+        // The sign of normals may be arbitrary, so each is taken on the side of the own one.
         let faces = |normal: DVec3| normal.dot(sight) * normal.dot(self.normal).signum() > EDGE_ON;
         let facing = |other: &Neighbour| (self.at)(other.index).iter().any(|disk| faces(side(disk)));
         let seen = self.near.iter().zip(&self.offsets).filter(|(other, _)| facing(other));
@@ -240,7 +251,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
     }
 }
 
-/// The unit normal of a disk; zero if it has none.
+/// The unit normal of a disk; zero if it is degenerate.
 fn side(disk: &(&Surfel, Clip)) -> DVec3 {
     disk.0.normal().as_dvec3().normalize_or_zero()
 }
@@ -248,7 +259,7 @@ fn side(disk: &(&Surfel, Clip)) -> DVec3 {
 /// The disks at each position, the largest first.
 struct Disks<'a> {
     all: Vec<(&'a Surfel, Clip)>,
-    /// Where those of each position begin in `all`; one more at the end.
+    /// The index in `all` of each position's first disk, and a final entry: the length of `all`.
     starts: Vec<usize>,
 }
 
@@ -272,7 +283,7 @@ fn disks_of<'a>(distinct: &DistinctPositions, scene: &'a Scene) -> Disks<'a> {
     Disks { all: order.iter().map(disk).collect(), starts }
 }
 
-/// Whether the disk reaches the point at `offset` from its centre, as far as that is in its plane.
+/// Whether the disk covers the point at `offset` from its centre, projected into its plane.
 fn reaches((surfel, clip): (&Surfel, Clip), offset: DVec3) -> bool {
     let [s, t] = half_axes(surfel);
     let within = offset.length_squared() <= s.length_squared().max(t.length_squared()) * (1.0 + ROUNDING);
@@ -288,7 +299,7 @@ fn meets((surfel, clip): (&Surfel, Clip), offset: DVec3, sight: DVec3) -> bool {
     slope.abs() > EDGE_ON && reaches((surfel, clip), offset - sight * (offset.dot(normal) / slope))
 }
 
-/// Whether the surface ends on the way from the disk's centre to the point at `offset`, as its lines say.
+/// Whether a clip line separates the point at `offset` from the disk's centre.
 fn is_past((surfel, clip): (&Surfel, Clip), offset: DVec3) -> bool {
     let at = on_disk(half_axes(surfel), offset);
     clip.inside(at.x, at.y) < 0.0
@@ -320,7 +331,8 @@ mod tests {
             };
             coverage(&build(vec![points], &()).unwrap().0, &()).unwrap().unwrap()
         };
-        // Half the diagonal of a square of the grid; the rim of the grid is no gap.
+        // Disks close a grid if their radius is half the diagonal of its squares; its rim is no
+        // gap.
         let (small, large) = (of_radius(0.0705), of_radius(0.0709));
         assert!((small.spacing - 0.1).abs() < 1e-6, "{small:?}");
         assert_eq!((small.covered, small.open), (0.0, 2500));
@@ -345,7 +357,7 @@ mod tests {
         let (even, rough, larger) = (of_heights(0.0, 0.08), of_heights(0.005, 0.08), of_heights(0.005, 0.2));
         assert_eq!((even.covered, even.covered_aslant), (1.0, 1.0));
         assert!(rough.covered == 1.0 && rough.covered_aslant < 0.3, "{rough:?}");
-        // All but the rim of the grid.
+        // All positions except those at the rim of the grid are covered.
         assert!(larger.covered_aslant > 0.9, "{larger:?}");
     }
 }

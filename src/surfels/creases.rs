@@ -1,4 +1,5 @@
-//! Creases between points: where the planes of two of them meet, and the lines at which the surfels of a cloud end there.
+//! Finds the creases between points, where their tangent planes meet, and the clip lines at which
+//! surfels end there.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -8,38 +9,47 @@ use super::lines::{self, Line};
 use super::positions::DistinctPositions;
 use crate::scene::Clip;
 
-/// The cosine of the angle between two tangent planes past which a crease is an edge of the surface: 60 degrees. Rough surfaces have
-/// many creases of less.
+/// A crease is an edge of the surface if the cosine between the two normals is below this: 60
+/// degrees. Rough surfaces have many creases of smaller angles.
 pub(super) const SHARP: f64 = 0.5;
 
-/// A crease is at least this part of the distance of two points from either: a cell has an area.
+/// A crease is at least this fraction of the points' distance away from either point, so that no
+/// cell is empty.
 pub(super) const NARROWEST: f64 = 0.01;
 
-/// The sine of the angle between two planes below which rounding and noise decide where they meet: 3 degrees.
+/// Below this sine of the angle between two planes, rounding and noise decide where they meet: 3
+/// degrees.
 const LEAST_SINE: f64 = 0.05;
 
-/// A point that is farther than so many radii of either's surfel is out of reach.
+/// A point is too far away for a crease beyond this many radii of the surfel.
 const REACH: f64 = 5.0;
 
-/// The cosine of the angle up to which another point is of one piece of surface with a point: 30 degrees.
+/// Two points lie on one smooth piece of the surface if the cosine between their normals is larger
+/// than this: 30 degrees.
 pub(super) const SMOOTH: f64 = 0.866_025_403_784_438_6;
 
-/// A surfel is cut where it stands out past an edge by more than so many times what the points of its side stand off its plane.
+/// A surfel is clipped only where it stands out past an edge by more than this many times the
+/// largest distance of the neighbours on its own side from its plane.
 const ROUGH: f64 = 4.0;
 
-/// How far past an edge a surfel goes, in its shorter half-axis.
+/// A surfel extends past an edge by this distance, on its unit disk.
 const MARGIN: f64 = 0.05;
 
-/// Where a crease runs between a point and another at `offset`, of these unit normals and the smaller of their surfels' radii: the unit
-/// direction from the point to it in the tangent plane, and how far that is.
+/// Finds the crease between a point and another one at `offset`: the unit direction toward it in
+/// the point's tangent plane, and its distance. The normals are unit vectors, and `radius` is the
+/// radius of the surfel, or of the smaller one of the two.
 ///
-/// Each of the two then lies below the plane of the other, or each above it, together by more than `least`; they face each other
-/// across the line where the planes meet, rather than along it; and each is within reach of the other's surfel, as no outlier is.
+/// There is a crease if
+///
+/// - each point lies below the plane of the other, or each above it, and the sum of both distances
+///   exceeds `least`;
+/// - the points lie across the line where the planes meet, rather than along it;
+/// - the points are within reach of their surfels, which an outlier is not.
 pub(super) fn crease([normal, other]: [DVec3; 2], offset: DVec3, radius: f64, least: f64) -> Option<(DVec3, f64)> {
     if offset.length() > REACH * radius {
         return None;
     }
-    // Of the other point over this one's plane, and of this one over the other's.
+    // The height of the other point over this one's plane, and of this one over the other's.
     let (height, back) = (offset.dot(normal), -offset.dot(other));
     if height * back < 0.0 || height.abs() + back.abs() <= least {
         return None;
@@ -55,10 +65,12 @@ pub(super) fn crease([normal, other]: [DVec3; 2], offset: DVec3, radius: f64, le
         .then_some((toward, (back.abs() / sine).max(NARROWEST * offset.length())))
 }
 
-/// Where the surfels of positions end at sharp edges: of these `normals`, of any length, and half-axes, world units. None if none does.
+/// Finds the clip lines at which the surfels of positions end at sharp edges; empty if there are
+/// none. `normals` are unit vectors or zero, and `axes` returns half-axes in world units.
 ///
-/// An edge is found between points whose normals say it, as of a drawing or a sampled mesh. Normals that were estimated are blurred
-/// across edges, and tell of none. Where a cloud ends without an edge, its points do not say: lines would cut what lies between them.
+/// An edge is found only if the normals show it, as those of a drawing or of a sampled mesh do.
+/// Estimated normals are blurred across edges and show none. Where a cloud ends without an edge,
+/// its points do not tell where: clip lines would cut gaps between them.
 pub(super) fn clips(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -81,7 +93,8 @@ pub(super) fn clips(
         let own: Vec<DVec3> =
             others.clone().filter(|(other, _)| other.dot(normal) > SMOOTH).map(|(_, offset)| offset).collect();
         let rough = own.iter().map(|offset| offset.dot(normal).abs()).fold(0.0, f64::max);
-        // Halfway to the points of its side what is nearer to it ends.
+        // The part of the own cell that must be kept, on the unit disk: halfway to the points of
+        // its own side.
         let cell: Vec<DVec2> = own.iter().map(|offset| on_disk(*offset * 0.5)).filter(|p| p.length() < 1.0).collect();
         let line = |(other, offset): (DVec3, DVec3)| {
             let (toward, distance) = crease([normal, other], offset, radius, ROUGH * rough)?;

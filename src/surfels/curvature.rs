@@ -1,4 +1,5 @@
-//! How a surface curves at a point, by the points around it: the caps of surfels.
+//! Estimates the curvature of the surface at a point from the points around it: the caps of
+//! surfels.
 
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -9,25 +10,28 @@ use super::positions::DistinctPositions;
 use super::sizes::{RADIUS_NEIGHBOURS, offsets};
 use crate::scene::Cap;
 
-/// The cosine of the angle up to which another point is of one piece of surface with a point: 60 degrees.
+/// Two points lie on one piece of the surface if the cosine between their normals is larger than
+/// this: 60 degrees.
 const ONE_PIECE: f64 = 0.5;
 
-/// Neighbours on a line, or on one side, say nothing of how the surface curves across it: the determinant of their equations is at least
-/// this part of the cube of their trace. It is 1/27 where they lie evenly around.
+/// The least determinant of the normal equations, as a fraction of their trace cubed. Below it, the
+/// neighbours lie on a line or on one side and do not determine the curvature across it. For
+/// neighbours evenly around the point the fraction is 1/27.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// The surface around a position, by the positions around it and their normals.
+/// The surface around a position, given by the positions around it and their normals.
 pub(crate) struct Around<'a, N: Fn(u32) -> DVec3> {
     pub distinct: &'a DistinctPositions,
     pub graph: &'a NeighbourGraph,
-    /// The unit normal at a position.
+    /// Returns the unit normal at a position.
     pub normal: N,
-    /// Normals tell the two sides of the surface apart: one that points the other way is of another sheet.
+    /// Normals tell the two sides of the surface apart: neighbours whose normals point the other
+    /// way lie on another sheet.
     pub sided: bool,
 }
 
 impl<N: Fn(u32) -> DVec3> Around<'_, N> {
-    /// The cap of a surfel at a position, of these half-axes, world units.
+    /// The cap of a surfel at a position with the half-axes `axes`, world units.
     pub fn cap(&self, position: u32, axes: [[f32; 3]; 2]) -> Cap {
         let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)) * self.distinct.scale());
         let own = s.cross(t);
@@ -39,8 +43,9 @@ impl<N: Fn(u32) -> DVec3> Around<'_, N> {
     }
 }
 
-/// The normals of positions, of which points may have none or several: the least, so that no order of the points shows. Empty if no
-/// point has one.
+/// The normal at each position, where points may have none or several. The one with the smallest
+/// bits is taken, so that the result is the same for any order of the points. Empty if no point has
+/// a normal.
 pub(crate) fn normals_at(
     distinct: &DistinctPositions,
     given: impl Fn(usize) -> Option<Vec3> + Sync,
@@ -58,21 +63,26 @@ pub(crate) fn normals_at(
     normals
 }
 
-/// The cap of a surfel with these half-axes, which touches the surface with its plane, by the offsets of neighbours on the surface and
-/// their unit normals: the paraboloid of the least squares of heights and of slopes, both by the distance, times the share of their
-/// squares that it explains: one that explains little would stand out of the surface. Flat where it would be higher than
-/// [`Cap::HIGHEST`]. All in one unit of length.
+/// Fits the cap of a surfel with the half-axes s and t, whose plane is tangent to the surface, to
+/// the offsets and unit normals of neighbours on the surface. All lengths have the same unit.
+///
+/// The cap is the paraboloid of least squares in heights and slopes, each relative to the distance.
+/// It is multiplied by the fraction of their squares that it explains: a paraboloid that explains
+/// little would stand out of the surface. It is flat where it would be higher than
+/// [`Cap::HIGHEST`].
 fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]) -> Cap {
     let normal = s.cross(t).normalize_or_zero();
     let (a, b) = (s / s.length_squared(), t / t.length_squared());
     let near = near.filter(|(offset, other)| is_beside(*offset, normal) && other.dot(normal) > ONE_PIECE);
-    // On the unit disk, heights in units of the longer half-axis: three equations each, of which the coefficients are uu, uv and vv.
+    // On the unit disk, with heights in units of the longer half-axis, each neighbour has three
+    // equations in the coefficients of uu, uv and vv.
     let unit = s.length().max(t.length());
     let equations = |(offset, other): (DVec3, DVec3)| {
         let (u, v) = (offset.dot(a), offset.dot(b));
         let rise = -other / (other.dot(normal) * unit);
-        // Of a unit of curvature a height is half the distance's square, and a slope the distance. A height counts a quarter: where
-        // planes are estimated, a point lies off its own.
+        // For a curvature of 1, a height is half the squared distance, and a slope is the distance.
+        // Divided by the squared distance and the distance, a height counts a quarter of a slope:
+        // where planes are estimated, a point does not lie on its own.
         let (far, farther) = (u.hypot(v).recip(), (u * u + v * v).recip());
         [
             (DVec3::new(0.5 * u * u, u * v, 0.5 * v * v) * farther, offset.dot(normal) / unit * farther),
@@ -102,7 +112,7 @@ fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]
 mod tests {
     use super::*;
 
-    /// Points around one of a paraboloid, with the surface's normals.
+    /// Points around the origin of a paraboloid, with the surface's normals.
     fn near(heights: [f64; 3], count: u32) -> Vec<(DVec3, DVec3)> {
         let [xx, xy, yy] = heights;
         let at = |k: u32| {
@@ -128,22 +138,22 @@ mod tests {
     #[test]
     fn what_is_no_paraboloid_stays_flat() {
         let axes = [DVec3::X, DVec3::Y];
-        // Nothing around, and too little.
+        // No neighbours, or too few.
         assert_eq!(fitted([].into_iter(), axes), Cap::FLAT);
         assert_eq!(fitted([(DVec3::X, DVec3::new(-0.1, 0.0, 1.0).normalize())].into_iter(), axes), Cap::FLAT);
         assert_eq!(fitted(near([0.2, 0.1, 0.3], 1).into_iter(), axes), Cap::FLAT);
-        // A line aslant, whose points hardly stray from it.
+        // Points close to an oblique line.
         let line =
             |k: i32| (DVec3::new(0.6, 0.8, 0.0) * f64::from(k - 4), DVec3::new(0.0, 1e-3 * f64::from(k % 2), 1.0));
         assert_eq!(fitted((0..8).filter(|k| *k != 4).map(line).collect::<Vec<_>>().into_iter(), axes), Cap::FLAT);
-        // A wave: slopes up and down in turn.
+        // A wave: the slopes alternate between up and down.
         let wave = near([0.0; 3], 8).into_iter().enumerate().map(|(k, (offset, _))| {
             (offset, (DVec3::Z + offset.normalize() * if k % 2 == 0 { 0.5 } else { -0.5 }).normalize())
         });
         assert!(fitted(wave.collect::<Vec<_>>().into_iter(), axes).highest() < 0.01);
-        // More than half a sphere.
+        // The cap would be higher than a hemisphere.
         assert_eq!(fitted(near([3.0, 0.0, 3.0], 4).into_iter(), axes), Cap::FLAT);
-        // Another sheet, whose normals point away, says nothing.
+        // Another sheet, whose normals point the other way, has no influence.
         let other = near([0.3, 0.0, 0.3], 8).into_iter().map(|(offset, normal)| (offset, -normal));
         let one = near([0.1, 0.0, 0.1], 8);
         let both: Vec<_> = one.iter().copied().chain(other).collect();

@@ -62,16 +62,18 @@ impl Symmetric3 {
         sum
     }
 
-    /// Its product with a vector.
+    /// The product of the matrix and a vector.
     pub fn times(self, v: DVec3) -> DVec3 {
         let Self { xx, yy, zz, xy, xz, yz } = self;
         let [x, y, z] = v.to_array();
         DVec3::new(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z)
     }
 
-    /// Eigenvalues in ascending order and their orthonormal eigenvectors, by cyclic Jacobi rotations (Golub and
-    /// Van Loan, Matrix Computations, section 8.5). Only `+ - * / sqrt` are used, so that every machine that follows
-    /// IEEE 754 gets the same bits. Entries of 1e-150 to 1e150 in size (or zero) neither overflow nor underflow.
+    /// Returns the eigenvalues in ascending order and their orthonormal eigenvectors, computed by
+    /// cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, section 8.5).
+    ///
+    /// Only `+ - * / sqrt` are used, so every machine that follows IEEE 754 gets the same bits.
+    /// Entries with magnitudes from 1e-150 to 1e150 (or zero) neither overflow nor underflow.
     pub fn eigen(self) -> ([f64; 3], [DVec3; 3]) {
         let largest =
             [self.xx, self.yy, self.zz, self.xy, self.xz, self.yz].iter().fold(0.0, |m: f64, e| m.max(e.abs()));
@@ -79,10 +81,10 @@ impl Symmetric3 {
             return ([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
         }
         let mut diagonal = [self.xx / largest, self.yy / largest, self.zz / largest];
-        // Entry i is the off-diagonal one of the row and column that are not i.
+        // Entry i is the off-diagonal one outside row i and column i.
         let mut off = [self.yz / largest, self.xz / largest, self.xy / largest];
         let mut vectors = [DVec3::X, DVec3::Y, DVec3::Z];
-        // Convergence is quadratic: four or five sweeps do, and the bound only guards against a surprise.
+        // Convergence is quadratic: four or five sweeps suffice, and the bound is only a safeguard.
         for _ in 0..30 {
             if off.iter().all(|e| e.abs() < 1e-300) {
                 break;
@@ -94,7 +96,8 @@ impl Symmetric3 {
                     continue;
                 }
                 let theta = (diagonal[q] - diagonal[p]) / (2.0 * entry);
-                // Squaring a large theta may overflow to infinity: t then becomes zero, which is its limit.
+                // The square of a large theta may overflow to infinity; t then becomes zero, which
+                // is its limit.
                 let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
                 let c = 1.0 / (t * t + 1.0).sqrt();
                 let s = t * c;

@@ -2,10 +2,10 @@
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-/// Of more ellipses none is tried as the shape of the one around them.
+/// Up to this many ellipses are tried as the shape of the one around all of them.
 const MANY: usize = 32;
 
-/// A point lies within up to this value of `q^T S^-1 q`, but for rounding.
+/// A point q lies inside an ellipse if `q^T S^-1 q` is at most this: 1, plus rounding.
 const HELD: f64 = 1.0 + 1e-9;
 
 /// An ellipse around the origin: `q^T S^-1 q <= 1`.
@@ -13,14 +13,15 @@ const HELD: f64 = 1.0 + 1e-9;
 pub(crate) struct Ellipse(DMat2);
 
 impl Ellipse {
-    /// A small one that holds all of `ellipses`: of the shape of a circle, of one of them, or of their sum, whichever is least.
+    /// Returns a small ellipse that contains all of `ellipses`. It has the shape of a circle, of
+    /// one of them, or of their sum, whichever gives the smallest area.
     pub fn around(ellipses: &[DMat2]) -> Option<Self> {
         let sum = ellipses.iter().fold(DMat2::ZERO, |sum, one| sum + *one);
         let own = if ellipses.len() <= MANY { ellipses } else { &[] };
         let shapes = own.iter().copied().chain([DMat2::IDENTITY, sum]);
         let scaled = shapes.filter_map(|shape| {
             let inverse = shape.inverse();
-            // The largest eigenvalue of shape^-1 S: how much the shape is to be enlarged.
+            // The scale factor for the shape: the largest eigenvalue of shape^-1 S.
             let factor = ellipses.iter().map(|one| largest_eigenvalue(inverse * *one)).fold(0.0, f64::max);
             let scaled = shape * factor;
             (scaled.is_finite() && scaled.determinant() > 0.0).then_some(scaled)
@@ -28,11 +29,12 @@ impl Ellipse {
         scaled.min_by(|a, b| a.determinant().total_cmp(&b.determinant())).map(Self)
     }
 
-    /// The least one of half-axes of at least the length `least` that holds all `points`; where that length bounds it, the least of some
-    /// directions.
+    /// Returns the smallest ellipse that contains all `points` and has half-axes of at least the
+    /// length `least`. Where that length limits the shorter half-axis, only some directions are
+    /// tried.
     ///
-    /// What is least for some of the points and holds the others is least for all: points are taken in one by one, each time the one that
-    /// stands out farthest.
+    /// If the smallest ellipse of some points contains the others, it is the smallest of all. So
+    /// points are added one by one, each time the one that lies farthest outside.
     pub fn around_points(points: &[DVec2], least: f64) -> Self {
         let mut some = Vec::with_capacity(points.len().min(8));
         loop {
@@ -46,10 +48,11 @@ impl Ellipse {
         }
     }
 
-    /// The same of a few points, by trying.
+    /// The same for a few points, by trial.
     ///
-    /// An ellipse around the origin that cannot shrink goes through two points that are its conjugate half-diameters, or through three;
-    /// where the points lie on a line, through the farthest.
+    /// An ellipse around the origin that cannot shrink passes through two points that are its
+    /// conjugate half-diameters, or through three points; if the points lie on a line, through the
+    /// farthest.
     fn of_few(points: &[DVec2], least: f64) -> Self {
         let farthest = points.iter().fold(0.0, |m: f64, point| m.max(point.length()));
         let mut best = Self(DMat2::from_diagonal(DVec2::splat(farthest.max(least).powi(2))));
@@ -74,9 +77,9 @@ impl Ellipse {
         best
     }
 
-    /// The one whose rim goes through three points, if there is one.
+    /// The ellipse through three points, if there is one.
     fn through(points: [DVec2; 3]) -> Option<Self> {
-        // Of each, x^2 A + 2 x y B + y^2 C = 1.
+        // For each point, x^2 A + 2 x y B + y^2 C = 1.
         let row = |point: DVec2| DVec3::new(point.x * point.x, 2.0 * point.x * point.y, point.y * point.y);
         let rows = DMat3::from_cols(row(points[0]), row(points[1]), row(points[2])).transpose();
         let DVec3 { x: a, y: b, z: c } = rows.inverse() * DVec3::ONE;
@@ -84,21 +87,22 @@ impl Ellipse {
         (a > 0.0 && shape.determinant() > 0.0).then(|| Self(shape.inverse())).filter(|found| found.0.is_finite())
     }
 
-    /// With half-axes of at least the length `least`: where the shorter one is made longer, the other one is as short as the `points` let
-    /// it be, in its direction.
+    /// The ellipse with half-axes of at least the length `least`. If the shorter one is lengthened,
+    /// the other is made as short as `points` permit, in its direction.
     fn at_least(self, least: f64, points: &[DVec2]) -> Self {
         let [major, minor] = self.half_axes();
         if minor.length() >= least {
             return self;
         }
         let along = major.normalize_or(DVec2::X);
-        // x^2 / s^2 + y^2 / least^2 <= 1. Beside the ellipse it is not a number, which the maximum passes over and `holds` finds.
+        // Solves x^2 / s^2 + y^2 / least^2 = 1 for s. It is NaN for a point with |y| > least, which
+        // the maximum ignores and `holds` detects.
         let reach = |point: &DVec2| point.dot(along).abs() / (1.0 - (point.dot(along.perp()) / least).powi(2)).sqrt();
         let length = points.iter().map(reach).fold(least, f64::max);
         Self(outer(along * length) + outer(along.perp() * least))
     }
 
-    /// Whether a point lies within, but for rounding.
+    /// Whether a point lies inside, up to rounding.
     fn holds(&self, point: DVec2) -> bool {
         point.dot(self.0.inverse() * point) <= HELD
     }
@@ -108,7 +112,8 @@ impl Ellipse {
         self.0.determinant().max(0.0).sqrt()
     }
 
-    /// The half-axes, the longer one first; the second is the first one turned to the left.
+    /// The half-axes, the longer one first; the second is the first direction turned left by 90
+    /// degrees.
     pub fn half_axes(&self) -> [DVec2; 2] {
         let [a, b, c] = [self.0.x_axis.x, self.0.x_axis.y, self.0.y_axis.y];
         let angle = 0.5 * (2.0 * b).atan2(a - c);
@@ -118,13 +123,13 @@ impl Ellipse {
     }
 }
 
-/// Of a matrix whose eigenvalues are real.
+/// The largest eigenvalue of a matrix whose eigenvalues are real.
 fn largest_eigenvalue(m: DMat2) -> f64 {
     let half = 0.5 * (m.x_axis.x + m.y_axis.y);
     half + (half * half - m.determinant()).max(0.0).sqrt()
 }
 
-/// `d d^T`.
+/// The outer product `d d^T`.
 pub(crate) fn outer(d: DVec2) -> DMat2 {
     DMat2::from_cols(d * d.x, d * d.y)
 }
@@ -145,7 +150,8 @@ mod tests {
             let found = Ellipse::around_points(&points, 0.1);
             assert!(points.iter().all(|point| found.holds(*point)), "{points:?}");
             assert!(found.half_axes()[1].length() >= 0.1 - 1e-9);
-            // By trying: directions, and lengths along them that are then as short as they may be.
+            // By trial: directions of the longer half-axis, and ratios of the two, with the least
+            // length that contains the points.
             let mut tried = f64::INFINITY;
             for step in 0..4000 {
                 let (along, slim) =
@@ -154,7 +160,8 @@ mod tests {
                 let major = points.iter().map(reach).fold(0.0, f64::max);
                 tried = tried.min(major.max(0.1) * (major * slim).max(0.1));
             }
-            // Where `least` bounds the shorter half-axis, only some directions of the longer one are tried.
+            // Where `least` limits the shorter half-axis, only some directions of the longer one
+            // are tried.
             let lost = if found.half_axes()[1].length() > 0.1 + 1e-9 { 1.0 + 1e-9 } else { 1.2 };
             assert!(found.square() <= tried * lost, "{} {tried} {points:?}", found.square());
         }

@@ -1,4 +1,4 @@
-//! Normals and radii for points that come without.
+//! Estimates normals and radii of points that lack them.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,29 +10,35 @@ use super::positions::DistinctPositions;
 use super::sizes::{Rough, cell_ellipse, grown, local_limits, lone_radius};
 use crate::Progress;
 
-/// How many neighbours a plane is fitted to. Few follow edges and curvature, many average noise. Measured on spheres of
-/// random points, RMS error of the normal in degrees, for 8, 12, 16, 24 neighbours: 200,000 points with radial noise of
-/// 0.1 spacings 4.6, 2.8, 2.0, 1.3; with 0.3 spacings 17, 9.2, 6.3, 4.0; 2,000 points without noise 1.8, 1.5, 1.4, 1.3.
-/// From 16 on more neighbours buy little that their wider rounding of edges does not cost.
+/// The number of neighbours that a plane is fitted to. Few follow edges and curvature, many average
+/// noise.
+///
+/// RMS error of the normal in degrees on spheres of random points, for 8, 12, 16 and 24 neighbours:
+/// 200,000 points with radial noise of 0.1 spacings 4.6, 2.8, 2.0, 1.3; with 0.3 spacings 17, 9.2,
+/// 6.3, 4.0; 2,000 points without noise 1.8, 1.5, 1.4, 1.3. Beyond 16, further neighbours gain less
+/// than they lose by rounding edges more widely.
 pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
 
-/// A radius is at most this many times the median of the estimated ones, so that sparse noise does not hide the scene.
+/// A radius is at most this many times the median of the estimated ones, so that sparse noise does
+/// not hide the scene.
 pub(crate) const LARGEST_MEDIAN_RATIO: f64 = 8.0;
 
-/// The radius in world units where there is one position only, and so no size to go by.
+/// The radius, world units, if there is only one position, which determines no size.
 pub(crate) const LONE_RADIUS: f64 = 0.5;
 
-/// The smallest and largest radius of any surfel, world units: products of half-axes stay normal f32 numbers.
+/// The smallest and largest radius of a surfel, world units: products of half-axes are normal f32
+/// numbers.
 pub(crate) const RADIUS_RANGE: (f64, f64) = (1e-18, 1e18);
 
-/// What the surroundings of a position suggest.
+/// The estimate at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Estimate {
-    /// Half-axes s, the longer one, and t, world units, of lengths within [`RADIUS_RANGE`]; s x t points into the half-space of up.
+    /// Half-axes s, the longer one, and t, world units. Their lengths are within [`RADIUS_RANGE`],
+    /// and s x t points into the half-space of up.
     pub axes: [[f32; 3]; 2],
-    /// Distance to the nearest neighbour, world units; zero where there is none.
+    /// Distance to the nearest neighbour, world units; zero without one.
     spacing: f32,
-    /// How far neighbours lie off the plane, the unit of positions.
+    /// The neighbours' heights over the plane, in the unit of positions.
     rough: Rough,
 }
 
@@ -49,30 +55,32 @@ impl Estimate {
     }
 }
 
-/// `axis`, not longer than `limit`.
+/// Shortens `axis` to at most `limit`.
 fn at_most(axis: [f32; 3], limit: f64) -> [f32; 3] {
     DVec3::from_array(axis.map(f64::from)).clamp_length_max(limit).as_vec3().to_array()
 }
 
-/// Estimates for a set of distinct positions.
+/// The estimates for a set of distinct positions.
 pub(crate) struct Estimates {
-    /// One for each position; default where it was not wanted.
+    /// The estimate at each position; the default where none was wanted.
     pub of_position: Vec<Estimate>,
-    /// Median over the wanted positions of the distance to the nearest other position, world units; None if there is
-    /// one position only.
+    /// Median over the wanted positions of the distance to the nearest other position, world units;
+    /// None if there is only one position.
     pub median_spacing: Option<f64>,
-    /// Of each position, whether its disk would have been larger.
+    /// Whether the limit from the neighbours made the disk at each position smaller.
     pub limited: Vec<bool>,
     /// The neighbours of the wanted positions, the nearest first.
     pub graph: NeighbourGraph,
 }
 
-/// Estimates the half-axes of a disk at each position where `wanted` says so (everywhere for None), from all positions.
+/// Estimates the half-axes of a disk at each position that is `wanted` (all for None), from all
+/// positions.
 ///
-/// The normal is the direction of least variance of the position and its [`NORMAL_NEIGHBOURS`] nearest others (Hoppe et
-/// al. 1992), turned toward `up`: the renderer turns normals to the viewer, so the sign only has to be definite.
-/// The half-axes are those of [`cell_ellipse`], and at most `largest_ratio` times the median of the longer ones of the neighbours that
-/// have some, as [`local_limits`] says.
+/// The normal is the direction of least variance of the position and its [`NORMAL_NEIGHBOURS`]
+/// nearest neighbours (Hoppe et al. 1992), turned toward `up`: the renderer turns normals to the
+/// viewer, so the sign only has to be definite. The half-axes are those of [`cell_ellipse`], longer
+/// where the surface is [`Rough`], and limited by [`local_limits`] to `largest_ratio` times the
+/// median radius of the neighbours.
 pub(crate) fn estimate(
     distinct: &DistinctPositions,
     wanted: Option<&[bool]>,
@@ -96,7 +104,7 @@ pub(crate) fn estimate(
     }
     let growth = (0..distinct.len() as u32).into_par_iter().map(|index| {
         let growth = Rough::growth(&graph, index, |other| of_position[other as usize].rough);
-        // Axes are in world units.
+        // The half-axes are in world units.
         if wanted(index as usize) { growth / distinct.scale() } else { 0.0 }
     });
     let growth: Vec<f64> = growth.collect();
@@ -148,23 +156,25 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
     }
 }
 
-/// The direction in which the offsets vary least, in the half-space of `up` (a unit vector). For offsets on a line it
-/// is the direction across the line nearest to `up`, for coincident ones it is `up`.
+/// The direction in which the offsets vary least, in the half-space of the unit vector `up`. For
+/// offsets on a line it is the direction across the line nearest to `up`; if all are equal, it is
+/// `up`.
 pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
     let largest = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs().max_element()));
     if largest == 0.0 {
         return up;
     }
-    // Offsets of about one, whatever the spacing: the squares below are as exact for dense parts as for sparse ones.
+    // Offsets are scaled to about 1, so the squares below are equally exact in dense and sparse
+    // parts.
     let mean = offsets.iter().map(|o| o / largest).sum::<DVec3>() / offsets.len() as f64;
     let covariance = Symmetric3::scatter(offsets.iter().map(|o| o / largest - mean));
     let (values, vectors) = covariance.eigen();
     let across_line = |line: DVec3| {
-        // Up itself, then the other axes, in case the line is along up.
+        // Up comes first; the other axes serve a line along up.
         let candidates = [up, DVec3::X, DVec3::Y].map(|axis| axis - line * axis.dot(line));
         candidates.into_iter().find(|c| c.length_squared() > 1e-12).map_or(up, DVec3::normalize)
     };
-    // A width of a millionth of the length is the rounding of the coordinates and says nothing.
+    // A width of a millionth of the length is only the rounding of the coordinates.
     let normal = if values[1] <= 1e-12 * values[2] { across_line(vectors[2]) } else { vectors[0] };
     let side = normal.dot(up);
     let flip =
@@ -172,7 +182,7 @@ pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
     if flip { -normal } else { normal }
 }
 
-/// The middle value (the upper one of two).
+/// The median (the upper one of two middle values); None without values.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)

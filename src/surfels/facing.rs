@@ -1,4 +1,4 @@
-//! From points to a scene whose surfels are drawn facing the camera, which needs no normal and so no neighbour.
+//! Builds a scene of surfels that face the camera, which needs neither normals nor neighbours.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -13,17 +13,21 @@ use crate::io::{Points, settle_colors};
 use crate::scene::{PointSize, Scene, body};
 use crate::{Progress, Result};
 
-/// The radius of a cloud without radii, in spacings: random points leave `exp(-pi 1.8^2)` of their plane open, 4 parts in 100,000. What
-/// is open hides nothing of what lies behind, which then is drawn too.
+/// The radius in a cloud without radii, in spacings. Random points leave `exp(-pi 1.8^2)` of their
+/// plane open, 4 parts in 100,000; through the gaps, whatever lies behind is visible.
 const RADIUS: f64 = 1.8;
 
-/// Makes one scene of the points of all inputs, to be drawn [facing](crate::plan::RenderOptions::facing) the camera: circles of the
-/// points' radii, or of the longer half-axes where they have these; points that have neither take one radius, by how far points lie
-/// apart in the mean. All of them are `size` as large.
+/// Builds one scene from the points of all inputs, to be drawn
+/// [facing](crate::plan::RenderOptions::facing) the camera.
+///
+/// The surfels are circles with the points' radii, or with the longer half-axes of points that have
+/// half-axes. Points with neither share one radius, which is computed from the mean spacing. `size`
+/// may scale or replace these radii.
 ///
 /// # Errors
 ///
-/// Those of [`build`](super::build), and [`Error::Usage`](crate::Error::Usage) for limits out of range.
+/// The errors of [`build`](super::build), and [`Error::Usage`](crate::Error::Usage) for limits out
+/// of range.
 pub fn build_facing(
     inputs: Vec<Points>,
     size: PointSize,
@@ -59,7 +63,7 @@ pub fn build_facing(
         (radius * factor).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1) as f32
     };
     points.radii = Some(own.par_iter().map(radius).collect());
-    // Of no matter: the camera says where they face.
+    // Placeholders: the camera determines where the surfels face.
     points.normals = Some(vec![[0.0, 0.0, 1.0]; own.len()]);
     (points.axes, points.clips, points.caps, points.texture) = (None, None, None, None);
     let ((scene, mut preparation), _) = built(gathered, limits, progress)?;

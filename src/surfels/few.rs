@@ -1,11 +1,12 @@
-//! Tests: fewer points than neighbours, down to one, and points at one place.
+//! Tests of fewer points than neighbours, down to one, and of coincident points.
 #![allow(clippy::unwrap_used)]
 
 use super::*;
 use crate::random::Random;
 use crate::scene::{PointSize, Scene};
 
-/// Ways that points lie: in a cube, in a plane, on a line, on a sphere, most of them together.
+/// The arrangements of points: in a cube, in a plane, on a line, on a sphere, and in a cube with
+/// all but one of them close together.
 const WAYS: u64 = 5;
 
 fn points(way: u64, count: usize, scale: f64) -> Vec<[f64; 3]> {
@@ -38,14 +39,14 @@ fn distances(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
     places.iter().map(of).collect()
 }
 
-/// The upper one of the middle distances to the nearest other point.
+/// The median distance to the nearest other point; the upper one of two middle values.
 fn median(points: &[[f64; 3]]) -> f64 {
     let mut nearest: Vec<f64> = distances(points).into_iter().map(|[nearest, _]| nearest).collect();
     nearest.sort_by(f64::total_cmp);
     nearest[nearest.len() / 2]
 }
 
-/// The longer half-axes of the surfels that `size` makes; of `None` those of [`build`].
+/// The longer half-axes of the surfels that `size` makes, or [`build`] for `None`.
 fn radii(size: Option<Size>, positions: &[[f64; 3]], limits: Limits) -> Vec<f64> {
     let input = cloud(positions.to_vec());
     let scene = |scene: Scene| scene.surfels.iter().map(|surfel| f64::from(surfel.radius())).collect();
@@ -79,7 +80,7 @@ fn surfels_of_a_few_points_are_as_large_as_these_lie_apart() {
                 for (radius, [_, farthest]) in made.iter().zip(&all) {
                     let of_all = matches!(size, Some(Size::BspGlobal(_) | Size::Bsp(_)));
                     let high = if of_all { most } else { *farthest };
-                    // Through the corners of a sliver a circle of any size goes.
+                    // A circle through the corners of a sliver may have any size.
                     let circle = size.is_some_and(|size| {
                         matches!(size, Size::Bsp(Triangle::Circumsphere) | Size::BspGlobal(Triangle::Circumsphere))
                     });
@@ -117,7 +118,7 @@ fn points_facing_the_camera_have_the_spacing_of_a_few() {
             }
         }
     }
-    // One place says nothing.
+    // One position determines no spacing.
     assert_eq!(common(vec![[3.0; 3]; 7]), (0.5, None));
 }
 

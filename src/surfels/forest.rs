@@ -1,8 +1,10 @@
-//! The minimum spanning forest of a graph whose links say whether their ends agree, and what it makes every node's sign.
+//! Computes the minimum spanning forest of a graph whose links say whether their ends have the same
+//! sign, and the sign of each node that follows.
 //!
-//! Borůvka's algorithm: each tree takes its lightest link to another, all trees at once, until none has one. The
-//! links' order is total (weight, then place in the list), so the forest is one, whatever the schedule. Signs are kept
-//! relative to the tree's root on the way, so that no tree need be walked afterwards.
+//! Borůvka's algorithm: all trees at once take their lightest link to another tree, until there are
+//! none. The order of the links is total (weight, then index), so the forest is unique, whatever
+//! the schedule. Signs are kept relative to the root of the tree, so no tree has to be traversed
+//! afterwards.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,17 +13,18 @@ use rayon::prelude::*;
 /// A link between two nodes or trees.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
-    /// The ends.
+    /// The nodes or trees at its two ends.
     pub ends: [u32; 2],
-    /// The weight above a bit that says whether the ends have opposite signs.
+    /// The weight, shifted left by one bit; the lowest bit says whether the ends have opposite
+    /// signs.
     weight: u32,
 }
 
-/// Bits of a weight.
+/// The number of bits of a weight.
 const WEIGHT_BITS: u32 = 24;
 
 impl Link {
-    /// `weight` lies in [0, 1], and is rounded to a multiple of 2^-24.
+    /// Creates a link. `weight` is in [0, 1] and rounded to a multiple of 2^-24.
     pub fn new(ends: [u32; 2], weight: f64, opposite: bool) -> Self {
         let rounded = (weight.clamp(0.0, 1.0) * f64::from((1u32 << WEIGHT_BITS) - 1)).round() as u32;
         Self { ends, weight: rounded << 1 | u32::from(opposite) }
@@ -31,33 +34,35 @@ impl Link {
         self.weight & 1 != 0
     }
 
-    /// Orders links by weight, and links of one weight by their place in the list.
+    /// The sort key: links are ordered by weight, and links of equal weight by their index.
     fn key(self, place: usize) -> u64 {
         u64::from(self.weight >> 1) << PLACE_BITS | place as u64
     }
 }
 
-/// Bits of a link's place in the list: what the weight leaves of a word.
+/// The number of bits left in a key for the link's index.
 const PLACE_BITS: u32 = u64::BITS - WEIGHT_BITS;
 
-/// A node's tree, and whether the node's sign is opposite to that of the tree's root.
+/// The tree that contains a node, and whether the node's sign is opposite to that of the tree's
+/// root.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Membership {
-    /// The tree's number, from 0.
+    /// The index of the tree.
     pub tree: u32,
-    /// The sign.
+    /// Whether the sign is opposite.
     pub opposite: bool,
 }
 
 impl Membership {
-    /// Where this one's tree is itself a node of `above`.
+    /// The membership in the outer tree, where this tree is itself a node of `above`.
     pub fn within(self, above: &[Self]) -> Self {
         let outer = above[self.tree as usize];
         Self { tree: outer.tree, opposite: self.opposite ^ outer.opposite }
     }
 }
 
-/// The trees of the minimum spanning forest over `nodes` nodes: which each node is in, and how many there are.
+/// Returns the membership of each of `nodes` nodes in the minimum spanning forest, and the number
+/// of trees.
 pub(crate) fn spanning_forest(nodes: usize, mut links: Vec<Link>) -> (Vec<Membership>, usize) {
     let mut members: Vec<Membership> =
         (0..nodes as u32).into_par_iter().map(|tree| Membership { tree, opposite: false }).collect();
@@ -82,11 +87,12 @@ pub(crate) fn spanning_forest(nodes: usize, mut links: Vec<Link>) -> (Vec<Member
     (members, trees)
 }
 
-/// One round: every tree joins the one that its lightest link leads to. Gives each tree's new one, and their number.
+/// One round: every tree joins the one at the other end of its lightest link. Returns the new
+/// membership of each tree, and the new number of trees.
 fn join(trees: usize, links: &[Link]) -> (Vec<Membership>, usize) {
     const NONE: u64 = u64::MAX;
     let lightest: Vec<AtomicU64> = (0..trees).into_par_iter().map(|_| AtomicU64::new(NONE)).collect();
-    // A minimum takes no notice of the order in which threads come.
+    // A minimum does not depend on the order of the threads.
     links.par_iter().enumerate().for_each(|(place, link)| {
         let key = link.key(place);
         for end in link.ends {
@@ -107,12 +113,13 @@ fn join(trees: usize, links: &[Link]) -> (Vec<Membership>, usize) {
             }
             let link = links[(key & ((1 << PLACE_BITS) - 1)) as usize];
             let other = if link.ends[0] == tree { link.ends[1] } else { link.ends[0] };
-            // As the order is total, the only circles are of two trees that chose one link: the first is their root.
+            // As the order is total, the only cycles are two trees that chose the same link: the
+            // first becomes their root.
             let is_root = lightest[other as usize] == key && tree < other;
             if is_root { itself } else { Membership { tree: other, opposite: link.opposite() } }
         })
         .collect();
-    // Each step doubles how far up the parents are, until all are roots.
+    // Each step doubles the number of levels up to the parents, until all parents are roots.
     loop {
         let above: Vec<Membership> = parents.par_iter().map(|parent| parent.within(&parents)).collect();
         if above == parents {
@@ -137,7 +144,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// The forest by Kruskal's algorithm: tree labels and signs.
+    /// The forest computed by Kruskal's algorithm: a label of each node's tree, and its sign.
     fn kruskal(nodes: usize, links: &[Link]) -> Vec<(usize, bool)> {
         let mut order: Vec<usize> = (0..links.len()).collect();
         order.sort_by_key(|&place| links[place].key(place));
@@ -177,7 +184,7 @@ mod tests {
             for (i, j) in (0..nodes as usize).flat_map(|i| (0..i).map(move |j| (i, j))) {
                 let together = expected[i].0 == expected[j].0;
                 assert_eq!(members[i].tree == members[j].tree, together, "round {round}");
-                // Cycles disagree here, so signs show which links were taken.
+                // Signs around cycles are inconsistent here, so they show which links were taken.
                 if together {
                     let sign = expected[i].1 ^ expected[j].1;
                     assert_eq!(members[i].opposite ^ members[j].opposite, sign, "round {round}");

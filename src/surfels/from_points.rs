@@ -1,4 +1,4 @@
-//! Surfels from points: what `epsplat surfels` does.
+//! Computes surfels from points: the command `epsplat surfels`.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -21,25 +21,27 @@ use crate::io::Points;
 use crate::scene::{Bounds, Clip, Listed, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
-/// A disk that ends at an edge is larger by this factor, as neither cells nor planes are certain there: of 4.0 million rays at 60,000
-/// points of the fandisk with normals 9 find a hole, and 126 without it.
+/// A disk that ends at an edge is enlarged by this factor, because neither cells nor planes are
+/// certain there. Of 4.0 million rays at 60,000 points of the fandisk with normals, 9 find a hole;
+/// without the factor, 126.
 const AT_EDGE: f32 = 1.2;
 
-/// How surfels are made of points.
+/// The options for computing surfels from points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FromPoints {
-    /// How large they are.
+    /// The size of the surfels.
     pub size: Size,
-    /// Which side estimated normals point to.
+    /// The side that estimated normals point to.
     pub orientation: Orientation,
-    /// Normals are estimated even where they are given.
+    /// Estimate normals even where they are given.
     pub estimate_normals: bool,
-    /// Which points become surfels, and how large those may be.
+    /// Limits on the points that become surfels, and on the surfels' size.
     pub limits: Limits,
 }
 
 impl Default for FromPoints {
-    /// Disks that hold their points' cells, normals outward, all points, no half-axis above three times those around it.
+    /// Ellipses that hold their points' cells, normals outward, all points, no half-axis longer
+    /// than three times the median of the neighbours'.
     fn default() -> Self {
         Self {
             size: Size::Knn,
@@ -50,41 +52,44 @@ impl Default for FromPoints {
     }
 }
 
-/// The surfels of a cloud, and what was done to its points on the way.
+/// The surfels of a cloud, and the counts of their preparation.
 #[derive(Clone, Debug)]
 pub struct Surfels {
-    /// One surfel for each point that was kept, in the points' order, with normals and radii, and half-axes but for
-    /// [`Size::Bsp`]. Colours and texture coordinates are those given.
+    /// One surfel for each point that was not left out, in the points' order, with normals and
+    /// radii. There are half-axes too, unless all surfels are disks ([`Size::is_of_disks`]) without
+    /// an edge. Colours and texture coordinates are the given ones.
     pub points: Points,
-    /// The counts that every scene has; its `surfels` are those kept.
+    /// The counts that every scene has.
     pub preparation: Preparation,
-    /// Connected parts of the surface, each of which was oriented on its own; None if nothing was.
+    /// The number of connected parts of the surface, each oriented on its own; None if none was.
     pub parts: Option<u64>,
-    /// Positions whose cluster of three spans no triangle, for [`Size::Bsp`]; else 0.
+    /// For [`Size::Bsp`], the number of positions whose cluster of three points is collinear; else
+    /// 0.
     pub collinear: u64,
 }
 
 impl Surfels {
-    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    /// Sentences for the user, one for each kind of loss or replacement.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.preparation.notes();
         let mut counted = |count: u64, what: &str| notes.extend((count > 0).then(|| format!("{count} points {what}")));
-        counted(self.collinear, "are in clusters on a line and took the mean of its edges");
+        counted(self.collinear, "are in collinear clusters, and got the mean length of their edges as their size");
         let distinct = self.preparation.distinct_positions.unwrap_or(self.preparation.surfels);
-        counted(self.preparation.surfels - distinct, "lie where another one does");
+        counted(self.preparation.surfels - distinct, "coincide with another one");
         notes
     }
 }
 
-/// Makes surfels of the points of all inputs, which become one cloud.
+/// Computes surfels from the points of all inputs, which become one cloud.
 ///
-/// Neighbours are searched among all points; those at one position are one, and get equal sizes and estimated normals. The
-/// result for a point depends on no order of the points and no number of threads, to the last bit.
+/// Neighbours are searched among all points. Points at one position count as one and have equal
+/// sizes and estimated normals. The result for a point is the same to the bit for any order of the
+/// points and any number of threads.
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`] if no input holds a usable point, and [`Error::Usage`] for options out of range or more than
-/// 2^32 - 1 points.
+/// [`Error::EmptyScene`] if no input holds a usable point, and [`Error::Usage`] for options out of
+/// range or more than 2^32 - 1 points.
 pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Progress) -> Result<Surfels> {
     check(options)?;
     let mut inputs = inputs;
@@ -141,7 +146,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
-    // Which surfels cover a closed surface nobody knows.
+    // It is unknown which surfels cover a closed surface.
     let unsided = gathered.points.unsided && preparation.estimated_normals < preparation.surfels;
     let points =
         Points { unsided, normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
@@ -151,7 +156,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
 }
 
-/// What is known of the points before anything is made of them.
+/// The preparation as far as it is known before the surfels are computed.
 fn prepared(
     gathered: &Gathered,
     given: Option<&[Option<[f32; 3]>]>,
@@ -174,23 +179,27 @@ fn prepared(
     preparation
 }
 
-/// Half-axes s and t of each point.
+/// Half-axes s and t of each point, world units.
 pub(super) type HalfAxes = Vec<[[f32; 3]; 2]>;
 
-/// The lengths of the half-axes s, of which t is not longer.
+/// The lengths of the half-axes s, which are not shorter than t.
 fn longer(axes: &HalfAxes) -> Vec<f32> {
     axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect()
 }
 
-/// The half-axes of points and the lines at which their surfels end at edges: as they are, of disks or `axes`, without an edge. Ellipses
-/// that hold cells are made round where they end at one, as points across an edge bound no cell of this side.
+/// The half-axes of points, and the clip lines at which their surfels end at edges.
+///
+/// If no surfel ends at an edge, `axes` is returned unchanged. Otherwise ellipses away from edges
+/// keep their half-axes, and so do all of [`Size::Ellipse`]. Cell ellipses ([`Size::Knn`]) at an
+/// edge become disks, because points across the edge do not bound the cell on this side. Disks are
+/// enlarged by [`AT_EDGE`].
 fn cut(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
     (normals, radii): (&[[f32; 3]], &[f32]),
     (size, axes): (Size, Option<HalfAxes>),
 ) -> (Option<HalfAxes>, Option<Vec<Clip>>) {
-    // Points at one position may have several normals: the first tells.
+    // Points at one position may have several normals: the first point's normal counts.
     let first = distinct.first_points();
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let half_axes = |point: usize| match &axes {
@@ -224,7 +233,8 @@ fn cut(
     (Some((0..normals.len()).into_par_iter().map(at_lines).collect()), Some(of_points))
 }
 
-/// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
+/// Turns the `normals` of positions to one side. Returns the number of connected parts of the
+/// surface if normals are propagated along it.
 fn oriented(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     normals: &mut [[f32; 3]],
@@ -251,18 +261,18 @@ fn oriented(
     }
 }
 
-/// How large the surfels of positions are, in the units of [`DistinctPositions`].
+/// The sizes of the surfels at positions, in the units of [`DistinctPositions`].
 struct Sizes {
     size: Size,
-    /// The longer half-axes.
+    /// The longer half-axis at each position, before it is limited.
     radii: Vec<f64>,
-    /// What their neighbours allow.
+    /// The largest half-axis that the neighbours of each position allow.
     limits: Vec<f64>,
-    /// Half-axes for the positions' own normals; empty for disks.
+    /// The half-axes for the positions' own normals; empty for disks.
     ellipses: Vec<[DVec3; 2]>,
-    /// Positions whose cluster of three spans no triangle.
+    /// The number of positions whose cluster of three points is collinear.
     collinear: u64,
-    /// Units of a length in the world.
+    /// Scaled units per world unit.
     scale: f64,
 }
 
@@ -284,7 +294,7 @@ impl Sizes {
             Size::BspGlobal(triangle) => vec![common_radius(distinct, triangle, progress); distinct.len()],
             Size::Qsplat => {
                 let own = largest_at(distinct, measured.unwrap_or_default()).into_par_iter().enumerate();
-                // Vertices of no triangle are sized as points are.
+                // Vertices of no triangle are sized like points.
                 let cell = |position: usize| {
                     let [s, _] = half_axes_at(Size::Knn, (distinct, graph), position as u32, normals[position]);
                     s.length()
@@ -312,7 +322,8 @@ impl Sizes {
         Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
     }
 
-    /// The half-axes of points of these normals, but for disks, and their longer ones, world units.
+    /// The half-axes of points with the normals `point_normals`, None for disks, and the longer of
+    /// them, world units.
     fn of_points(
         &self,
         (distinct, graph): (&DistinctPositions, &NeighbourGraph),
@@ -329,7 +340,8 @@ impl Sizes {
         (Some(axes), radii)
     }
 
-    /// Points, at these positions, whose surfels would be larger than their neighbours allow.
+    /// The number of points, at these positions, whose surfels were made smaller because of their
+    /// neighbours.
     fn limited(&self, of_point: &[u32]) -> u64 {
         let limited = |position: usize| self.radii[position] > self.limits[position];
         of_point.par_iter().filter(|position| limited(**position as usize)).count() as u64
@@ -339,14 +351,15 @@ impl Sizes {
         (length / self.scale).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1)
     }
 
-    /// The longer half-axis at a position, world units.
+    /// The longer half-axis at a position after limiting, world units.
     fn length(&self, position: u32) -> f64 {
         let radius = self.radii[position as usize].min(self.limits[position as usize]);
         if radius > 0.0 { self.world(radius) } else { LONE_RADIUS }
     }
 
-    /// The half-axes at a position for a point of this normal, world units: of the length that the position's own ellipse has, within
-    /// its limit, also where the point has another normal.
+    /// The half-axes at a position for a point with the normal `normal`, world units. Even if that
+    /// is not the position's own normal, they are limited to the length of the position's own
+    /// ellipse.
     fn ellipse(
         &self,
         (distinct, graph): (&DistinctPositions, &NeighbourGraph),
@@ -383,7 +396,8 @@ fn roughened(
     own.map(|(axes, index)| grown(axes, Rough::growth(graph, index, |other| rough[other as usize]))).collect()
 }
 
-/// The largest radius, scaled units, of the points at each position, whose own are in world units.
+/// The largest of the radii of the points at each position, scaled units; `radii` is in world
+/// units.
 fn largest_at(distinct: &DistinctPositions, radii: &[f32]) -> Vec<f64> {
     let mut largest = vec![0.0f64; distinct.len()];
     for (&position, radius) in distinct.of_point().iter().zip(radii) {
@@ -397,13 +411,14 @@ fn check(options: &FromPoints) -> Result<()> {
     options.limits.check()?;
     match &options.orientation {
         Orientation::Toward(scanners) if scanners.is_empty() || !scanners.iter().all(|at| at.is_finite()) => Err(
-            Error::Usage("normals can be turned toward finite positions only, of which at least one is needed".into()),
+            Error::Usage("normals are turned toward scanner positions: give at least one, and only finite ones".into()),
         ),
         _ => Ok(()),
     }
 }
 
-/// The usable ones of the given normals, of unit length; those of half-axes come first. None if no input has any.
+/// The usable given normals, of unit length, where those of half-axes take precedence. None if no
+/// input has any.
 fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
     let Points { normals, axes, .. } = &gathered.points;
     (normals.is_some() || axes.is_some()).then(|| {
@@ -417,7 +432,7 @@ fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
     })
 }
 
-/// The normal of the plane through each position and its neighbours, on the side of `up`.
+/// The normal of the plane fitted to each position and its neighbours, on the side of `up`.
 fn fit_normals(distinct: &DistinctPositions, graph: &NeighbourGraph, up: DVec3) -> Vec<[f32; 3]> {
     (0..distinct.len() as u32)
         .into_par_iter()
@@ -430,7 +445,8 @@ fn fit_normals(distinct: &DistinctPositions, graph: &NeighbourGraph, up: DVec3) 
         .collect()
 }
 
-/// The median distance to the nearest other position, world units. None if there is one only.
+/// The median distance to the nearest other position, world units; None if there is only one
+/// position.
 fn median_spacing(distinct: &DistinctPositions, graph: &NeighbourGraph) -> Option<f64> {
     let nearest = |index| offsets(distinct, graph, index, 1).next();
     let spacings = (0..distinct.len() as u32).into_par_iter().filter_map(|index| Some(nearest(index)?.length()));

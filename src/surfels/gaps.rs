@@ -1,32 +1,37 @@
-//! The gaps between points: how far a disk must reach so that none stays open.
+//! Finds the gaps between points: how far a disk must reach to close them.
 //!
-//! Randomly placed points leave gaps that are wider than the mean distance of neighbours says: in any direction the next one may be
-//! far. What is nearer to a point than to any other is its Voronoi cell, so disks that hold their points' cells leave no hole. The
-//! farthest place of a cell is one of its corners, where three points are equally far: the middle of a gap, or beside one. Where the
-//! surface ends, a cell has no corner, and no disk stands out farther for it.
+//! Randomly placed points leave gaps that are wider than the mean distance of neighbours suggests:
+//! in any direction, the next point may be far away. A point's Voronoi cell is the part of the
+//! surface that is nearer to it than to any other point, so disks that contain their points' cells
+//! leave no hole. The farthest point of a cell is one of its corners, where three points are
+//! equally far away: the middle of a gap, or beside one. Where the surface ends, a cell has no
+//! corner, so no disk is enlarged for it.
 
 use glam::{DVec2, DVec3};
 
-/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
+/// The largest elevation over the tangent plane at which a neighbour is beside a point, as a
+/// cosine: 60 degrees.
 const STEEPEST: f64 = 0.5;
 
-/// Whether a neighbour at this offset is beside a point in the plane across the unit vector `normal`, and not over or under it.
+/// Whether a neighbour at `offset` lies beside a point in the plane across the unit vector
+/// `normal`, and not above or below it.
 pub(crate) fn is_beside(offset: DVec3, normal: DVec3) -> bool {
     let squared = offset.length_squared();
     squared - offset.dot(normal).powi(2) > STEEPEST * STEEPEST * squared
 }
 
-/// Corners of a cell that is cut by as many borders as there are neighbours, and four of its outline.
+/// The largest number of corners of a cell; a cell that would exceed it is not cut further.
 const MOST_CORNERS: usize = 32;
 
-/// A corner of a cell, and the neighbour across the edge from it to the next one; none across the outline.
+/// A corner of a cell, and the neighbour across the edge from it to the next corner; None for an
+/// edge of the initial square.
 #[derive(Clone, Copy, Default)]
 struct Corner {
     at: DVec2,
     across: Option<DVec2>,
 }
 
-/// The cell of a point in its tangent plane, as far as neighbours are known.
+/// The Voronoi cell of a point in its tangent plane, as far as its neighbours are known.
 pub(crate) struct Cell {
     corners: [Corner; MOST_CORNERS],
     count: usize,
@@ -35,9 +40,11 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// The cell of a point whose neighbours lie at `offsets`, the nearest first, in the plane across the unit vector `normal`; it ends at
-    /// `reach`, in the unit of the offsets, where no neighbour bounds it. A cell whose corners are all within `enough` is not cut
-    /// further.
+    /// Computes the cell of a point in the plane across the unit vector `normal`.
+    ///
+    /// `offsets` are those of its neighbours, the nearest first. Where no neighbour bounds the
+    /// cell, it ends at `reach`, in the unit of the offsets. A cell whose corners are all within
+    /// `enough` is not cut further.
     pub fn new(offsets: &[DVec3], normal: DVec3, (reach, enough): (f64, f64)) -> Self {
         let (e1, e2) = normal.any_orthonormal_pair();
         let mut corners = [Corner::default(); MOST_CORNERS];
@@ -62,7 +69,8 @@ impl Cell {
         &self.corners[..self.count]
     }
 
-    /// Leaves what is nearer to the point than to `neighbour`; whether that is less.
+    /// Cuts off the part that is nearer to `neighbour` than to the point; returns whether there was
+    /// one.
     fn clip(&mut self, neighbour: DVec2) -> bool {
         let half = 0.5 * neighbour.length_squared();
         let beyond = |corner: &Corner| corner.at.dot(neighbour) - half;
@@ -92,17 +100,17 @@ impl Cell {
         self.count += 1;
     }
 
-    /// Whether neighbours bound it all around.
+    /// Whether neighbours bound the cell on all sides.
     pub fn is_closed(&self) -> bool {
         self.corners().iter().all(|corner| corner.across.is_some())
     }
 
-    /// The unit vectors x and y of the tangent plane, of which x × y is its normal.
+    /// The unit vectors x and y of the tangent plane; x × y is its normal.
     pub fn basis(&self) -> [DVec3; 2] {
         self.basis
     }
 
-    /// The corners between two neighbours, (x, y) in the tangent plane relative to the point.
+    /// The corners between two neighbours, as (x, y) in the tangent plane relative to the point.
     pub fn closed(&self) -> impl Iterator<Item = DVec2> {
         let corners = self.corners();
         let before = |k: usize| corners[if k > 0 { k - 1 } else { corners.len() - 1 }].across;
@@ -138,7 +146,7 @@ mod tests {
         for normal in [DVec3::Z, -DVec3::Z, DVec3::new(0.1, 0.05, 1.0).normalize()] {
             let whole = farthest_corner(&Cell::new(&ring(12), normal, (3.0, 0.0)));
             assert!((whole - 0.5f64.sqrt()).abs() < 0.02, "{whole}");
-            // Without the point at (1, 0) the cell goes on to (1, 0.0), the middle of what is missing.
+            // Without the point at (1, 0), the cell extends to the middle of the gap at (1, 0).
             let wider = farthest_corner(&Cell::new(&ring(13), normal, (3.0, 0.0)));
             assert!((wider - 1.0).abs() < 0.02, "{wider}");
         }
@@ -147,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_cell_that_is_open_has_no_corner_there() {
-        // A straight border, points in a line, and none at all.
+        // A straight border, points on a line, and no points.
         let border: Vec<_> =
             [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
         let cell = Cell::new(&border, DVec3::Z, (5.0, 0.0));
@@ -156,7 +164,7 @@ mod tests {
         let line: Vec<_> = (1..9).map(|k| DVec3::X * f64::from(k)).collect();
         assert_eq!(farthest_corner(&Cell::new(&line, DVec3::Z, (5.0, 0.0))), 0.0);
         assert_eq!(farthest_corner(&Cell::new(&[], DVec3::Z, (5.0, 0.0))), 0.0);
-        // Another sheet right above and below bounds nothing.
+        // Another sheet directly above and below bounds nothing.
         let sheets = [DVec3::Z * 0.1, -DVec3::Z * 0.1, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y];
         assert!((farthest_corner(&Cell::new(&sheets, DVec3::Z, (5.0, 0.0))) - 0.5f64.sqrt()).abs() < 1e-12);
     }

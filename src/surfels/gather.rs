@@ -1,4 +1,4 @@
-//! All inputs as one set of points with finite coordinates.
+//! Joins all inputs into one set of points with finite coordinates.
 
 use super::colors::ColorGatherer;
 use super::mesh::color_vertices;
@@ -10,16 +10,17 @@ use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
 pub(crate) struct Gathered {
-    /// What they have: what some inputs lack is zero, or [`Clip::NONE`](crate::scene::Clip::NONE), and what all of them lack None. No
-    /// coordinate is -0.
+    /// The points. An attribute that only some inputs have is zero, or
+    /// [`Clip::NONE`](crate::scene::Clip::NONE), for the points of the others; one that no input
+    /// has is None. No coordinate is -0.
     pub points: Points,
-    /// Which they are.
+    /// The input and point that each comes from.
     pub provenance: Provenance,
     /// The counts so far.
     pub preparation: Preparation,
 }
 
-/// Joins the inputs and drops points whose coordinates are unusable.
+/// Joins the inputs, and leaves out points with unusable coordinates.
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut inputs = inputs;
     settle_colors(&mut inputs);
@@ -63,7 +64,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         return Err(Error::EmptyScene(nothing_to_draw(input_count, &preparation)));
     }
     for coordinate in points.positions.iter_mut().flatten() {
-        // -0 + 0 is 0: one position, one bit pattern.
+        // -0 + 0 is 0, so equal positions have equal bits.
         *coordinate += 0.0;
     }
     let colors = colors.finish();
@@ -72,7 +73,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     Ok(Gathered { points, provenance, preparation })
 }
 
-/// Puts the points of `input` after those of `all`; colours are joined by [`ColorGatherer`].
+/// Appends the points of `input` to `all`, except colours, which [`ColorGatherer`] joins.
 fn join(all: &mut Points, mut input: Points) {
     let (before, count) = (all.positions.len(), input.positions.len());
     append(&mut all.normals, before, input.normals, count);
@@ -98,7 +99,7 @@ fn join(all: &mut Points, mut input: Points) {
     };
 }
 
-/// Why there is nothing to draw.
+/// The reason why there is nothing to draw.
 fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
     match (inputs, preparation.points) {
         (_, 0) if preparation.unseen > 0 => format!(
@@ -113,8 +114,8 @@ fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
         (0, _) => "no input was given, so there is nothing to draw".to_owned(),
         (_, 0) => "the input holds no points, so there is nothing to draw".to_owned(),
         (_, points) if preparation.shapeless > 0 => format!(
-            "none of the {points} Gaussians read has a place, scales, a rotation, an opacity and a colour that are numbers and span a \
-             surface, so there is nothing to draw"
+            "none of the {points} Gaussians read has a finite position, scales, rotation, opacity and colour and \
+             a surface, so there is nothing to draw"
         ),
         (_, points) => format!(
             "none of the {points} points read has three finite coordinates of at most {LARGEST_COORDINATE:e} in \
@@ -131,7 +132,8 @@ impl Gathered {
     }
 }
 
-/// Whether a Gaussian has a surface, an opacity and a colour: what others lack is estimated, but of a Gaussian nothing can be.
+/// Whether a Gaussian has usable half-axes, opacity and colour. Other points' missing attributes
+/// are estimated, but not those of Gaussians.
 pub(crate) fn has_shape(points: &Points, index: usize) -> bool {
     let color = match &points.colors {
         Some(Colors::Linear(colors)) => colors.get(index),
@@ -146,7 +148,8 @@ pub(crate) fn is_usable(position: &[f64; 3]) -> bool {
     position.iter().all(|c| c.abs() <= LARGEST_COORDINATE)
 }
 
-/// Appends `count` values to the `before` values of earlier inputs; what is missing on either side becomes default.
+/// Appends `count` values to the `before` values of earlier inputs. Missing values on either side
+/// become the default.
 fn append<T: Clone + Default>(all: &mut Option<Vec<T>>, before: usize, added: Option<Vec<T>>, count: usize) {
     let Some(mut added) = added else {
         if let Some(all) = all {

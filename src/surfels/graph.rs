@@ -1,4 +1,4 @@
-//! Who is whose neighbour: the nearest positions of each position, kept.
+//! Stores the nearest neighbours of each position.
 
 use rayon::prelude::*;
 
@@ -6,12 +6,13 @@ use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
 use crate::Progress;
 
-/// Positions that one thread takes at a time.
+/// The number of positions that a thread processes at a time.
 const CHUNK: usize = 4096;
 
 /// The nearest neighbours of every position, the nearest first.
 pub(crate) struct NeighbourGraph {
-    /// How many neighbours each position has: as many as were asked for, or all others if there are fewer.
+    /// The number of neighbours per position: as many as were asked for, or all others if there are
+    /// fewer.
     degree: usize,
     neighbours: Vec<u32>,
 }
@@ -25,8 +26,11 @@ impl NeighbourGraph {
         graph
     }
 
-    /// Finds the `count` nearest neighbours of each position that is `wanted`, makes its value of them, and keeps the nearest
-    /// `kept` of them. `values` are one for each position; those of others stay, and their neighbours say nothing.
+    /// Finds the `count` nearest neighbours of each `wanted` position, calls `make` with them, and
+    /// stores the `kept` nearest.
+    ///
+    /// `values` has one value per position: `make` returns the new one. Positions that are not
+    /// wanted keep theirs, and their stored neighbours are meaningless.
     pub fn visit<T: Send>(
         (distinct, count, kept): (&DistinctPositions, usize, usize),
         wanted: impl Fn(usize) -> bool + Sync,
@@ -76,7 +80,8 @@ impl NeighbourGraph {
         &self.neighbours[first..first + self.degree]
     }
 
-    /// The links between positions that are among each other's `count` nearest, from either side, each once and in order.
+    /// The links from each position to its `count` nearest neighbours, without direction: each pair
+    /// once, ordered by the position that it starts from.
     pub fn links(&self, count: usize) -> impl ParallelIterator<Item = (u32, u32)> {
         let near = move |index: u32| &self.of(index)[..count.min(self.degree)];
         let len = self.neighbours.len().checked_div(self.degree).unwrap_or(0);

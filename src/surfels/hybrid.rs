@@ -1,17 +1,22 @@
-//! Which triangles of a mesh become surfels (Tien 2008, chapter 5: splats and triangles in one picture).
+//! Chooses the triangles of a mesh that become surfels (Tien 2008, chapter 5: splats and triangles
+//! in one picture).
 //!
-//! Triangles are exact, but each costs its time, however small it is. Surfels as wide as half a pixel, a sample of the four that pictures
-//! have by default, are as many as the picture needs. So a triangle becomes surfels if
+//! Triangles are exact, but each takes time, however small it is. Surfels as wide as half a pixel,
+//! the spacing of the four samples per pixel that pictures have by default, are as many as the
+//! picture needs. So a triangle becomes surfels if
 //!
-//! 1. those around it have less than [`LARGEST`] of a square pixel on average: then there are [`COST`] of them or more to a surfel, which
-//!    costs about as much;
-//! 2. it belongs to a patch of such triangles, joined at edges, of at least [`LEAST_PATCH`] square pixels: smaller ones would be mostly rims.
+//! 1. the triangles around it have an area of less than [`LARGEST`] square pixels on average: then
+//!    there are at least [`COST`] of them per surfel, which costs about as much;
+//! 2. it belongs to a patch of such triangles, joined at edges, of at least [`LEAST_PATCH`] square
+//!    pixels: smaller patches would be mostly rims.
 //!
-//! Sharp edges and ends of the surface are no reason to stay: samples end there by lines ([`Clip`](crate::scene::Clip)), and triangles that are
-//! so small have sharp edges wherever a scan is rough. With those kept the dragon's picture at 128x128 was as far from rays (within 0.1 dB), and
-//! took a third more time.
+//! Triangles at sharp edges and at the ends of the surface become surfels too: samples are clipped
+//! there ([`Clip`](crate::scene::Clip)), and the small triangles of a rough scan have sharp edges
+//! everywhere. With those triangles kept, the picture of the dragon at 128x128 was as close to ray
+//! tracing (within 0.1 dB), and took a third more time.
 //!
-//! What decides are sums of integers and the planes of triangles, so the order of triangles and vertices changes nothing.
+//! The choice depends on sums of integers and on the planes of triangles, so it does not depend on
+//! the order of triangles and vertices.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -26,56 +31,61 @@ use crate::scene::Bounds;
 use crate::sets::Sets;
 use crate::{Progress, Result};
 
-/// Surfels for a square pixel.
+/// Surfels per square pixel.
 pub const DENSITY: f64 = 4.0;
 
-/// What a surfel costs, in triangles of less than a pixel: of the Stanford dragon's 871,414 triangles of 0.05 square pixels each and the
-/// 161,000 surfels in their place a frame takes 94 and 100 ms on Mesa's llvmpipe.
+/// The cost of a surfel, in triangles smaller than a pixel. For the Stanford dragon's 871,414
+/// triangles of 0.05 square pixels each, a frame takes 94 ms on Mesa's llvmpipe; for the 161,000
+/// surfels that replace them, 100 ms.
 pub const COST: f64 = 5.0;
 
-/// Square pixels of the triangles that become surfels, at most.
+/// The largest mean area of triangles that become surfels, square pixels.
 pub const LARGEST: f64 = 1.0 / (DENSITY * COST);
 
-/// Square pixels of the smallest patch that becomes surfels.
+/// The area of the smallest patch that becomes surfels, square pixels.
 pub const LEAST_PATCH: f64 = 16.0;
 
-/// Areas are whole multiples of this part of a square pixel, and at most [`MOST_UNITS`].
+/// Areas are stored as multiples of this unit, in square pixels, and limited to [`MOST_UNITS`].
 const UNIT: f64 = 1.0 / 16_777_216.0;
 const MOST_UNITS: f64 = 1e12;
 
-/// Rounds in which sizes are averaged over the triangles around each vertex.
+/// The number of rounds in which areas are averaged over the triangles around each vertex.
 const ROUNDS: usize = 2;
 
-/// A mesh as surfels and triangles.
+/// A mesh, divided into surfels and triangles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Hybrid {
-    /// Surfels in place of small triangles.
+    /// Surfels that replace small triangles.
     pub surfels: Option<Points>,
     /// The other triangles.
     pub triangles: Option<Mesh>,
-    /// How many there are.
+    /// The counts of both.
     pub report: Report,
 }
 
-/// What became of a mesh.
+/// The result of dividing a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Triangles of the mesh.
+    /// The number of triangles of the mesh.
     pub triangles: u64,
-    /// Those that stay.
+    /// The number of triangles that stay.
     pub kept: u64,
-    /// Surfels in place of the others.
+    /// The number of surfels that replace the others.
     pub surfels: u64,
     /// The width of a pixel, world units.
     pub pixel: f64,
 }
 
-/// Divides a mesh that is seen where a pixel is `pixel` world units wide, positive and finite: triangles that are [`splatted`] become samples,
-/// [`DENSITY`] for each square pixel on average and more where the mesh has more triangles, which cover them ([`sample`]).
+/// Divides a mesh into surfels and triangles for a view in which a pixel is `pixel` world units
+/// wide, positive and finite.
+///
+/// The triangles that are [`splatted`] become samples that cover them ([`sample`]), [`DENSITY`] per
+/// square pixel on average and more where the mesh has more triangles.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`](crate::Error::Usage) for a mesh whose parts do not fit each other, or more than [`MOST`] samples.
+/// [`Error::Usage`](crate::Error::Usage) for a mesh whose parts do not fit each other, or more than
+/// [`MOST`] samples.
 pub fn hybrid(mesh: &Mesh, pixel: f64, progress: &dyn Progress) -> Result<Hybrid> {
     mesh.check()?;
     progress.begin("dividing triangles", 0);
@@ -93,7 +103,7 @@ pub fn hybrid(mesh: &Mesh, pixel: f64, progress: &dyn Progress) -> Result<Hybrid
     Ok(Hybrid { surfels, triangles: Some(large).filter(|large| !large.triangles.is_empty()), report })
 }
 
-/// Surfels that cover the triangles of `small`, a part of `mesh`.
+/// Samples surfels that cover the triangles of `small`, a part of `mesh`.
 fn surfels_of(small: &Mesh, mesh: &Mesh, pixel: f64, progress: &dyn Progress) -> Result<Points> {
     let area =
         small.triangles.iter().map(|corners| u128::from(units(small, *corners, pixel))).sum::<u128>() as f64 * UNIT;
@@ -101,17 +111,17 @@ fn surfels_of(small: &Mesh, mesh: &Mesh, pixel: f64, progress: &dyn Progress) ->
     let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::default().of(surface, voxels);
     let (mut points, sampling) =
         sample(small, count, &Method::Stratified { priority: &priority, depth: None }, 0, progress)?;
-    // Together with the triangles beside them they cover what the mesh does.
-    // Nobody could say which image is which.
+    // Without texture numbers, coordinates do not determine an image.
     if points.texture_numbers.take().is_some() {
         points.texture = None;
     }
+    // Together with the remaining triangles, the surfels cover what the mesh does.
     points.closed = sampling.faces_as_wound && is_closed(&mesh.positions, &mesh.triangles);
     Ok(points)
 }
 
-/// The width of a pixel where the diagonal of the box around a mesh's triangles is seen as long as so many `pixels`; None of a mesh without
-/// finite corners that are apart.
+/// The width of a pixel, world units, if the diagonal of the box around a mesh's triangles is
+/// `pixels` long; None for a mesh without distinct finite corners.
 pub fn pixel(mesh: &Mesh, pixels: f64) -> Option<f64> {
     let corners = mesh.triangles.as_flattened().par_iter();
     let corners = corners.map(|vertex| DVec3::from_array(mesh.positions[*vertex as usize]));
@@ -119,7 +129,7 @@ pub fn pixel(mesh: &Mesh, pixels: f64) -> Option<f64> {
     Some(pixel).filter(|pixel| pixel.is_finite() && *pixel > 0.0)
 }
 
-/// For each triangle of a mesh whether it becomes surfels, where a pixel is `pixel` world units wide.
+/// Whether each triangle of a mesh becomes surfels, where a pixel is `pixel` world units wide.
 pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     let welded = distinct(&mesh.positions);
     let corners: Vec<[u32; 3]> =
@@ -127,7 +137,7 @@ pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     let areas: Vec<u64> = corners.iter().map(|corners| units(mesh, *corners, pixel)).collect();
     let sizes = (0..ROUNDS).fold(areas.clone(), |sizes, _| around(&corners, &sizes, mesh.positions.len()));
     let edges = edges(&corners);
-    // What has no area is left to whoever draws triangles, who tells of it.
+    // Triangles without an area stay, so that whoever draws triangles reports them.
     let has_area = |corners: &[u32; 3]| area(mesh, *corners) > 0.0;
     let chosen: Vec<bool> = sizes
         .iter()
@@ -150,12 +160,13 @@ pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     chosen.into_iter().enumerate().map(|(triangle, chosen)| chosen && is_large(triangle)).collect()
 }
 
-/// The area of a triangle in parts of a square pixel.
+/// The area of a triangle in multiples of [`UNIT`].
 fn units(mesh: &Mesh, corners: [u32; 3], pixel: f64) -> u64 {
     (area(mesh, corners) / (pixel * pixel) / UNIT).clamp(0.0, MOST_UNITS) as u64
 }
 
-/// None of what is not finite. The same whichever corner comes first.
+/// The area of a triangle, world units squared; 0 if it is not finite. It does not depend on which
+/// corner comes first.
 fn area(mesh: &Mesh, corners: [u32; 3]) -> f64 {
     let mut places = corners.map(|vertex| mesh.positions[vertex as usize]);
     let least = |k: &usize| places[*k].map(f64::to_bits);
@@ -166,7 +177,7 @@ fn area(mesh: &Mesh, corners: [u32; 3]) -> f64 {
     if twice.is_finite() { 0.5 * twice } else { 0.0 }
 }
 
-/// For each triangle the mean over its corners of the mean size of the triangles there.
+/// For each triangle, the mean over its corners of the mean area of the triangles there.
 fn around(corners: &[[u32; 3]], sizes: &[u64], vertices: usize) -> Vec<u64> {
     let mut of_vertex = vec![(0u64, 0u64); vertices];
     for (corners, size) in corners.iter().zip(sizes) {
@@ -182,7 +193,8 @@ fn around(corners: &[[u32; 3]], sizes: &[u64], vertices: usize) -> Vec<u64> {
     corners.iter().map(|corners| corners.map(mean).iter().sum::<u64>() / 3).collect()
 }
 
-/// The edges of triangles with these corners, each with one of them, sorted; those of one edge are next to one another.
+/// The edges of triangles with these corners, each with the index of its triangle, sorted by their
+/// ends.
 fn edges(corners: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
     let of = |(triangle, [a, b, c]): (usize, &[u32; 3])| {
         let ends = [[a, b], [b, c], [c, a]].map(|[from, to]| [*from.min(to), *from.max(to)]);
@@ -199,7 +211,8 @@ fn edges(corners: &[[u32; 3]]) -> Vec<([u32; 2], u32)> {
 mod tests {
     use super::*;
 
-    /// A square of `side` squared cells of two triangles each, of which those past the middle are `wide` units wide and others one.
+    /// A square of `side` squared cells of two triangles each. Cells past the middle are `wide`
+    /// units wide, others one.
     fn square(side: u32, wide: f64) -> Mesh {
         let at = |k: u32| {
             let (x, y) = (f64::from(k % (side + 1)), f64::from(k / (side + 1)));
@@ -222,9 +235,10 @@ mod tests {
     fn small_triangles_become_surfels() {
         let count =
             |wide: f64, pixel: f64| splatted(&square(40, wide), pixel).into_iter().filter(|chosen| *chosen).count();
-        // Half a unit of area each: too large where a pixel is 3 wide, too small a patch in all where it is 12.
+        // Triangles of half a square unit: too large for a pixel 3 units wide, and too small a
+        // patch in all for one 12 units wide.
         assert_eq!([3.5, 3.0, 12.0].map(|pixel| count(1.0, pixel)), [3200, 0, 0]);
-        // Wide ones stay, and those beside them that are large on average.
+        // Wide triangles stay, and so do those beside them whose average is too large.
         let half = count(8.0, 3.5);
         assert!((1440..1600).contains(&half), "{half}");
     }

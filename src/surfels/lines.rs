@@ -1,50 +1,55 @@
-//! The lines at which a disk ends: of all ends of the surface around it, the two that take most of what stands out past them.
+//! Chooses the clip lines of a disk: of all ends of the surface around it, the two that cut off
+//! most.
 
 use glam::DVec2;
 
 use crate::scene::Clip;
 
-/// Lines of a disk that are looked at.
+/// The largest number of lines that are considered per disk.
 const MOST: usize = 32;
 
-/// Of lines whose directions differ by less than this cosine says, 2 degrees, and their offsets by less than this, one is looked at: an
+/// Two lines are the same if the cosine between their directions is larger than the first value, 2
+/// degrees, and their offsets differ by less than the second. Only one of them is considered: an
 /// end has a line for each triangle or point along it.
 const SAME: (f64, f64) = (0.9994, 0.02);
 
-/// A line on the unit disk, of which what has `inward . q >= offset` is kept.
+/// A line on the unit disk, which keeps the points q with `inward . q >= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Line {
-    /// Unit.
+    /// Unit vector.
     pub inward: DVec2,
-    /// Negative where the disk's centre is kept.
+    /// Negative if the disk's centre is kept.
     pub offset: f64,
 }
 
 impl Line {
-    /// Through two points, keeping what is on the left on the way from the one to the other. None if they are one.
+    /// The line through two points, which keeps the left side seen from the first to the second.
+    /// None if they coincide.
     pub fn through(from: DVec2, to: DVec2) -> Option<Self> {
         let inward = (to - from).try_normalize()?.perp();
         Some(Self { inward, offset: inward.dot(from) })
     }
 
-    /// Moved out until it keeps the disk's centre and all of `points`, and by `margin` more.
+    /// Moves the line outward until it keeps the disk's centre and all of `points`, and by `margin`
+    /// more.
     ///
-    /// A disk must cover its cell: where an end bends around that, the line along one of its sides would cut off what lies past the
-    /// next.
+    /// A disk must cover its cell: where an end bends around the cell, the line along one of its
+    /// sides would cut off the part past the next side.
     pub fn keeping(self, points: &[DVec2], margin: f64) -> Self {
         let of_points = points.iter().map(|point| point.dot(self.inward)).fold(0.0, f64::min);
         Self { offset: self.offset.min(of_points) - margin, ..self }
     }
 }
 
-/// How near the segment between two points comes to the disk's centre: the point of it, as a share of the way.
+/// The point of a segment that is nearest to the disk's centre, as a fraction of the way between
+/// its ends.
 pub(super) fn nearest_share(from: DVec2, to: DVec2) -> f64 {
     let along = to - from;
     let share = -from.dot(along) / along.length_squared();
     if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
 }
 
-/// The corners of the convex hull of `points`: what keeps them keeps all.
+/// The corners of the convex hull of `points`: a line that keeps them keeps all points.
 pub(super) fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let chain = |points: &mut dyn Iterator<Item = DVec2>| {
@@ -63,8 +68,8 @@ pub(super) fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     [lower, upper].concat()
 }
 
-/// Of `lines` that cut the disk, each with what is known of it, those to look at: those that cut most come first, and of such that are
-/// nearly the same one is left.
+/// Returns the `lines` to consider, each with its data, among those that cut the disk. Lines that
+/// cut off most come first, and of several nearly equal ones only the first remains.
 pub(super) fn apart<T: Copy>(mut lines: Vec<(Line, T)>) -> Vec<(Line, T)> {
     lines.retain(|(line, _)| line.offset > -1.0);
     lines.sort_by(|(a, _), (b, _)| {
@@ -86,7 +91,8 @@ pub(super) fn apart<T: Copy>(mut lines: Vec<(Line, T)>) -> Vec<(Line, T)> {
     apart
 }
 
-/// Of `lines` the two at most that leave out most of the disk together; none that leaves out nothing.
+/// Returns at most two of `lines`: those that together cut off most of the disk. A line that cuts
+/// off nothing is not used.
 pub(super) fn clip(lines: Vec<Line>) -> Clip {
     let lines: Vec<Line> =
         apart(lines.into_iter().map(|line| (line, ())).collect()).into_iter().map(|(line, ())| line).collect();
@@ -97,10 +103,10 @@ pub(super) fn clip(lines: Vec<Line>) -> Clip {
     clip
 }
 
-/// Points of the unit disk, evenly by area, by which its parts are compared.
+/// The number of points, distributed evenly over the unit disk, by which areas are compared.
 const POINTS: u32 = 128;
 
-/// The first of the best, one line before two.
+/// The first best choice, where one line comes before two.
 fn best(lines: &[Line]) -> [Option<Line>; 2] {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let point = |k: u32| DVec2::from_angle(golden * f64::from(k)) * ((f64::from(k) + 0.5) / f64::from(POINTS)).sqrt();
@@ -156,7 +162,7 @@ mod tests {
         let Clip([first, second]) = clip(vec![above, nearly, right, line(0.0, -1.5)]);
         assert_eq!((first, second[1] < -0.5), ([-1.0, first[1], 0.5], true));
         assert_eq!(clip(vec![line(0.0, -1.5)]), Clip::NONE);
-        // One that another makes needless is left out.
+        // A line that another one makes redundant is left out.
         assert_eq!(clip(vec![right, line(180.0, -0.9)]).0[1], Clip::NONE.0[0]);
     }
 }

@@ -1,4 +1,4 @@
-//! From points and meshes to surfels.
+//! Computes surfels from points and meshes.
 
 pub mod analytic;
 pub mod borders;
@@ -62,39 +62,41 @@ use self::positions::{exponent, power_of_two};
 use crate::io::Points;
 use crate::scene::{Bounds, Up};
 
-/// The largest absolute coordinate of a point, world units (in metres, a hundred light years). Larger ones are treated
-/// like ones that are not finite, because products of f32 lengths would overflow on the way to the image.
+/// The largest absolute coordinate of a point, world units (in metres, a hundred light years).
+/// Points with larger ones are left out like those that are not finite, because products of f32
+/// lengths would overflow on the way to the image.
 pub const LARGEST_COORDINATE: f64 = 1e18;
 
-/// The normal with unit length, or None if it has no direction.
+/// The normal with unit length; None if it has no direction.
 fn unit(normal: [f32; 3]) -> Option<Vec3> {
-    // In f64 the squares of f32 numbers neither overflow nor underflow.
+    // In f64, the squares of f32 numbers neither overflow nor underflow.
     let [x, y, z] = normal.map(f64::from);
     let length = (x * x + y * y + z * z).sqrt();
     (length.is_finite() && length > 0.0).then(|| (DVec3::new(x, y, z) / length).as_vec3())
 }
 
-/// The radius within [`RADIUS_RANGE`], or None if it says nothing.
+/// The radius clamped to [`RADIUS_RANGE`]; None if it is not positive or not finite.
 fn usable_radius(radius: f32) -> Option<f32> {
     let (smallest, largest) = RADIUS_RANGE;
     (radius.is_finite() && radius > 0.0).then(|| radius.clamp(smallest as f32, largest as f32))
 }
 
-/// The half-axes, or None if they span no ellipse that an f32 can say, or one outside [`RADIUS_RANGE`].
+/// The half-axes; None if they are parallel, not finite, or outside [`RADIUS_RANGE`].
 fn usable_axes(axes: [[f32; 3]; 2]) -> Option<[Vec3; 2]> {
-    /// Below this sine of the angle between them, two half-axes are one.
+    /// Two half-axes are parallel if the sine of the angle between them is below this.
     const PARALLEL: f64 = 1e-6;
     let (smallest, largest) = RADIUS_RANGE;
     let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
     let (shorter, longer) = (s.length().min(t.length()), s.length().max(t.length()));
-    // Half-axes that are not perpendicular stand for a shorter one, and for a longer one by at most a square root of two.
+    // Half-axes that are not perpendicular describe an ellipse whose shorter half-axis is shorter
+    // than both, and whose longer one is longer by up to a factor of the square root of two.
     let shortest = s.cross(t).length() / (1.5 * longer);
     let sound = longer <= largest / 1.5 && shortest >= smallest.max(PARALLEL * shorter);
     sound.then(|| axes.map(Vec3::from_array))
 }
 
-/// The box of the points that a scene keeps, world coordinates as they were read: those whose
-/// coordinates are usable, and of Gaussians those that have a shape.
+/// The box of the points that a scene uses, in world coordinates as they were read: those with
+/// usable coordinates and, among Gaussians, with a shape.
 pub fn bounds(points: &Points) -> Bounds {
     let is_kept = |(index, position): &(usize, &[f64; 3])| {
         gather::is_usable(position) && (!points.encoded || gather::has_shape(points, *index))
@@ -104,13 +106,14 @@ pub fn bounds(points: &Points) -> Bounds {
     Bounds::of(kept.map(|(_, position)| DVec3::from_array(*position) + DVec3::ZERO))
 }
 
-/// The scene's origin for positions in `bounds`, world units, axis by axis.
+/// Returns the scene's origin for positions in `bounds`, world units, axis by axis.
 ///
-/// Let E be the longest edge of the box (1 if all points coincide). An axis on which no coordinate exceeds 2 E keeps
-/// origin 0: coordinates that already sit near zero stay what they are, and f32 ones exact. On any other axis the
-/// origin is the middle of the box, rounded to a multiple of the power of two between E / 16 and E / 8. Relative
-/// coordinates are then within 2 E, so a surfel centre is off by at most 2^-24 * 2 E (0.12 mm in a scene of 1 km).
-/// The origin depends on the box alone, so on no order of points.
+/// Let E be the longest edge of the box (1 if all points coincide). An axis on which no absolute
+/// coordinate exceeds 2 E has origin 0: coordinates that are already near zero do not change, and
+/// f32 ones stay exact. On any other axis the origin is the centre of the box, rounded to a
+/// multiple of the power of two between E / 16 and E / 8. Relative coordinates are then within 2 E,
+/// so a surfel's centre has an error of at most 2^-24 * 2 E (0.12 mm in a scene of 1 km). The
+/// origin depends only on the box, not on the order of points.
 fn origin_for(bounds: &Bounds) -> DVec3 {
     let extent = bounds.extent().max_element();
     let extent = if extent > 0.0 { extent } else { 1.0 };
@@ -133,7 +136,8 @@ fn origin_for(bounds: &Bounds) -> DVec3 {
     )
 }
 
-/// Up for inputs whose format does not say: flat in z means survey data, anything else a model.
+/// The up axis for inputs whose format does not define one: z if the box is flat in z, as of survey
+/// data, else y, as for models.
 fn guess_up(bounds: &Bounds) -> Up {
     let extent = bounds.extent();
     if extent.z < 0.5 * extent.x.min(extent.y) { Up::Z } else { Up::Y }

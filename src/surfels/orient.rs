@@ -1,4 +1,4 @@
-//! Which side of the surface a normal points to.
+//! Chooses the side of the surface that a normal points to.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -8,33 +8,38 @@ use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::Progress;
 
-/// How normals that were estimated, and so have no side, get one.
+/// The method that gives estimated normals, whose sign is arbitrary, a side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Orientation {
-    /// Along the surface from neighbour to neighbour, outward for each connected part of it (Hoppe et al. 1992).
+    /// Propagates the sign along the surface from neighbour to neighbour; each connected part faces
+    /// outward (Hoppe et al. 1992).
     #[default]
     Propagate,
-    /// Toward the nearest of these positions, world coordinates, from which the points were scanned.
+    /// Toward the nearest of these positions, world coordinates, from which the points were
+    /// scanned.
     Toward(Vec<DVec3>),
-    /// They keep the sign they were estimated with: the half-space of the up axis.
+    /// The half-space of the up axis, as they were estimated.
     Up,
 }
 
-/// How many of its neighbours a normal is compared with. With 6 alone scan lines fall apart: `data/autzen.laz` has 23 parts
-/// by 6 and 3 by 10.
+/// The number of neighbours that a normal is compared with. With only 6, scan lines fall apart:
+/// `data/autzen.laz` has 23 parts with 6 and 3 with 10.
 const COMPARED: usize = 10;
 
-/// Neighbours up to this one come before all others: those farther on may lie beyond a thin part. They only join what would
-/// else be apart.
+/// Links to this many nearest neighbours are used first, because farther ones may lie across a thin
+/// part. Farther ones only join parts that would otherwise stay separate.
 const NEAREST: usize = 6;
 
-/// Where a mean normal is at least this long, the surface is a sheet and not closed: half a sphere's is 0.5.
+/// A part is a sheet, and not closed, if its mean normal is at least this long: that of half a
+/// sphere is 0.5.
 const SHEET: f64 = 0.5;
 
-/// A neighbour lies beside a point, and not on another sheet, up to this sine of the angle with the point's plane.
+/// A neighbour lies beside a point, and not on another sheet, if the sine of its elevation over the
+/// point's plane is below this.
 const BESIDE: f64 = 0.25;
 
-/// The points whose normal, a unit vector, faces the other way than that of the nearest point elsewhere, which lies beside it.
+/// Counts the points whose normal, a unit vector, is opposed to that of the nearest point at
+/// another position, if that lies beside it.
 pub(crate) fn opposed(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -52,13 +57,15 @@ pub(crate) fn opposed(
     distinct.of_point().par_iter().enumerate().filter(|point| faces_away(*point) == Some(true)).count() as u64
 }
 
-/// Signs `normals` (unit vectors, one for each position) so that neighbours agree and the surface faces outward. Gives the
-/// number of its connected parts, each of which is oriented on its own.
+/// Flips `normals` (unit vectors, one per position) so that neighbours agree and the surface faces
+/// outward. Returns the number of its connected parts, each of which is oriented on its own.
 ///
-/// Neighbours are compared along the minimum spanning forest of the doubts of [`continued`], over links to the nearest
-/// neighbours, and what those leave apart is joined by links to farther ones. A part of the surface then faces as most of the `given` normals in it do (pairs of position and normal).
-/// Without any, a sheet faces `up`, unless it stands upright; and all else faces outward where it is outermost, in a vote
-/// of the extreme positions in 26 directions, which lie on the convex hull.
+/// Signs propagate along the minimum spanning forest whose weights are the doubts of [`continued`]:
+/// first over links to the nearest neighbours, and then over links to farther ones that join
+/// separate trees. A part then faces as most of its `given` normals do (pairs of position and
+/// normal). Without any, a sheet that does not stand upright faces `up`. All other parts face
+/// outward where they are outermost, by a vote of the extreme positions in 26 directions, which lie
+/// on the convex hull.
 pub(crate) fn propagate(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -103,15 +110,16 @@ pub(crate) fn propagate(
     parts as u64
 }
 
-/// How a normal `n` goes on to a neighbour at the offset `along`, whose normal is `m` up to its sign: the cosine between
-/// what it becomes and m, and how doubtful that is, from 0 to 1.
+/// Continues a normal `n` to a neighbour at the offset `along`, whose normal is `m` up to its sign.
+/// Returns the cosine between the continued normal and m, and the doubt about it, from 0 to 1.
 ///
-/// The shortest smooth way between the two, an arc, takes n to its reflection across the plane that halves the offset. The
-/// doubt of Hoppe et al. 1992, 1 - |n . m|, knows nothing of where the neighbour lies, and so takes the two sides of a
-/// thin part for one, where the arc takes them for what they are. Where the offset is along a normal, noise and a far
-/// side look the same, so such links come last: the cosine counts by the fourth power of the sine between offset and
-/// normal. On the 1,839 points of `data/bunny.obj` this leaves 3 normals on the wrong side, all within 15 degrees of the
-/// tangent plane, where the doubt of Hoppe leaves 87.
+/// The shortest smooth path between the two points, an arc, turns n into its reflection across the
+/// plane that bisects the offset. The doubt of Hoppe et al. 1992, 1 - |n . m|, ignores where the
+/// neighbour lies, and so confuses the two sides of a thin part, which the arc tells apart. Where
+/// the offset is along a normal, noise and the far side look the same, so such links come last: the
+/// cosine is multiplied by the fourth power of the sine between offset and normal. On the 1,839
+/// points of `data/bunny.obj`, 3 normals end up on the wrong side, all within 15 degrees of the
+/// tangent plane; with the doubt of Hoppe, 87 do.
 fn continued(along: DVec3, n: DVec3, m: DVec3) -> (f64, f64) {
     let squared = along.length_squared();
     let (p, q) = (along.dot(n), along.dot(m));
@@ -120,7 +128,7 @@ fn continued(along: DVec3, n: DVec3, m: DVec3) -> (f64, f64) {
     (cosine, 1.0 - cosine.abs().min(1.0) * flat * flat)
 }
 
-/// For each part, how much it faces the way it should: negative if the other way.
+/// The vote of each part on its orientation: negative if the part should be flipped.
 fn outward(
     distinct: &DistinctPositions,
     normals: &[[f32; 3]],
@@ -134,7 +142,7 @@ fn outward(
         *sum += DVec3::from_array(normal.map(f64::from));
         *count += 1.0;
     }
-    // One of each pair of opposite directions, of those whose coordinates are -1, 0 or 1.
+    // One of each pair of opposite directions with coordinates -1, 0 or 1.
     let directions: Vec<DVec3> = (14..27)
         .map(|i| DVec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1)).normalize())
         .collect();
@@ -152,7 +160,8 @@ fn outward(
             }
             let facing = |index: u32, direction: DVec3| {
                 let cosine = direction.dot(DVec3::from_array(normals[index as usize].map(f64::from)));
-                // At a tip a normal may be far off, and then it is nearly across: it counts for little.
+                // At a tip, a normal may be far off and is then nearly perpendicular: squaring
+                // reduces its vote.
                 cosine * cosine.abs()
             };
             extremes.iter().map(|[(_, far), (_, near)]| facing(*far, direction) + facing(*near, -direction)).collect()
@@ -168,7 +177,8 @@ fn outward(
         .collect()
 }
 
-/// Turns each of `normals` (at `centers`, world coordinates) toward the nearest of `scanners`.
+/// Turns each of `normals` toward the nearest of `scanners`; `centers` returns their positions,
+/// world coordinates.
 pub(crate) fn toward(centers: impl Fn(usize) -> DVec3 + Sync, normals: &mut [[f32; 3]], scanners: &[DVec3]) {
     let faces_away = |index: usize, normal: [f32; 3]| {
         let center = centers(index);
@@ -183,7 +193,7 @@ pub(crate) fn toward(centers: impl Fn(usize) -> DVec3 + Sync, normals: &mut [[f3
     });
 }
 
-/// Inverts the normals of which `inverted` says so.
+/// Negates the normals for which `inverted` returns true.
 fn turn(normals: &mut [[f32; 3]], inverted: impl Fn(usize) -> bool + Sync) {
     normals.par_iter_mut().enumerate().filter(|(index, _)| inverted(*index)).for_each(|(_, normal)| {
         *normal = normal.map(|c| -c);

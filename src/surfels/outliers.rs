@@ -1,4 +1,4 @@
-//! Points that lie too far from all others to be of the surface.
+//! Leaves out outliers: points that lie too far from all others to belong to the surface.
 
 use rayon::prelude::*;
 
@@ -8,10 +8,11 @@ use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::Progress;
 
-/// More than the rounding of a mean of as many distances as there may be, as a part of it.
+/// Relative tolerance, larger than the rounding error of the mean of all distances.
 const ROUNDING: f64 = 1e-9;
 
-/// Leaves out the points that lie farther from their neighbours than so many `deviations`, and says how many.
+/// Leaves out the points whose distance to their neighbours exceeds the mean by more than this many
+/// standard deviations; returns their number.
 pub(crate) fn drop_outliers(
     gathered: &mut Gathered,
     distinct: &mut DistinctPositions,
@@ -38,12 +39,13 @@ pub(crate) fn drop_outliers(
     dropped
 }
 
-/// Which positions are no outliers: those whose mean distance to their neighbours is at most the
-/// mean of that over all positions plus `deviations` of its standard deviations (Rusu et al. 2008,
-/// "Towards 3D point cloud based object maps for household environments", section 3.1). The mean of
-/// equal distances may be rounded below them: none of them is an outlier.
+/// Whether each position is an inlier: its mean distance to its neighbours is at most the mean over
+/// all positions plus `deviations` standard deviations (Rusu et al. 2008, "Towards 3D point cloud
+/// based object maps for household environments", section 3.1).
+///
+/// The mean of equal distances may be rounded to less than them; none of them is an outlier.
 fn inliers(distances: &[f64], deviations: f64) -> Vec<bool> {
-    // One after the other, so that the sums' rounding is the same for any number of threads.
+    // Serial sums, so that their rounding is the same for any number of threads.
     let count = distances.len() as f64;
     let mean = distances.iter().sum::<f64>() / count;
     let variance = distances.iter().map(|distance| (distance - mean) * (distance - mean)).sum::<f64>() / count;

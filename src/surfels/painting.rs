@@ -1,4 +1,4 @@
-//! Which of several textures paints which point.
+//! Assigns points to several textures.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,15 +12,16 @@ use crate::scene::mipmap::half;
 use crate::scene::{Atlas, Colors, Scene};
 use crate::{Error, Progress, Result};
 
-/// The most textures of a scene: then coordinates in their plane keep the digits that a texture of 16384 texels needs.
+/// The largest number of textures in a scene: coordinates in their common plane are then precise
+/// enough for a texture of 16384 texels.
 const MOST: u64 = 1024;
 
-/// Numbers the points of all inputs by their textures, of which there are so many: one for all, one for each input, or in the order of the inputs
-/// as many as the numbers of its points name.
+/// Numbers the points of all inputs by their textures. There is one texture for all inputs, or one
+/// for each, or as many as the texture numbers of the points name, in the order of the inputs.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if there are more or fewer textures than that, or no input has texture
+/// [`Error::Usage`] if the number of textures is none of these, or no input has texture
 /// coordinates.
 pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     let bare = bare_inputs(inputs)?;
@@ -36,7 +37,7 @@ pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     if textures as u64 > MOST {
         return Err(Error::Usage(format!("{textures} textures are given, and a scene has {MOST} at most")));
     }
-    // What no point has comes last in a single input.
+    // With a single input, textures that no point names may be left over.
     if all != textures as u64 && !(inputs.len() == 1 && all < textures as u64) {
         let given = if textures == 1 { "1 texture is given".into() } else { format!("{textures} textures are given") };
         let needed = match one_each {
@@ -49,12 +50,13 @@ pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     Ok(())
 }
 
-/// Gives the points of inputs without texture coordinates the number of no texture, so that they
-/// keep their colours beside painted ones; and tells whether there are such inputs.
+/// Gives the points of inputs without texture coordinates the number [`u32::MAX`], which means no
+/// texture, so that they keep their colours beside painted points. Returns whether there are such
+/// inputs.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if none has any.
+/// [`Error::Usage`] if no input has texture coordinates.
 fn bare_inputs(inputs: &mut [Points]) -> Result<bool> {
     let lacks = |input: &Points| input.texture.is_none() && !input.positions.is_empty();
     let bare = inputs.iter().any(lacks);
@@ -75,11 +77,12 @@ fn bare_inputs(inputs: &mut [Points]) -> Result<bool> {
     Ok(bare)
 }
 
-/// Numbers the points of several inputs by their textures, if any of them has numbers: else all are taken to be in one.
+/// Numbers the points of several inputs by their textures if any input has texture numbers;
+/// otherwise all of them have the same texture.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for a number that no texture has.
+/// [`Error::Usage`] for a number that is too large.
 pub(super) fn number_together(inputs: &mut [Points]) -> Result<()> {
     let named = named_by_all(inputs)?;
     if inputs.iter().any(|input| input.texture_numbers.is_some()) {
@@ -88,24 +91,26 @@ pub(super) fn number_together(inputs: &mut [Points]) -> Result<()> {
     Ok(())
 }
 
-/// The most texels of all images of meshes' materials together that surfels are painted with: with
-/// their halvings they fit into the 128 MiB that any device binds.
+/// The largest number of texels of all material images together that surfels are painted with: with
+/// their mipmaps they fit into 128 MiB, which any device can bind.
 const MOST_TEXELS: u64 = 1 << 24;
 
 /// The images that the materials of inputs name.
 #[derive(Debug, Default)]
 struct Own {
-    /// Each times the colour of a material.
+    /// The images, each multiplied by the colour of a material.
     textures: Vec<Arc<Texture>>,
-    /// Which inputs have some.
+    /// Whether each input has images.
     has_images: Vec<bool>,
-    /// How many of them were halved.
+    /// The number of images that were halved.
     halved: u64,
 }
 
-/// The images that the materials of the inputs' meshes name, whose triangles get their numbers
-/// among all. None, where there are more than a scene has, or Gaussians beside them, whose colours
-/// are codes.
+/// Collects the images that the materials of the inputs' meshes name, and numbers the triangles by
+/// them.
+///
+/// The result is empty if there are more images than a scene can have, or if there are Gaussians,
+/// whose colours are sRGB codes.
 fn own(inputs: &mut [Points]) -> Own {
     fn painted(input: &mut Points) -> Option<&mut Paint> {
         let paint = input.faces.as_mut().filter(|_| input.of_mesh)?.paint.as_deref_mut();
@@ -147,8 +152,8 @@ fn own(inputs: &mut [Points]) -> Own {
     Own { textures: images.into_iter().zip(halvings).map(made).collect(), has_images, halved }
 }
 
-/// How often images of these sizes are halved until they have no more than [`MOST_TEXELS`]: always
-/// the largest.
+/// Returns how often images of these sizes are halved until they have at most [`MOST_TEXELS`]
+/// together: always the largest next.
 fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     let mut halvings = vec![0; sizes.len()];
     let texels =
@@ -162,7 +167,7 @@ fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     halvings
 }
 
-/// The surfels of an input beside those that are painted: what has no image of its own has no
+/// The surfels of an input in a scene with painted ones: surfels of an input without images have no
 /// texture.
 fn beside_painted(mut points: Points, has_images: bool) -> Points {
     if !has_images || points.texture_slopes.is_none() {
@@ -173,9 +178,11 @@ fn beside_painted(mut points: Points, has_images: bool) -> Points {
     points
 }
 
-/// [`build_within`], painted with the images that the materials of the inputs' meshes name; surfels
-/// of others have their colours. Without such images, or with more than can be told apart, it is
-/// the same: surfels have the means of the images over their triangles.
+/// Builds a scene as [`build_within`] does, but painted with the images that the materials of the
+/// inputs' meshes name; surfels of other inputs have their colours.
+///
+/// Without such images, or with more than a scene can have, the result is that of [`build_within`]:
+/// a surfel has the mean of the image over its triangles.
 ///
 /// # Errors
 ///
@@ -197,7 +204,7 @@ pub fn build_painted(
     Ok((scene, Preparation { halved_images: own.halved, ..preparation }))
 }
 
-/// The scene of points that are numbered by these textures.
+/// Builds the scene of points that are numbered by `textures`.
 pub(super) fn painted(
     inputs: Vec<Points>,
     textures: Vec<Arc<Texture>>,
@@ -206,37 +213,37 @@ pub(super) fn painted(
 ) -> Result<(Scene, Preparation)> {
     let gathered = gather(inputs)?;
     let (mut scene, preparation, places) = built_in_texture(gathered, textures.len() as u32, limits, progress)?;
-    // Nodes have no place in a texture.
+    // Nodes have no texture coordinates.
     scene.hierarchy = None;
     scene.colors = Colors::Textured(texture::painted(&scene, textures, &places, progress)?);
     Ok((scene, preparation))
 }
 
-/// Moves the numbers of each input past those of the inputs before it, which have so many.
+/// Adds to the texture numbers of each input the number of textures of the inputs before it.
 fn offset(inputs: &mut [Points], textures: &[u64]) {
     let mut first = 0;
     for (input, own) in inputs.iter_mut().zip(textures) {
         let count = input.positions.len();
         let numbers = input.texture_numbers.get_or_insert_with(|| vec![0; count]);
-        // The number of no texture saturates, and stays.
+        // The addition saturates, so u32::MAX still means no texture.
         numbers.iter_mut().for_each(|number| *number = number.saturating_add(first));
-        // None of them is more than MOST.
+        // A number of textures is at most MOST.
         first = first.saturating_add(*own as u32);
     }
 }
 
-/// The textures that each input needs.
+/// The number of textures that each input needs.
 fn named_by_all(inputs: &[Points]) -> Result<Vec<u64>> {
     let named: Vec<u64> = inputs.iter().map(named).collect();
     match named.iter().find(|named| **named > MOST) {
         Some(named) => {
-            Err(Error::Usage(format!("a point is in texture {} (texnumber), and there are at most {MOST}", named - 1)))
+            Err(Error::Usage(format!("a point names texture {} (texnumber), but there are at most {MOST}", named - 1)))
         }
         None => Ok(named),
     }
 }
 
-/// The textures that an input needs.
+/// The number of textures that an input needs.
 fn named(input: &Points) -> u64 {
     match &input.texture_numbers {
         Some(numbers) => last(numbers).map_or(0, |last| u64::from(last) + 1),
@@ -244,19 +251,20 @@ fn named(input: &Points) -> u64 {
     }
 }
 
-/// The last texture that points name.
+/// The largest texture number that points name.
 fn last(numbers: &[u32]) -> Option<u32> {
     numbers.iter().copied().filter(|&number| number != u32::MAX).max()
 }
 
-/// Points that no texture paints have coordinates of no matter, which shall not widen the plane.
+/// Sets the coordinates of points without a texture to 0, so that they do not widen the common
+/// plane.
 pub(super) fn clear_bare(points: &mut Points) {
     let (Some(numbers), Some(places)) = (&points.texture_numbers, &mut points.texture) else { return };
     let bare = numbers.iter().zip(places).filter(|(number, _)| **number == u32::MAX);
     bare.for_each(|(_, place)| *place = [0.0; 2]);
 }
 
-/// Moves the coordinates of points into the plane of their textures, of which there are so many at least.
+/// Moves the coordinates of points into the common plane of at least `at_least` textures.
 pub(super) fn join(points: &mut Points, at_least: u32) -> Atlas {
     let (Some(numbers), Some(places)) = (points.texture_numbers.take(), &mut points.texture) else { return Atlas::ONE };
     let textures = last(&numbers).map_or(0, |last| last + 1).max(at_least).max(1);
@@ -277,7 +285,7 @@ mod tests {
         assert_eq!(halvings(&[[4096, 4096], [16, 16]]), [1, 0]);
         assert_eq!(halvings(&[[16384, 16384]]), [2]);
         assert_eq!(halvings(&[[8192, 4096], [8192, 4096]]), [1, 1]);
-        // Both halves fill the room, which a small one then passes.
+        // Both halves fill the limit exactly, and a small third image exceeds it.
         assert_eq!(halvings(&[[8192, 4096], [8192, 4096], [64, 64]]), [1, 2, 0]);
         assert!(halvings(&[]).is_empty());
     }

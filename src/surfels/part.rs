@@ -1,7 +1,9 @@
-//! The part of a file with levels of detail that a picture takes, as a scene whose picture is that of all of it, to the bit.
+//! Reads the part of a file with levels of detail that a picture needs, as a scene whose picture is
+//! that of the whole file, to the bit.
 //!
-//! From the root down, level by level: what is below a node is read where the picture may come to it. A node where it cannot is a leaf without surfels, so
-//! the part is a tree, too, of which the same nodes are drawn as of the whole.
+//! The tree is read from the root down, level by level: the children or surfels of a node are read
+//! if the picture may need them. Other nodes become leaves without surfels, so the part is a tree,
+//! too, from which the same nodes are drawn.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,22 +16,23 @@ use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::scene::whole::LevelFacts;
 use crate::{Progress, Result};
 
-/// Nodes or points that are read at once: what is made of them on the way takes no more memory, but of nodes three times as much, as one block is read
-/// and another one appended meanwhile.
+/// The number of nodes or points that are read at once, which bounds the memory for decoding. For
+/// nodes it is three times as much, because one block is read and another one is appended
+/// meanwhile.
 const BLOCK: u32 = 1 << 16;
 
-/// How much of a file a part is.
+/// The size of a part of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Taken {
-    /// Nodes.
+    /// The number of nodes.
     pub nodes: u64,
-    /// Surfels.
+    /// The number of surfels.
     pub surfels: u64,
-    /// Bytes that these have in the file.
+    /// Their size in the file, bytes.
     pub bytes: u64,
 }
 
-/// Nothing of a file but what all of its surfels say together.
+/// A scene without surfels, with the facts that the file states about all of them.
 pub fn nothing(levels: &Levels) -> Scene {
     let whole = levels.whole;
     let oriented = !levels.unsided;
@@ -43,12 +46,16 @@ pub fn nothing(levels: &Levels) -> Scene {
     }
 }
 
-/// The part of a file that has the surfels and the children of those of its nodes that `may_be_divided`: a tree of nodes about the file's origin, and the
-/// number of one of them.
+/// Reads the part of a file that holds the surfels and children of those nodes for which
+/// `may_be_divided` returns true. Returns its scene and its size.
+///
+/// `may_be_divided` is called with a tree of nodes, relative to the file's origin, and the index of
+/// one of them.
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
+/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the
+/// file, and any error of `fits`, which is called with the size of the part so far.
 pub fn part(
     levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
@@ -67,7 +74,8 @@ pub fn part(
     Ok((scene?, taken))
 }
 
-/// The nodes of a part, of which leaves name surfels of the file, how much it is, and what all nodes say together.
+/// Reads the nodes of a part, whose leaves hold the indices of surfels in the file. Returns them,
+/// the size of the part, and the facts about all its nodes.
 fn grown(
     levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
@@ -81,7 +89,7 @@ fn grown(
     };
     let (mut tree, mut taken) = (Hierarchy::default(), Taken { nodes: 0, surfels: 0, bytes: 0 });
     let mut facts = LevelFacts::default();
-    // Those of a level, by their numbers in the file, which ascend.
+    // The indices in the file of a level's nodes, ascending.
     let mut numbers: Vec<Range<u32>> = std::iter::once(0..1).collect();
     for _ in 0..=DEEPEST {
         let Some(last) = numbers.last() else { break };
@@ -108,8 +116,8 @@ fn grown(
     Ok((tree, taken, facts))
 }
 
-/// Hands what `made` makes of the nodes of these numbers to `append`, block by block: while one is decoded the one before it is appended, and the next
-/// one is read.
+/// Reads the nodes with these indices block by block and passes what `made` returns for them to
+/// `append`. While a block is decoded, the previous one is appended and the next one is read.
 fn in_blocks<T: Send>(
     levels: &Levels,
     numbers: &[Range<u32>],
@@ -132,21 +140,21 @@ fn in_blocks<T: Send>(
     append(decoded)
 }
 
-/// What is below a level.
+/// The level below the current one.
 struct Below {
-    /// The numbers in the file of the children of its nodes that are divided.
+    /// The indices in the file of the children of divided nodes.
     numbers: Vec<Range<u32>>,
-    /// Those of the next ones are no smaller.
+    /// The indices of further children are at least this.
     reached: u32,
-    /// The place in the part of the next one.
+    /// The index in the part of the next child.
     place: u32,
-    /// How many surfels its leaves have that are divided.
+    /// The number of surfels of the divided leaves.
     surfels: u64,
 }
 
 impl Below {
-    /// Appends nodes of the level to a tree: the children of those that are divided come next, and others are leaves without surfels. None if they
-    /// are no nodes of a tree.
+    /// Appends nodes of the current level to the tree. Nodes that are not divided become leaves
+    /// without surfels. Returns None if the nodes do not form a tree.
     fn append(&mut self, tree: &mut Hierarchy, nodes: Hierarchy, divided: &[bool]) -> Option<()> {
         for (node, divided) in nodes.nodes.into_iter().zip(divided) {
             if node.count == 0 || (!node.leaf && node.count as usize > FAN_OUT) {
@@ -173,7 +181,7 @@ impl Below {
     }
 }
 
-/// Ranges in blocks of so many numbers as are read at once.
+/// Divides ranges into blocks of [`BLOCK`] indices; the last block may have fewer.
 fn blocks(ranges: &[Range<u32>]) -> Vec<Vec<Range<u32>>> {
     let (mut all, mut room) = (Vec::new(), 0);
     for range in ranges {
@@ -191,7 +199,7 @@ fn blocks(ranges: &[Range<u32>]) -> Vec<Vec<Range<u32>>> {
     all
 }
 
-/// Adds a range after all others.
+/// Appends a range, and merges it with the last one if they are adjacent.
 fn push(ranges: &mut Vec<Range<u32>>, next: Range<u32>) {
     match ranges.last_mut() {
         Some(last) if last.end == next.start => last.end = next.end,
@@ -199,7 +207,8 @@ fn push(ranges: &mut Vec<Range<u32>>, next: Range<u32>) {
     }
 }
 
-/// The numbers in the file of the leaves' surfels from left to right, which get their places in the part; None if they do not ascend.
+/// Returns the indices in the file of the leaves' surfels from left to right, and replaces them by
+/// indices in the part. None if they do not ascend.
 fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
     let (mut all, mut reached, mut held) = (Vec::new(), 0, 0);
     let mut open = vec![0];
@@ -207,7 +216,7 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
         let node: &mut Node = &mut tree.nodes[index as usize];
         let own = node.first..node.first.checked_add(node.count)?;
         if !node.leaf {
-            // Children have larger numbers, so this ends.
+            // Children have larger indices than their parent, so this ends.
             open.extend(own.rev());
             continue;
         }
@@ -218,13 +227,13 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
             reached = own.end;
             push(&mut all, own);
         }
-        // Ranges that ascend have fewer than 2^32 numbers together.
+        // Ascending ranges have fewer than 2^32 indices together.
         (node.first, held) = (held, held + node.count);
     }
     Some(all)
 }
 
-/// The surfels of these numbers and the tree over them.
+/// Reads the surfels with these indices and builds the scene with the tree over them.
 fn scene(
     levels: &Levels,
     numbers: &[Range<u32>],
@@ -238,7 +247,7 @@ fn scene(
         let (mut scene, count) = (empty.clone(), points.positions.len());
         complete::add(&mut scene, vec![points], whole.has)
             .filter(|added| added.positions.len() == count)
-            .ok_or("a point of its levels of detail has no place or no half-axes")?;
+            .ok_or("a point of its levels of detail has no valid position or no half-axes")?;
         progress.advance(count as u64);
         Ok(scene)
     };
@@ -248,7 +257,7 @@ fn scene(
     tree.settle(&scene.surfels, &scene.low);
     scene.hierarchy = Some(Arc::new(tree));
     if !whole.holds(&scene, facts) {
-        return Err(levels.malformed("its element 'scene' leaves out points or nodes that it has"));
+        return Err(levels.malformed("its element 'scene' does not cover all of its points and nodes"));
     }
     Ok(Scene { part_of: Some(Box::new(whole)), ..scene })
 }
@@ -258,7 +267,7 @@ mod tests {
     use super::*;
     use crate::scene::{Cap, Surfel};
 
-    /// Leaves whose points are those of others, however many they say they are.
+    /// Rejects leaves that share points, whatever count they state.
     #[test]
     fn points_follow_each_other() {
         let node = |leaf: bool, first: u32, count: u32| {

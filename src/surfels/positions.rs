@@ -1,4 +1,4 @@
-//! The distinct positions of a cloud, in an order of their own.
+//! The distinct positions of a cloud, in an order that does not depend on that of the points.
 
 use std::cmp::Ordering;
 
@@ -10,22 +10,29 @@ use crate::morton;
 use crate::scene::Bounds;
 use crate::{Error, Result};
 
-/// Scaled coordinates below 2^-400 become zero, so that the squared distance of two distinct positions is never zero.
+/// Scaled coordinates below 2^-400 become zero, so the squared distance of two distinct positions
+/// is never zero.
 const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
 
-/// The distinct positions of a cloud, in an order that only depends on the set: along a Morton curve, so that what is
-/// near in space is near in memory.
+/// The distinct positions of a cloud, ordered along a Morton curve, so that neighbours in space are
+/// near each other in memory. The order depends only on the set of positions.
 pub(crate) struct DistinctPositions {
     /// Positions relative to the scene's origin, times [`DistinctPositions::scale`].
     positions: Vec<[f64; 3]>,
     /// For each point, the index of its position.
     of_point: Vec<u32>,
-    /// A power of two that brings the scene's extent to about one, so squares neither overflow nor underflow.
+    /// A power of two that scales the scene's extent to about one, so squares neither overflow nor
+    /// underflow.
     scale: f64,
 }
 
 impl DistinctPositions {
-    /// The distinct ones of `points` (world units, finite), which all lie in `bounds`, relative to `origin`.
+    /// Finds the distinct positions of `points` (world units, finite), which all lie in `bounds`,
+    /// relative to `origin`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for more than 2^32 - 1 points.
     pub fn new(points: &[[f64; 3]], bounds: &Bounds, origin: DVec3) -> Result<Self> {
         if points.len() > u32::MAX as usize {
             return Err(Error::Usage(format!(
@@ -42,14 +49,14 @@ impl DistinctPositions {
             let scaled = (DVec3::from_array(*point) - origin) * scale;
             scaled.to_array().map(|c| if c.abs() < SMALLEST { 0.0 } else { c })
         };
-        // The scaled extent is below 2, so 61 bits after the point make 62 in all.
+        // The scaled extent is below 2, so 61 fractional bits make 62 in all.
         let cell = |p: &[f64; 3]| -> [u64; 3] { std::array::from_fn(|i| ((p[i] - low[i]) * power_of_two(61)) as u64) };
         let mut order: Vec<(u64, u32)> = points
             .par_iter()
             .zip(0..points.len() as u32)
             .map(|(point, index)| (morton_prefix(cell(&place(point))), index))
             .collect();
-        // Points that compare equal are the same position, so it does not matter that this sort is not stable.
+        // Points that compare equal have the same position, so the sort need not be stable.
         order.par_sort_unstable_by(|a, b| {
             a.0.cmp(&b.0).then_with(|| {
                 let (a, b) = (place(&points[a.1 as usize]), place(&points[b.1 as usize]));
@@ -69,7 +76,7 @@ impl DistinctPositions {
         Ok(Self { positions, of_point, scale })
     }
 
-    /// Only those positions whose flag in `keep` is set, and the points at them.
+    /// Keeps only the positions whose flag in `keep` is set, and the points at them.
     pub fn retain(&mut self, keep: &[bool]) {
         let mut numbers = Vec::with_capacity(keep.len());
         let mut kept = 0;
@@ -82,29 +89,29 @@ impl DistinctPositions {
         retain(&mut self.positions, keep);
     }
 
-    /// How many there are.
+    /// The number of distinct positions.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// All of them, scaled units.
+    /// All positions, scaled units.
     pub fn as_slice(&self) -> &[[f64; 3]] {
         &self.positions
     }
 
-    /// Position `index`, scaled units.
+    /// The position with this index, scaled units.
     pub fn position(&self, index: u32) -> DVec3 {
         DVec3::from_array(self.positions[index as usize])
     }
 
-    /// Of each position the first of its points.
+    /// The index of the first point at each position.
     pub fn first_points(&self) -> Vec<u32> {
         let mut first = vec![0; self.len()];
         self.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point as u32);
         first
     }
 
-    /// For each point that was given, which position it has.
+    /// The index of each point's position.
     pub fn of_point(&self) -> &[u32] {
         &self.of_point
     }
@@ -120,18 +127,19 @@ pub(crate) fn exponent(x: f64) -> i32 {
     (((x.to_bits() >> 52) & 0x7ff) as i32 - 1023).max(-1000)
 }
 
-/// 2^e, exactly; e is limited to what a normal f64 holds.
+/// 2^e, exactly; e is clamped to the exponents of normal f64 numbers.
 pub(crate) fn power_of_two(e: i32) -> f64 {
     f64::from_bits(((e.clamp(-1022, 1023) + 1023) as u64) << 52)
 }
 
-/// The upper 21 of 62 bits of each coordinate, interleaved.
+/// The interleaved upper 21 of 62 bits of each coordinate.
 fn morton_prefix(cell: [u64; 3]) -> u64 {
     morton::code(cell.map(|c| c >> 41))
 }
 
-/// The order of the full interleaved coordinates, without interleaving them: the coordinate with the highest differing
-/// bit decides (Chan 2002). Where an outlier makes the whole cloud one cell of the prefix, this keeps the curve.
+/// Compares the full Morton codes without interleaving: the coordinate with the highest differing
+/// bit decides (Chan 2002). This keeps the order on the curve if an outlier puts the rest of the
+/// cloud into one cell of the prefix.
 fn morton_order(a: [u64; 3], b: [u64; 3]) -> Ordering {
     let mut decisive = 2;
     for axis in [1, 0] {
@@ -153,7 +161,7 @@ mod tests {
         let mut state = 1u64;
         let mut next = || {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            // Few bits, so that cells share prefixes.
+            // With few bits, cells share prefixes.
             (state >> 40 & 7) << 58 | (state >> 50 & 3) << 41
         };
         for _ in 0..10_000 {

@@ -1,4 +1,4 @@
-//! What became of the points of a scene.
+//! Counts of the points that were left out, changed or estimated on the way to a scene.
 
 #[cfg(doc)]
 use super::{LARGEST_COORDINATE, Limits};
@@ -6,83 +6,103 @@ use crate::io::points::Flattened;
 #[cfg(doc)]
 use crate::scene::Scene;
 
-/// What was done to the points on the way to a scene.
+/// The preparation of a scene's points.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Preparation {
-    /// Points in all inputs.
+    /// The number of points in all inputs.
     pub points: u64,
-    /// Points that are in the files but not among `points`: they are marked as withheld, which is deleted.
+    /// The number of points that the files mark as withheld (deleted), which `points` does not
+    /// include.
     pub withheld: u64,
-    /// Points that are in the files but not among `points`: their class has the opacity 0.
+    /// The number of points whose class has the opacity 0, which `points` does not include.
     pub unseen: u64,
-    /// Parts of files that could not be read and were left out, named and counted: a sentence each.
+    /// Parts of files that could not be read and were left out: a sentence for each, with names and
+    /// counts.
     pub unread: Vec<String>,
-    /// Vertices that are in the meshes but not among `points`: no triangle names them.
+    /// The number of vertices that no triangle of their mesh uses, which `points` does not include.
     pub loose: u64,
-    /// The same, but their triangles have no area, or a corner that is not finite or exceeds
-    /// [`LARGEST_COORDINATE`].
+    /// The number of vertices whose triangles all have no area, or a corner that is not finite or
+    /// exceeds [`LARGEST_COORDINATE`]; `points` does not include them.
     pub stranded: u64,
-    /// Triangles of meshes left out because a coordinate of a corner is not finite or exceeds
-    /// [`LARGEST_COORDINATE`].
+    /// The number of mesh triangles that were left out because a coordinate of a corner is not
+    /// finite or exceeds [`LARGEST_COORDINATE`].
     pub broken: u64,
-    /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
+    /// The number of Gaussians that were left out because their scales, rotation, opacity or colour
+    /// are not finite, or they have no surface.
     pub shapeless: u64,
-    /// Ellipsoids that were made surfels.
+    /// The ellipsoids that became surfels.
     pub flattened: Option<Flattened>,
-    /// Points left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
+    /// The number of points that were left out because a coordinate is not finite or exceeds
+    /// [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
-    /// Points left out as outliers, which [`Limits::outliers`] asks for.
+    /// The number of points that were left out as outliers ([`Limits::outliers`]).
     pub dropped_outliers: u64,
-    /// Surfels in the scene: `points - shapeless - dropped_non_finite - dropped_outliers`.
+    /// The number of surfels in the scene:
+    /// `points - shapeless - dropped_non_finite - dropped_outliers`.
     pub surfels: u64,
-    /// Surfels whose normal was missing, zero or not finite, and was estimated from neighbours.
+    /// The number of surfels whose normal was missing, zero or not finite, and was estimated from
+    /// neighbours.
     pub estimated_normals: u64,
-    /// Surfels whose given normal faces the other way than that of the nearest point beside them; counted where radii were estimated. If they
-    /// are more than a quarter, normals have no side ([`Scene::oriented`]): half of them would have, were sides random.
+    /// The number of surfels whose given normal is opposed to that of the nearest point beside
+    /// them; counted where radii were estimated.
+    ///
+    /// If it exceeds a quarter of the surfels, normals have no side ([`Scene::oriented`]): with
+    /// random signs, half of them would be opposed.
     pub opposed_normals: u64,
-    /// Surfels whose radius was missing, not positive or not finite, and was estimated from neighbours.
+    /// The number of surfels whose radius was missing, not positive or not finite, and was
+    /// estimated from neighbours.
     pub estimated_radii: u64,
-    /// Points without a radius that are drawn facing the camera, and the one that all of them took, world units.
+    /// The number of points without a radius that are drawn facing the camera, and the radius that
+    /// all of them have, world units.
     pub common_radius: Option<(u64, f64)>,
-    /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
+    /// The number of surfels whose colour was not finite or exceeded 1e18 and was replaced by
+    /// [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR), plus the number of those with such
+    /// coefficients of harmonics, which became 0.
     pub replaced_colors: u64,
-    /// Surfels whose alpha was not from 0 to 1 and became the nearer of the two.
+    /// The number of surfels whose alpha was outside [0, 1] and was clamped.
     pub clamped_alphas: u64,
-    /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
+    /// The number of points whose texture coordinates were not finite or too large and became 0;
+    /// counted where a texture paints them.
     pub replaced_places: u64,
-    /// Surfels that have the mean of an image over their triangles, as no image paints them.
+    /// The number of surfels that have the mean of an image over their triangle, as no image paints
+    /// them.
     pub averaged: u64,
-    /// Images of materials that were halved, so that all of them fit into a device's memory.
+    /// The number of material images that were halved, so that all of them fit into a device's
+    /// memory.
     pub halved_images: u64,
-    /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
+    /// The number of distinct positions of the surfels; None if nothing was estimated.
     pub distinct_positions: Option<u64>,
-    /// No input says which way is up, so it was guessed.
+    /// No input states which axis points up, so it was guessed.
     pub guessed_up: bool,
-    /// Points that stray: they lie so far from nearly all others that the default view leaves them out ([`Scene::framed`]).
+    /// The number of stray points: they lie so far from nearly all others that the default view
+    /// leaves them out ([`Scene::framed`]).
     pub strays: u64,
-    /// Surfels whose radius was estimated and would have been larger than [`Limits::largest_ratio`] allows.
+    /// The number of surfels whose estimated radius was reduced because of their neighbours
+    /// ([`Limits::largest_ratio`]).
     pub limited_by_neighbours: u64,
-    /// Surfels larger than a million times the scene, which were made that large.
+    /// The number of surfels larger than a million times the scene, which were reduced to that
+    /// size.
     pub limited_radii: u64,
-    /// The largest error of a centre's coordinate, world units, where it may show: it is more than 1/256 of the surfel's shorter
-    /// half-axis, although coordinates are kept in twice the digits of f32.
+    /// The largest rounding error of a centre's coordinate, world units, among the errors that may
+    /// be visible: more than 1/256 of the surfel's shorter half-axis, although coordinates are
+    /// stored as two f32. None if there are none.
     pub rounding: Option<f64>,
-    /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
+    /// Median distance from a position to the nearest other one, world units; None if nothing was
     /// estimated or there is only one position.
     pub median_spacing: Option<f64>,
-    /// Sentences about what readers found odd in the files
+    /// Sentences about oddities that readers found in the files
     /// ([`Points::notes`](crate::io::Points::notes)).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub told: Vec<String>,
 }
 
 impl Preparation {
-    /// Whether given normals face either way, as a fit of planes leaves them.
+    /// Whether the signs of given normals are arbitrary, as those of fitted planes are.
     pub(crate) fn has_random_sides(&self) -> bool {
         4 * self.opposed_normals > self.surfels
     }
 
-    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    /// Sentences for the user, one for each kind of loss or replacement.
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} points {what}"));
         let notes = [
@@ -100,7 +120,7 @@ impl Preparation {
             }),
             (self.shapeless > 0).then(|| {
                 let what =
-                    "were left out: their scales, rotation, opacity or colour are no numbers, or span no surface";
+                    "were left out: their scales, rotation, opacity or colour are not finite, or they have no surface";
                 format!("{} Gaussians {what}", self.shapeless)
             }),
             self.flattened.map(|flattened| flattened.sentence()),
@@ -108,9 +128,9 @@ impl Preparation {
             counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours"),
             counted(
                 self.replaced_colors,
-                "had a colour that is not finite and became grey, or lost its change with the view",
+                "had a colour that is not finite: it became grey, or lost its dependence on the view",
             ),
-            counted(self.clamped_alphas, "had an alpha that is not from 0 to 1 and got the nearer of the two"),
+            counted(self.clamped_alphas, "had an alpha outside 0 to 1, which was clamped"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];
         let images = [
@@ -125,7 +145,7 @@ impl Preparation {
             }),
         ];
         let common = self.common_radius.map(|(points, radius)| {
-            format!("{points} points have no radius and took one for all, by the mean spacing: {radius:.3e} world units (--point-size)")
+            format!("{points} points have no radius and got a common one from the mean spacing: {radius:.3e} world units (--point-size)")
         });
         let strays = counted(self.strays, "stray: they lie far away from all others, outside of the default view");
         let by_neighbours =
@@ -135,7 +155,7 @@ impl Preparation {
             format!("normals face either way: {opposed} of {all} are opposed to the nearest one's, so they have no side (epsplat surfels --estimate-normals gives them one)")
         });
         let limited =
-            counted(self.limited_radii, "had a radius of more than a million times the scene and became that large");
+            counted(self.limited_radii, "had a radius of more than a million times the scene and were limited to it");
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });

@@ -1,4 +1,5 @@
-//! How far points lie apart, without a look at any neighbour: of the cells of a grid that a surface passes through, as many as it has.
+//! Measures the spacing of points without a search for neighbours, from the number of grid cells
+//! that their surface passes through.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -8,25 +9,30 @@ use crate::morton::code;
 use crate::random::mixed;
 use crate::scene::Bounds;
 
-/// Points that are looked at; more say no more.
+/// The number of points that are used: more do not improve the result.
 const LOOKED_AT: u64 = 1 << 20;
 
-/// Points that a cell holds in the mean, at least: with fewer, cells that the surface passes through are empty.
+/// The least mean number of points per cell: with fewer, some cells that the surface passes through
+/// are empty.
 const HELD: usize = 8;
 
-/// Cells of side 1 that a plane passes through, by its area: the mean of `|n_x| + |n_y| + |n_z|` over all its directions.
+/// The number of unit cells that a plane passes through, per unit area: the mean of
+/// `|n_x| + |n_y| + |n_z|` over all directions n.
 const PASSED: f64 = 1.5;
 
-/// Bits of a cell's coordinate.
+/// Bits of a cell coordinate.
 const BITS: u32 = 21;
 
-/// A cloud of at most this many positions has too few cells: its spacing is measured between them.
+/// With at most this many positions there are too few cells, and the spacing is measured between
+/// the positions.
 const FEW: usize = HELD * HELD;
 
-/// The square root of the area that a position stands for, in the units of `positions`, most of
-/// which lie in `body`: the side of the squares that would tile the surface. For a few positions it
-/// is the median distance to the nearest other one. Points at one place are one position. None
-/// where all lie at one place. It does not depend on the order of the points.
+/// The square root of the area per position, in the units of `positions`: the side of the squares
+/// that would tile the surface.
+///
+/// `body` is the box of most positions. Points at one position count once. For at most [`FEW`]
+/// positions, the result is the median distance to the nearest other one; None if there is only one
+/// position. The result does not depend on the order of the points.
 pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
     let few = few_distinct(positions);
     if !few.is_empty() {
@@ -50,7 +56,7 @@ pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
     distinct.dedup();
     let looked_at = distinct.len() as f64;
     let mut codes: Vec<u64> = distinct.into_iter().filter_map(|(code, _)| code).collect();
-    // From the finest grid on: a cell of the next one has eight of this one's.
+    // From the finest grid to coarser ones: a cell of the next grid contains eight of this one.
     for level in 0..=BITS {
         codes.dedup();
         let passed = codes.len();
@@ -63,7 +69,7 @@ pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
     None
 }
 
-/// The distinct ones of `positions`, sorted by their bits, if they are at most [`FEW`]; else none.
+/// The distinct `positions`, sorted by their bits, if they are at most [`FEW`]; else empty.
 fn few_distinct(positions: &[[f64; 3]]) -> Vec<DVec3> {
     let mut few: Vec<[u64; 3]> = Vec::new();
     for position in positions {
@@ -78,7 +84,7 @@ fn few_distinct(positions: &[[f64; 3]]) -> Vec<DVec3> {
     few.into_iter().map(|bits| DVec3::from_array(bits.map(f64::from_bits))).collect()
 }
 
-/// The median distance from a position to the nearest other one; None of one.
+/// The median distance from a position to the nearest other one; None for a single position.
 fn median_nearest(distinct: &[DVec3]) -> Option<f64> {
     let nearest = |(index, at): (usize, &DVec3)| {
         let others = distinct.iter().enumerate().filter(|(other, _)| *other != index);
@@ -116,7 +122,7 @@ mod tests {
             assert!((0.8..1.25).contains(&found), "{found}");
             let reversed: Vec<_> = sphere.iter().rev().copied().collect();
             assert_eq!(spacing(&reversed, &bounds(&sphere)), spacing(&sphere, &bounds(&sphere)));
-            // A plane along the axes is the case that the mean over directions errs most for.
+            // The mean over all directions has the largest error for a plane along the axes.
             let plane: Vec<[f64; 3]> = (0..count).map(|_| [random.number(), random.number(), 0.0]).collect();
             let found = spacing(&plane, &bounds(&plane)).unwrap_or(0.0) * (count as f64).sqrt();
             assert!((0.7..1.25).contains(&found), "{found}");
@@ -160,7 +166,7 @@ mod tests {
         let mut points: Vec<[f64; 3]> = (0..9).map(|i| [f64::from(i % 3), f64::from(i / 3), 0.0]).collect();
         points.push([1e-9, 0.0, 0.0]);
         assert_eq!(of(&points), Some(1.0));
-        // Spacings that grow along a line.
+        // Positions on a line at growing distances.
         let line: Vec<[f64; 3]> = (0..65).map(|i| [f64::from(i) * f64::from(i), 0.0, 0.0]).collect();
         assert!(of(&line).is_some_and(|found| (20.0..400.0).contains(&found)), "{:?}", of(&line));
     }

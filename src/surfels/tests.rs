@@ -148,7 +148,7 @@ fn sphere_normals_and_radii_are_near_the_truth() {
     }
 }
 
-/// Whether a place of the plane z = 0 lies within a surfel of that plane.
+/// Whether a point of the plane z = 0 lies inside a surfel in that plane.
 fn holds(surfel: &Surfel, [x, y]: [f64; 2]) -> bool {
     let place = DVec3::new(x - f64::from(surfel.center[0]), y - f64::from(surfel.center[1]), 0.0);
     let along = |axis: [f32; 3]| {
@@ -181,7 +181,7 @@ fn a_random_plane_is_covered() {
             .any(|surfel| holds(surfel, [x, y]));
         holes += u32::from(!covered);
     }
-    // Of the circle of the same area.
+    // The radius of the circle with the same area.
     let mean_radius =
         scene.surfels.iter().map(|s| f64::from(s.normal().length()).sqrt()).sum::<f64>() / f64::from(count);
     println!(
@@ -189,13 +189,13 @@ fn a_random_plane_is_covered() {
         f64::from(holes) / f64::from(samples),
         mean_radius * f64::from(count).sqrt()
     );
-    // The mean distance to 8 neighbours alone leaves 400.
+    // Disks with the mean distance to 8 neighbours as their radius leave 400.
     assert!(holes <= 8, "{holes} of {samples}");
-    // Not by disks so large that nothing is sharp.
+    // Nor are the disks so large that nothing is sharp.
     assert!(mean_radius * f64::from(count).sqrt() < 1.35, "{mean_radius}");
     let told = coverage(&scene, &()).unwrap().unwrap();
     assert!(told.covered > 0.995 && told.covered < 1.0, "{told:?}");
-    // What has holes is not said to have none.
+    // A scene with holes is not reported as covered.
     let mut small = scene;
     small.surfels.iter_mut().for_each(|surfel| {
         (surfel.s, surfel.t) = (surfel.s.map(|c| c * 0.65), surfel.t.map(|c| c * 0.65));

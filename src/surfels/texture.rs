@@ -1,4 +1,5 @@
-//! Surfels that are painted by a texture: how its coordinates change over their disks, and its mean there.
+//! Paints surfels with a texture: computes how its coordinates change over their disks, and its
+//! mean over each disk.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,17 +13,21 @@ use super::positions::DistinctPositions;
 use crate::scene::{Atlas, Bounds, Place, Scene, Surfel, Texture, Textured};
 use crate::{Progress, Result};
 
-/// Neighbours that tell how fast coordinates change: the first two rings of a square grid.
+/// The number of neighbours from which the change of coordinates is estimated: the first two rings
+/// of a square grid.
 const NEIGHBOURS: usize = 8;
 
-/// The change for each length, of those to the neighbours in order, that is typical. At a straight seam three of the first ring
-/// lie on the other side, and five at its corner.
+/// The typical change per unit length is the one of this rank, from 0, among the changes to the
+/// neighbours in ascending order. At a straight seam, three neighbours of the first ring lie on the
+/// other side; at a seam's corner, five.
 const RANK: usize = 2;
 
-/// Changes of more than this many times the typical one are jumps across a seam: parameterisations stretch a surface less.
+/// A change of more than this many times the typical one is a jump across a seam: parameterisations
+/// stretch a surface less.
 const STRETCH: f64 = 3.0;
 
-/// Least squares with a smaller ratio of determinant to squared trace say nothing of one direction.
+/// Least squares with a smaller ratio of determinant to squared trace do not determine the change
+/// in one direction.
 const LEAST_SPREAD: f64 = 1e-3;
 
 /// Paints the surfels of `scene` with `textures` at their coordinates.
@@ -40,7 +45,7 @@ pub(super) fn painted(
     for (index, (surfel, slopes)) in given.filter(|(_, given)| are_known(*given)) {
         places[index] = of_slopes(surfel, coordinates.centers[index], *slopes);
     }
-    // Disks overlap: half of one at each side is about the surfel's own part of the surface.
+    // Disks overlap: half a disk to each side is about the surfel's own part of the surface.
     let color = |(index, place): (usize, &Place)| {
         let center = place.center.map(f64::from);
         let texture = textures.get(coordinates.atlas.number(center) as usize);
@@ -53,13 +58,15 @@ pub(super) fn painted(
     Textured::new(textures, coordinates.atlas, places, colors)
 }
 
-/// Whether the slopes of a surfel were given and can be used: over its disk they gain no more than coordinates may be.
+/// Whether the given slopes of a surfel are known and usable: over its disk, coordinates must not
+/// change by more than [`LARGEST_PLACE`].
 fn are_known((surfel, slopes): (&Surfel, &[[f32; 3]; 2])) -> bool {
     let all = slopes.as_flattened();
     all.iter().any(|gain| *gain != 0.0) && all.iter().all(|gain| gain.abs() * surfel.radius() <= LARGEST_PLACE)
 }
 
-/// Places whose slopes are all to be filled in, where every surfel has its own, or no texture.
+/// Places whose slopes are still to be set, if every surfel has given slopes or no texture; else
+/// None.
 fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
     let Coordinates { centers, slopes, atlas } = coordinates;
     let is_bare = |center: &[f32; 2]| atlas.number(center.map(f64::from)) >= atlas.textures;
@@ -71,10 +78,11 @@ fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
     all.then(|| centers.iter().map(|&center| Place { center, ..Place::default() }).collect())
 }
 
-/// The place of a surfel whose coordinates change so. It overlaps others that are as far off as it is large.
+/// The place of a surfel with given slopes. Its reach covers overlapping surfels as far away as its
+/// radius.
 fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-    // What they gain off its plane is nothing of the surfel's.
+    // Only the change within the surfel's plane counts.
     let normal = s.cross(t).normalize_or_zero();
     let gains = slopes.map(|slope| {
         let gain = DVec3::from_array(slope.map(f64::from));
@@ -90,22 +98,22 @@ fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place 
     }
 }
 
-/// The change of coordinates for each length that is typical around a point, from steps to its neighbours in the order of their distance:
-/// in space, and in the texture.
+/// The typical change of texture coordinates per unit length around a point. `steps` are those to
+/// its neighbours, the nearest first: the offset in space and the difference of coordinates.
 pub(super) fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
     let mut changes: Vec<f64> = steps.iter().map(|(offset, gain)| gain.length() / offset.length()).collect();
     changes.sort_by(f64::total_cmp);
     changes.get(RANK.min(changes.len().saturating_sub(1))).copied().unwrap_or(0.0)
 }
 
-/// Whether a seam lies before a step, by the typical change around its start.
+/// Whether a step crosses a seam, given the typical change around its start.
 pub(super) fn jumps((offset, gain): &(DVec3, DVec2), typical: f64) -> bool {
     gain.length() / offset.length() > STRETCH * typical
 }
 
-/// What u and v gain along the half-axes of an ellipse, by least squares over steps.
+/// The changes of u and v along the half-axes of an ellipse, by least squares over steps.
 pub(super) fn slopes_along([s, t]: [DVec3; 2], steps: impl Iterator<Item = (DVec3, DVec2)>) -> DMat2 {
-    // Sums of x x^T and of gain x^T, for x on the unit disk.
+    // The sums of x x^T and of gain x^T, for x on the unit disk.
     let (mut squares, mut products) = (DMat2::ZERO, DMat2::ZERO);
     for (offset, gain) in steps {
         let x = DVec2::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared());
@@ -117,14 +125,18 @@ pub(super) fn slopes_along([s, t]: [DVec3; 2], steps: impl Iterator<Item = (DVec
     if solvable { products * squares.inverse() } else { DMat2::ZERO }
 }
 
-/// The same in world units.
+/// Converts changes along half-axes to gradients per world unit.
 pub(super) fn in_world(slopes: DMat2, [s, t]: [DVec3; 2]) -> [[f32; 3]; 2] {
     let (along_s, along_t) = (s / s.length_squared(), t / t.length_squared());
     [0, 1].map(|k| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array())
 }
 
-/// What is `made` of each point, by its index, and of the steps to its nearest neighbours in the same texture, or in none as it is: in space, and
-/// in the plane of textures. Of several points of a texture at one position the smallest coordinates count, which any order gives.
+/// Calls `made` with the index of each point and the steps to its nearest neighbours among the
+/// points with the same texture: the offset in space and the difference of coordinates in the
+/// common plane. Points without a texture have neighbours among themselves.
+///
+/// If several points of a texture have one position, the smallest coordinates count, so that the
+/// order of points does not matter.
 pub(super) fn around<T: Clone + Default + Send>(
     (points, bounds): (&[[f64; 3]], &Bounds),
     places: &[[f32; 2]],
@@ -162,8 +174,8 @@ pub(super) fn around<T: Clone + Default + Send>(
     Ok(all)
 }
 
-/// The change of coordinates over each disk, by least squares over those neighbours that no jump lies before. The reach is that of
-/// the typical change over the radius.
+/// The change of coordinates over each disk, by least squares over the neighbours that are not
+/// across a seam. The reach is the typical change times the radius.
 fn places(scene: &Scene, coordinates: &Coordinates, progress: &dyn Progress) -> Result<Vec<Place>> {
     let surfels = &scene.surfels;
     let positions: Vec<[f64; 3]> =
@@ -178,7 +190,8 @@ fn places(scene: &Scene, coordinates: &Coordinates, progress: &dyn Progress) -> 
     all
 }
 
-/// A surfel's place, from the steps to its neighbours: in world units, and in the texture.
+/// A surfel's place, from the steps to its neighbours: the offset in world units and the difference
+/// of texture coordinates.
 fn place(surfel: &Surfel, center: [f32; 2], steps: &[(DVec3, DVec2)]) -> Place {
     let typical = typical_change(steps);
     let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -217,7 +230,7 @@ mod tests {
             assert!(u.distance(0.01 * Vec3::X) < 1e-6 && v.distance(0.02 * Vec3::Y) < 1e-6, "{k}: {u} {v}");
             assert!(place.reach <= 0.02 * 1.5 * 1.001 && place.reach >= 0.01 * 1.5 * 0.999, "{k}: {}", place.reach);
         }
-        // What is no jump but steep is followed.
+        // A change that is steep but no jump is followed.
         let steep = of(0.01);
         assert!(steep.iter().any(|place| place.slopes[0][0] > 0.011));
     }

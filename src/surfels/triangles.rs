@@ -1,4 +1,4 @@
-//! From meshes to the triangles of a scene, as they are.
+//! Converts meshes to the triangles of a scene.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,35 +11,38 @@ use crate::scene::color::DEFAULT_COLOR;
 use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
 use crate::{Error, Result};
 
-/// What was done to meshes on the way to a scene.
+/// The preparation of meshes for a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct MeshPreparation {
-    /// Triangles of all meshes.
+    /// The number of triangles of all meshes.
     pub given: u64,
-    /// Those in the scene.
+    /// The number of triangles in the scene.
     pub triangles: u64,
-    /// Left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
+    /// The number of triangles that were left out because a coordinate is not finite or exceeds
+    /// [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
-    /// Left out because they have no area, as far as the digits of their coordinates tell.
+    /// The number of triangles that were left out because their area is zero within the precision
+    /// of their coordinates.
     pub dropped_degenerate: u64,
-    /// Those with a colour that was not finite, which became [`DEFAULT_COLOR`], or an alpha that was not from 0 to 1, which became the
-    /// nearer of the two.
+    /// The number of triangles with a colour that was not finite and became [`DEFAULT_COLOR`], or
+    /// an alpha outside [0, 1] that was clamped.
     pub replaced_colors: u64,
-    /// The largest error of a corner's coordinate, world units, where it may show: it is more than
-    /// 1/256 of the triangle's width, although coordinates are kept in twice the digits of f32.
+    /// The largest rounding error of a corner's coordinate, world units, among the errors that may
+    /// be visible: more than 1/256 of the triangle's width, although coordinates are stored as two
+    /// f32. None if there are none.
     pub rounding: Option<f64>,
-    /// Nobody says which way is up, so it was guessed.
+    /// No mesh states which axis points up, so it was guessed.
     pub guessed_up: bool,
 }
 
 impl MeshPreparation {
-    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    /// Sentences for the user, one for each kind of loss or replacement.
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} triangles {what}"));
         [
             counted(self.dropped_non_finite, "left out: a coordinate is not finite or too large"),
-            counted(self.dropped_degenerate, "left out: they have no area, as far as the digits of their coordinates tell"),
-            counted(self.replaced_colors, "had a colour that is none, or an alpha beyond 0 to 1, which was replaced"),
+            counted(self.dropped_degenerate, "left out: their area is zero within the precision of their coordinates"),
+            counted(self.replaced_colors, "had a colour that is not finite or an alpha outside 0 to 1, which was replaced"),
             self.rounding.map(|error| {
                 format!("the narrowest triangles lie so far from others that their coordinates err by up to {error:.2e} world units")
             }),
@@ -50,14 +53,16 @@ impl MeshPreparation {
     }
 }
 
-/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of
-/// them alone. Corners are relative to the scene's origin, which is that of its surfels if it has
-/// some. Triangles have the colours of their corners, and their normals, or those of their planes
-/// where there are none.
+/// Adds the triangles of `meshes` to `scene`, which must not have any, or builds a scene of them
+/// alone.
+///
+/// Corners are relative to the scene's origin; an existing scene keeps its own. Triangles have the
+/// colours and normals of their corners, or the normals of their planes where those are missing.
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`] if no mesh has a usable triangle, [`Error::Usage`] for a mesh whose parts do not fit each other.
+/// [`Error::EmptyScene`] if no mesh has a usable triangle or the scene is too small, and
+/// [`Error::Usage`] if `scene` already has triangles or the parts of a mesh do not fit each other.
 pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, MeshPreparation)> {
     meshes.iter().try_for_each(Mesh::check)?;
     if scene.as_ref().is_some_and(|scene| !scene.triangles.is_empty()) {
@@ -82,7 +87,7 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
     let (mut all, mut textures) = (Vec::new(), Numbers::default());
     for mesh in meshes {
         preparation.given += mesh.triangles.len() as u64;
-        // The number of each material's texture, whatever meshes share it.
+        // The index of each material's texture, which meshes may share.
         let number = |of: &Material| of.texture.as_ref().map(|texture| textures.of(texture));
         let numbers: Vec<Option<u32>> = mesh.materials.iter().map(number).collect();
         let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
@@ -97,20 +102,21 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
     preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;
     if scene.triangles.is_empty() {
         return Err(Error::EmptyScene(format!(
-            "there are no triangles that have finite corners and an area that the digits of their coordinates tell, of {} in the mesh",
+            "there are no triangles to draw: of the {} given, none has finite corners and an area beyond the precision of its coordinates",
             preparation.given
         )));
     }
     let size = scene.bounds().extent().max_element();
     if size < SMALLEST_SCENE {
         return Err(Error::EmptyScene(format!(
-            "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
+            "the scene is {size:.1e} world units wide, but only scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} can be drawn: scale it"
         )));
     }
     Ok((scene, preparation))
 }
 
-/// A triangle relative to `origin`, and whether a colour of it was replaced; the textures of materials have these `numbers`.
+/// Returns triangle `index` relative to `origin`, and whether one of its colours was replaced.
+/// `numbers` are the texture indices of the materials.
 fn triangle(mesh: &Mesh, index: usize, origin: DVec3, numbers: &[Option<u32>]) -> (Triangle, bool) {
     let corners = mesh.triangles[index].map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]) - origin);
     let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero().as_vec3();
@@ -123,14 +129,14 @@ fn triangle(mesh: &Mesh, index: usize, origin: DVec3, numbers: &[Option<u32>]) -
     let texture = number.zip(places.copied().filter(usable));
     let mut replaced = false;
     let mut color = |weights: DVec3| {
-        // What a texture is multiplied with.
+        // The colour that a texture is multiplied by.
         let diffuse = texture.and(mesh.material_of(index)).map(|material| material.diffuse);
         let given = diffuse.unwrap_or_else(|| mesh.color_at(index, weights));
         let sound = given.iter().all(|value| value.is_finite());
         let [r, g, b, alpha] = if sound { given } else { DEFAULT_COLOR };
         let within = alpha.clamp(0.0, 1.0);
         replaced |= !sound || within != alpha;
-        // Adding +0 makes the two zeros one.
+        // Adding +0 turns -0 into 0.
         [r * within, g * within, b * within, within].map(|value| value + 0.0)
     };
     let colors = [DVec3::X, DVec3::Y, DVec3::Z].map(&mut color);

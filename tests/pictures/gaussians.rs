@@ -375,7 +375,7 @@ fn odd_files_end_in_a_sentence_or_are_counted() {
          property float green\nproperty float blue\nproperty float alpha\nend_header\n0 0 0 1 1 1 1.5\n1 0 0 1 1 1 -0.5\n",
     );
     let told = String::from_utf8(succeeds(&["info", text(&alpha)]).stdout).unwrap();
-    assert!(told.contains("2 points had an alpha that is not from 0 to 1"), "{told}");
+    assert!(told.contains("2 points had an alpha outside 0 to 1"), "{told}");
 }
 
 /// The command line draws a file as it was trained without being asked, and says what is not so.

@@ -274,7 +274,7 @@ fn degenerate_clouds_have_surfels() {
         let alone = sound(vec![[1.0, 2.0, 3.0]; 5000], size);
         assert_eq!(alone.points.radii.as_ref().unwrap()[..2], [0.5, 0.5]);
         assert!(
-            alone.notes().iter().any(|note| note == "4999 points lie where another one does"),
+            alone.notes().iter().any(|note| note == "4999 points coincide with another one"),
             "{:?}",
             alone.notes()
         );

@@ -1,8 +1,11 @@
-//! Generated surfaces as Gaussian surfels, whose harmonics have what a light beside the eye would make of them.
+//! Generated surfaces as Gaussian surfels, whose spherical harmonics approximate shading by a light
+//! beside the eye.
 //!
-//! A surface of albedo a, seen along d at the unit normal n, with `c = max(0, -d . n)`, shows `a (0.25 + 0.75 c) + 0.3 c^8`, as far as spherical
-//! harmonics of degree 3 tell it: of `c^s = sum over l of A_l sum over m of Y_lm(n) Y_lm(-d)` the terms up to l = 3 with, by Funk and Hecke,
-//! `A_l = 2 pi` times the integral over t from 0 to 1 of `t^s P_l(t)`, P_l being Legendre's polynomial.
+//! A surface of albedo a, seen along d with the unit normal n, has the colour
+//! `a (0.25 + 0.75 c) + 0.3 c^8` with `c = max(0, -d . n)`. It is expanded in spherical harmonics
+//! up to degree 3: `c^s = sum over l of A_l sum over m of Y_lm(n) Y_lm(-d)`, where, by Funk and
+//! Hecke, `A_l = 2 pi` times the integral over t from 0 to 1 of `t^s P_l(t)`, and P_l is Legendre's
+//! polynomial.
 
 use std::f64::consts::PI;
 
@@ -15,10 +18,11 @@ use crate::scene::gaussian::EXTENT;
 use crate::scene::harmonics::{MOST_DEGREE, basis, terms_of};
 use crate::scene::{Colors, Harmonics};
 
-/// Standard deviations, in units of the mean spacing: neighbours overlap.
+/// The standard deviation in units of the mean spacing; neighbours overlap.
 const DEVIATION_IN_SPACINGS: f64 = 0.6;
 
-/// `count` Gaussians of opacities from 0.1 to 0.95 in no order, evenly spaced on the surface, the same each time. Their colours are codes.
+/// Generates `count` Gaussians, evenly spaced on the surface, with opacities from 0.1 to 0.95 that
+/// look random. The result is always the same. Colours are sRGB-encoded.
 pub fn gaussians(shape: Shape, count: u64) -> Points {
     let (mut positions, mut axes, mut colors, mut terms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (index, sample) in generate(shape, count).enumerate() {
@@ -27,7 +31,7 @@ pub fn gaussians(shape: Shape, count: u64) -> Points {
         let [s, t] = <[DVec3; 2]>::from(normal.any_orthonormal_pair());
         let half_axis = EXTENT * DEVIATION_IN_SPACINGS / RADIUS_IN_SPACINGS * f64::from(radius);
         positions.push(position);
-        // s x t is the normal.
+        // s x t is along the normal.
         axes.push([s, t].map(|unit| (unit * half_axis).as_vec3().to_array()));
         let alpha = 0.1 + 0.85 * scrambled(index as u64);
         let albedo = color.map(|code| f64::from(code) / 255.0);
@@ -53,12 +57,13 @@ pub fn gaussians(shape: Shape, count: u64) -> Points {
     }
 }
 
-/// A number from 0 to 1 that says nothing of `index`: multiples of an irrational number would follow the lattice that positions are on.
+/// A pseudorandom number in [0, 1). Multiples of an irrational number would correlate with the
+/// lattice of the positions.
 fn scrambled(index: u64) -> f64 {
     (random::mixed((index + 1).wrapping_mul(random::STEP)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A_l of `c^s`.
+/// The coefficient A_l of `c^s`.
 fn lobe(s: u32, l: usize) -> f64 {
     let power = |k: u32| 1.0 / f64::from(s + 1 + k);
     2.0 * PI
@@ -75,7 +80,7 @@ fn lobe(s: u32, l: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Seen along its normal a surface is bright, from the side less, and never as its formula is not.
+    /// The expansion is close to the formula at all angles.
     #[test]
     fn a_light_beside_the_eye_is_what_harmonics_tell_of_it() {
         let points = gaussians(Shape::Sphere, 500);

@@ -1,7 +1,8 @@
-//! Evenly spaced points from their index: Fibonacci lattices.
+//! Fibonacci lattices: evenly spaced points, each computed from its index.
 //!
-//! The plane lattice (i / n, frac(i / phi)) stays even however it is stretched along its axes, because the golden ratio
-//! phi is the number worst approximated by fractions. So any area-preserving map of the unit square spreads it evenly.
+//! The plane lattice (i / n, frac(i / phi)) stays even however it is stretched along its axes,
+//! because the golden ratio phi is the number worst approximated by fractions. So any
+//! area-preserving map of the unit square spreads it evenly.
 
 use std::f64::consts::TAU;
 
@@ -9,8 +10,8 @@ use glam::{DVec3, Vec3Swizzles};
 
 use super::{SHELLS, TORUS_MAJOR, TORUS_MINOR};
 
-/// 2^64 / phi. Products with an index modulo 2^64 are the golden fraction of that index: no digit is lost to its whole
-/// part, and an index of 1e9 is off by less than 1e-10 turns.
+/// 2^64 / phi. The product with an index, modulo 2^64, is the fraction of index / phi. No digit is
+/// lost to the integer part, and an index of 1e9 is off by less than 1e-10 turns.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The upper 53 bits as a number in [0, 1).
@@ -18,8 +19,8 @@ fn fraction(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Point `index` of `count` on the unit sphere (Swinbank and Purser 2006, with points at the middles of bands of equal
-/// area).
+/// Point `index` of `count` on the unit sphere (Swinbank and Purser 2006, with points at the
+/// middles of bands of equal area).
 pub(super) fn sphere(index: u64, count: u64) -> DVec3 {
     // 1 - z, so that the polar radius sqrt((1 - z)(1 + z)) loses no digits near the poles.
     let below_pole = (2.0 * index as f64 + 1.0) / count as f64;
@@ -28,7 +29,7 @@ pub(super) fn sphere(index: u64, count: u64) -> DVec3 {
     DVec3::new(polar * cos, polar * sin, 1.0 - below_pole)
 }
 
-/// Point `index` of `count` on the shells, of which each has a part of the points as it has of the area.
+/// Point `index` of `count` on the shells; each shell has points in proportion to its area.
 pub(super) fn shells(index: u64, count: u64) -> DVec3 {
     let area: f64 = SHELLS.iter().map(|radius| radius * radius).sum();
     let (mut up_to, mut first) = (0.0, 0);
@@ -40,15 +41,16 @@ pub(super) fn shells(index: u64, count: u64) -> DVec3 {
         }
         first = end;
     }
-    // The last shell ends with the last point.
+    // Never reached, as the last shell ends with the last point.
     DVec3::NAN
 }
 
-/// Point `index` of `count` on the crossing squares, a half of them each.
+/// Point `index` of `count` on the crossing squares; each has half of the points.
 pub(super) fn crossing(index: u64, count: u64) -> DVec3 {
     let of_first = count.div_ceil(2);
     match index.checked_sub(of_first) {
-        // The golden fractions, none of which is a half, go across the line in which they cross.
+        // The golden-ratio coordinate runs across the line where the squares cross. It is never
+        // exactly in the middle, so no point lies on that line.
         None => square(index, of_first).yxz(),
         Some(index) => square(index, count - of_first).zxy(),
     }
@@ -56,9 +58,9 @@ pub(super) fn crossing(index: u64, count: u64) -> DVec3 {
 
 /// Point `index` of `count` on the torus.
 ///
-/// The minor angle v takes equal steps of area: the part of the area up to v is (v + e sin v) / tau with
-/// e = minor / major. The major angle takes index * m / count turns with the whole number m nearest to
-/// count / phi, so that the lattice closes where v comes round.
+/// The minor angle v takes equal steps of area: the fraction of the area up to v is (v + e sin v) /
+/// tau with e = minor / major. The major angle takes index * m / count turns, where m is the
+/// integer nearest to count / phi, so that the lattice closes where v wraps around.
 pub(super) fn torus(index: u64, count: u64) -> DVec3 {
     let minor_angle = angle_at_area(TAU * ((index as f64 + 0.5) / count as f64));
     let step = ((u128::from(count) * u128::from(GOLDEN) + (1 << 63)) >> 64) as u64;
@@ -72,7 +74,7 @@ pub(super) fn torus(index: u64, count: u64) -> DVec3 {
 /// The v in [0, tau] with v + e sin v = `area`.
 fn angle_at_area(area: f64) -> f64 {
     const E: f64 = TORUS_MINOR / TORUS_MAJOR;
-    // Newton's method inside a bracket that shrinks by at least half where Newton would leave it.
+    // Newton's method in a bracket, which is halved where Newton would leave it.
     let (mut low, mut high) = (0.0, TAU);
     let mut v = area;
     for _ in 0..60 {

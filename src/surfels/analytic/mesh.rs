@@ -1,4 +1,4 @@
-//! Shapes as triangles: meshes whose corners lie on them.
+//! Triangle meshes of the shapes, with vertices on the surface.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,12 +8,15 @@ use super::{Shape, TORUS_MAJOR, TORUS_MINOR};
 use crate::io::Mesh;
 use crate::scene::Colors;
 
-/// About `triangles` triangles that stand for a shape, with its normals and colours at their corners, counter-clockwise seen from where
-/// normals point to. Of shells, and squares that cross, there is one part after the other.
+/// Generates a mesh of about `triangles` triangles with the shape's normals and colours at their
+/// corners.
+///
+/// Triangles are counter-clockwise as seen from the side of the normals. The shells, and the two
+/// crossing squares, follow one another.
 pub fn mesh(shape: Shape, triangles: u64) -> Mesh {
     let mut mesh = Mesh { normals: Some(Vec::new()), colors: Some(Colors::Srgb8(Vec::new())), ..Mesh::default() };
     let triangles = triangles.max(2) as f64;
-    // Twice as many columns as rows, or as many in a square.
+    // Round shapes have twice as many columns as rows, squares equally many.
     let (square, round) = ((triangles / 2.0).sqrt().round() as u32, (triangles / 4.0).sqrt().round().max(2.0) as u32);
     let sphere = |radius: f64| {
         move |u: f64, v: f64| {
@@ -44,8 +47,8 @@ pub fn mesh(shape: Shape, triangles: u64) -> Mesh {
     mesh
 }
 
-/// Adds a grid of `columns` and `rows` over [0, 1] x [0, 1], whose first column is the one after the last if it is `closed` across; of
-/// triangles that have an area.
+/// Adds a grid of `columns` and `rows` over [0, 1] x [0, 1], without triangles that have no area.
+/// If it is `closed`, the last column joins the first.
 fn add(mesh: &mut Mesh, shape: Shape, [columns, rows]: [u32; 2], closed: bool, at: impl Fn(f64, f64) -> DVec3) {
     let first = mesh.positions.len() as u32;
     let (columns, rows) = (columns.max(1), rows.max(1));
@@ -66,7 +69,7 @@ fn add(mesh: &mut Mesh, shape: Shape, [columns, rows]: [u32; 2], closed: bool, a
         let [d, c] = [vertex(column, row + 1), vertex(column + 1, row + 1)];
         for corners in [[a, b, c], [a, c, d]] {
             let [p, q, r] = corners.map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]));
-            // At poles corners are one but for rounding.
+            // At the poles, corners coincide up to rounding.
             if (q - p).cross(r - p).length() < 1e-15 {
                 continue;
             }
@@ -94,7 +97,7 @@ mod tests {
                 let area = |(corners, normals): (&[u32; 3], &[[f32; 3]; 3])| {
                     let [p, q, r] = corners.map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]));
                     let across = (q - p).cross(r - p);
-                    // Where squares cross, the corners of one may be those of the other.
+                    // Where the squares cross, a corner of one may get the normal of the other.
                     let faces = |n: &[f32; 3]| across.dot(DVec3::from_array(n.map(f64::from))) > 0.0;
                     assert!(
                         wanted < 100 || shape == Shape::Crossing || normals.iter().all(faces),

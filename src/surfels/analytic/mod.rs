@@ -1,4 +1,4 @@
-//! Generated scenes whose geometry has a formula: the ground truth of depth, normal and coverage.
+//! Generated scenes with an analytic surface: the ground truth of depth, normal and coverage.
 
 mod gaussians;
 mod lattice;
@@ -17,7 +17,7 @@ pub use self::ray::depth_along_ray;
 use crate::scene::Up;
 use crate::{Error, Result};
 
-/// Distance of the torus' tube centre from its axis, world units.
+/// Distance of the centre of the torus' tube from the axis, world units.
 pub const TORUS_MAJOR: f64 = 1.0;
 
 /// Radius of the torus' tube, world units.
@@ -26,7 +26,7 @@ pub const TORUS_MINOR: f64 = 0.4;
 /// Squares of the checkerboard along each edge.
 pub const CHECKER_SQUARES: u32 = 32;
 
-/// Disk radius of a sample in units of the mean spacing, the square root of the area that each sample stands for.
+/// Disk radius of a sample in units of the mean spacing, the square root of the area per sample.
 pub const RADIUS_IN_SPACINGS: f64 = 1.5;
 
 /// A surface with a formula.
@@ -42,9 +42,9 @@ pub enum Shape {
     Checkerboard,
     /// The same square with lines of text, each half as high as the one above.
     Text,
-    /// Spheres of the radii [`SHELLS`] around the world origin.
+    /// Concentric spheres with the radii [`SHELLS`] around the world origin.
     Shells,
-    /// The square at z = 0, and one of the same edge at x = 0 that crosses it.
+    /// The same square at z = 0, and an equal one at x = 0 that crosses it.
     Crossing,
 }
 
@@ -52,7 +52,7 @@ pub enum Shape {
 pub const SHELLS: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 
 impl Shape {
-    /// Every shape with its name and what it is, for a command line's help.
+    /// Each shape with its name and its description in the command line's help.
     pub const ALL: [(Self, &'static str, &'static str); 7] = [
         (Self::Sphere, "sphere", "the unit sphere"),
         (Self::Torus, "torus", "a torus around the z axis, radii 1 and 0.4"),
@@ -63,7 +63,7 @@ impl Shape {
         (Self::Crossing, "crossing", "squares of edge 2 that cross, at z = 0 and x = 0"),
     ];
 
-    /// Which way is up in the default view of it.
+    /// The up direction of the default view.
     pub fn up(self) -> Up {
         match self {
             Self::Sphere | Self::Shells => Up::Y,
@@ -82,8 +82,8 @@ impl Shape {
         }
     }
 
-    /// The signed distance of a point from the surface, which for the squares goes on beyond its edges: world units,
-    /// positive on the side that normals point to.
+    /// The signed distance of a point from the surface, world units, positive on the side of the
+    /// normals. The squares count as infinite planes.
     pub fn distance(self, p: DVec3) -> f64 {
         match self {
             Self::Sphere => p.length() - 1.0,
@@ -103,7 +103,8 @@ impl Shape {
         }
     }
 
-    /// The outward unit normal at a point of the surface, to about 1e-15: the gradient of [`distance`](Self::distance).
+    /// The outward unit normal at a point of the surface, accurate to about 1e-15: the gradient of
+    /// [`distance`](Self::distance).
     pub fn normal(self, p: DVec3) -> DVec3 {
         match self {
             Self::Sphere | Self::Shells => p.normalize(),
@@ -140,7 +141,8 @@ impl Shape {
                     [250, 246, 236]
                 }
             }
-            // Bands along x, y and z of different widths: smooth, but with detail at several scales and directions.
+            // Bands along x, y and z of different widths: smooth, with detail at several scales and
+            // in several directions.
             Self::Sphere | Self::Torus | Self::Shells => {
                 let band = |c: f64, bands: f64, shift: f64| 0.5 + 0.5 * (PI * bands * c + shift).sin();
                 [
@@ -152,8 +154,11 @@ impl Shape {
         }
     }
 
-    /// The place in a texture, [0, 1] across and up, of a point of the surface: turns around the upward axis and the latitude, or turns
-    /// around the tube from its inside; across the square and up.
+    /// The texture coordinates (u, v) of a point of the surface, in [0, 1], v upward.
+    ///
+    /// On spheres, u is the turn around the upward axis and v the latitude. On the torus, u is the
+    /// turn around the axis and v the turn around the tube, from its inside. On squares, they run
+    /// across and up.
     pub fn texture_at(self, p: DVec3) -> [f32; 2] {
         let turns = |y: f64, x: f64| 0.5 + y.atan2(x) / TAU;
         let (u, v) = match self {
@@ -166,7 +171,7 @@ impl Shape {
     }
 }
 
-/// Whether a point is of the square at z = 0, as it lies nearer to it than to the one at x = 0.
+/// Whether a point belongs to the square at z = 0, being nearer to it than to the one at x = 0.
 fn crosses_at_z(p: DVec3) -> bool {
     p.z.abs() <= p.x.abs()
 }
@@ -185,17 +190,18 @@ impl FromStr for Shape {
 /// One point of a generated surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// On the surface to 1e-15, world units.
+    /// World units, on the surface to 1e-15.
     pub position: [f64; 3],
     /// Outward unit normal.
     pub normal: [f32; 3],
-    /// Disk radius, world units: 1.5 times the square root of the area that each sample stands for.
+    /// Disk radius, world units: 1.5 times the square root of the area per sample.
     pub radius: f32,
-    /// 8-bit sRGB.
+    /// Colour, 8-bit sRGB.
     pub color: [u8; 3],
 }
 
-/// Exactly `count` samples, evenly spaced on the surface, each computed when it is asked for; always the same.
+/// Generates exactly `count` samples, evenly spaced on the surface. Each is computed on demand, and
+/// the samples are always the same.
 pub fn generate(shape: Shape, count: u64) -> impl ExactSizeIterator<Item = Sample> + Clone + Send {
     let radius = (RADIUS_IN_SPACINGS * (shape.area() / count.max(1) as f64).sqrt()) as f32;
     Samples { shape, count, next: 0, radius }
@@ -279,7 +285,7 @@ mod tests {
 
     #[test]
     fn spacing_is_even() {
-        // Where squares cross, samples of both lie near one another.
+        // Where the squares cross, samples of both are close together.
         for (shape, _, _) in Shape::ALL.into_iter().filter(|(shape, _, _)| *shape != Shape::Crossing) {
             for count in [500, 1000, 4181, 12_345, 100_000] {
                 let points: Vec<_> = generate(shape, count).map(|s| s.position).collect();

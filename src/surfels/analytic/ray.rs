@@ -1,19 +1,22 @@
-//! Where a ray first meets an analytic surface.
+//! The intersection of a ray with an analytic surface.
 
 use glam::{DVec3, Vec3Swizzles};
 
 use super::{SHELLS, Shape, TORUS_MAJOR, TORUS_MINOR};
 
-/// The smallest t > 0 for which `origin + t * direction` lies on the surface, in units of the direction's length; None
-/// if there is none, or the direction has no length. Accurate to about 1e-12 relative to the distance from the scene,
-/// except within rounding of grazing it.
+/// Returns the smallest t > 0 for which `origin + t * direction` lies on the surface; None if there
+/// is none, or the direction has no length.
+///
+/// t is in units of the direction's length, and accurate to about 1e-12 relative to the distance
+/// from the scene, except within rounding of grazing the surface.
 pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<f64> {
     let length = direction.length();
     if !(length.is_normal() && origin.is_finite()) {
         return None;
     }
     let direction = direction / length;
-    // From the point of the ray nearest to the scene's centre, so that a far eye costs no digits but those of t.
+    // The ray starts at its point nearest to the scene's centre, so that a far eye costs no digits
+    // but those of t.
     let shift = -origin.dot(direction);
     let nearest = origin + direction * shift;
     let first = |t: f64| t + shift > 0.0;
@@ -25,7 +28,7 @@ pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<
         Shape::Torus => torus_crossings(nearest, direction).into_iter().find(|&t| first(t)),
         Shape::Plane | Shape::Checkerboard | Shape::Text => square(nearest, direction).filter(|&t| first(t)),
         Shape::Crossing => {
-            // With x and z exchanged the one at x = 0 is the other.
+            // Exchanging x and z maps the square at x = 0 to the one at z = 0.
             let both = [square(nearest, direction), square(nearest.zyx(), direction.zyx())];
             both.into_iter().flatten().filter(|&t| first(t)).min_by(f64::total_cmp)
         }
@@ -44,21 +47,22 @@ fn square(start: DVec3, direction: DVec3) -> Option<f64> {
     (t.is_finite() && hit.x.abs() <= 1.0 && hit.y.abs() <= 1.0).then_some(t)
 }
 
-/// All t at which the line `start + t * direction` crosses the torus, ascending. `start` is the line's point nearest to
-/// the world origin, `direction` a unit vector.
+/// All t at which the line `start + t * direction` crosses the torus, ascending. `start` is the
+/// line's point nearest to the world origin, `direction` a unit vector.
 ///
-/// With q = |p|^2 + R^2 - r^2 the torus is q^2 = 4 R^2 (x^2 + y^2), a quartic in t. Its roots are separated by those of
-/// its derivative, found in the same way, so none is lost and none needs a guess; a Newton step or two on the signed
-/// distance then removes the rounding of the coefficients.
+/// With q = |p|^2 + R^2 - r^2 the torus is q^2 = 4 R^2 (x^2 + y^2), a quartic in t. The roots of
+/// its derivative, found in the same way, separate its roots, so none is lost and none needs an
+/// initial guess. Up to three Newton steps on the signed distance then remove the rounding error of
+/// the coefficients.
 fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
     let reach = TORUS_MAJOR + TORUS_MINOR;
     let half_chord_squared = reach * reach - start.length_squared();
     if half_chord_squared < 0.0 || half_chord_squared.is_nan() {
         return Vec::new();
     }
-    // A little beyond the bounding sphere, where the torus is certainly not.
+    // A little beyond the bounding sphere, where the torus certainly is not.
     let limit = half_chord_squared.sqrt() + 1e-6;
-    // |p|^2 = k + t^2, as the linear term vanishes at the nearest point.
+    // |p|^2 = |start|^2 + t^2, as the linear term vanishes at the nearest point.
     let k = start.length_squared() + TORUS_MAJOR * TORUS_MAJOR - TORUS_MINOR * TORUS_MINOR;
     let flat = 4.0 * TORUS_MAJOR * TORUS_MAJOR;
     let (s, d) = (start.truncate(), direction.truncate());
@@ -70,7 +74,8 @@ fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
         for _ in 0..3 {
             let p = start + direction * *t;
             let step = Shape::Torus.distance(p) / Shape::Torus.normal(p).dot(direction);
-            // Near a grazing point the step means nothing, and the bracketed root is the better answer.
+            // Near a grazing point the step is meaningless, and the bracketed root is more
+            // accurate.
             if step.is_nan() || step.abs() > 1e-6 {
                 break;
             }
@@ -81,8 +86,9 @@ fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
     crossings
 }
 
-/// The roots at which the polynomial (coefficients in ascending powers) changes sign between `low` and `high`,
-/// ascending, each to about the last bit of a number as large as the interval.
+/// Finds the roots at which the polynomial (coefficients in ascending powers) changes sign between
+/// `low` and `high`, ascending. Each is accurate to about the last bit of a number as large as the
+/// interval.
 fn roots(polynomial: &[f64], low: f64, high: f64, found: &mut Vec<f64>) {
     let value = |of: &[f64], t: f64| of.iter().rev().fold(0.0, |sum, c| sum * t + c);
     let derivative: Vec<f64> = polynomial.iter().zip(0u32..).skip(1).map(|(c, power)| c * f64::from(power)).collect();
@@ -97,7 +103,8 @@ fn roots(polynomial: &[f64], low: f64, high: f64, found: &mut Vec<f64>) {
         let (mut a, mut b) = (from, to);
         let rising = value(polynomial, b) > 0.0;
         if (value(polynomial, a) > 0.0) != rising {
-            // Newton's method inside a bracket, which is halved where Newton would leave it or a step is not half the last.
+            // Newton's method in a bracket, which is halved where Newton would leave it or a step
+            // exceeds half the last one.
             let (mut t, mut step) = (0.5 * (a + b), b - a);
             while step > least {
                 let at = value(polynomial, t);
@@ -168,7 +175,8 @@ mod tests {
                 if t < truth - 1e-9 {
                     behind += 1;
                 }
-                // Sphere tracing with the signed distance cannot step over the surface: it agrees on what comes first.
+                // Sphere tracing with the signed distance cannot step over the surface, so it finds
+                // the same first hit.
                 let inside = Shape::Torus.distance(eye) < 0.0;
                 let mut traced = 0.0;
                 for _ in 0..5000 {
@@ -185,7 +193,7 @@ mod tests {
 
     #[test]
     fn rays_meet_each_shell_and_both_squares() {
-        // Again and again from just behind what was met.
+        // Each search continues just behind the last hit.
         let met = |shape: Shape, start: DVec3, direction: DVec3| {
             let (mut all, mut at) = (Vec::new(), 0.0);
             while let Some(t) = depth_along_ray(shape, start + direction * at, direction) {

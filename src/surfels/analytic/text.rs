@@ -1,15 +1,16 @@
-//! Lines of text, each half as high as the one above: what is the smallest that can be read (Schuetz and Wimmer 2015, Figures 5 and 7)?
+//! Lines of text, each half as high as the one above, which show the smallest legible size (Schuetz
+//! and Wimmer 2015, Figures 5 and 7).
 
-/// What is written, over and over.
+/// The text, repeated along each line.
 const WORDS: &str = "THE NEAREST POINT WINS ";
 
-/// Lines, from the top; the first is half as high as the square.
+/// The number of lines, from the top; the first is half as high as the square.
 const LINES: i32 = 8;
 
-/// Rows and columns of a letter's cell, of which the last ones are empty.
+/// Rows and columns of a letter's cell; the last of each are empty.
 const CELL: (f64, u64) = (8.0, 6);
 
-/// The rows of a letter, of five columns each, from the left.
+/// The rows of a letter, five columns each, the left one in the highest bit.
 fn rows(letter: u8) -> [u8; 7] {
     match letter {
         b'T' => [0b11111, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100],
@@ -27,7 +28,7 @@ fn rows(letter: u8) -> [u8; 7] {
     }
 }
 
-/// Whether there is ink at (x, y), from the left and from the top of a square of side 1.
+/// Whether there is ink at (x, y), measured from the left and the top of a square of side 1.
 pub(super) fn ink(x: f64, y: f64) -> bool {
     let line = (-(1.0 - y).log2()).floor().clamp(0.0, f64::from(LINES - 1)) as i32;
     let height = (-f64::from(line) - 1.0).exp2();
@@ -45,13 +46,14 @@ mod tests {
 
     #[test]
     fn lines_are_written_and_each_is_half_as_high() {
-        // The first line's T, H and the part of E that fits: units are sixteenths.
+        // The first line's T, H and the part of E that fits: a unit is a sixteenth of the square.
         let row =
             |y: f64| (0..16).map(|x| if ink((f64::from(x) + 0.5) / 16.0, y) { '#' } else { '.' }).collect::<String>();
         assert_eq!(row(0.5 / 16.0), "#####.#...#.####");
         assert_eq!(row(3.5 / 16.0), "..#...#####.####");
         assert_eq!(row(7.5 / 16.0), "................");
-        // The second one says the same on half the way, and the last one ends with the square.
+        // The second line repeats the first at half the size, and the last one ends with the
+        // square.
         for k in 0..7 {
             let (x, y) = (0.3, 0.07 * f64::from(k));
             assert_eq!(ink(x, y), ink(0.5 * x, 0.5 + 0.5 * y));

@@ -1,4 +1,5 @@
-//! Ellipses with which disks at its corners cover a triangle, and the lines at which they end.
+//! Ellipses with which the disks at its corners cover a triangle, and the lines at which the disks
+//! end.
 
 use std::f64::consts::PI;
 
@@ -13,24 +14,26 @@ use crate::surfels::gather::is_usable;
 /// A triangle with an area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet {
-    /// Unit.
+    /// Unit normal.
     pub normal: DVec3,
     /// Square world units.
     pub area: f64,
-    /// At its corners, radians.
+    /// The angles at its corners, radians.
     pub angles: [f64; 3],
+    /// World coordinates.
     pub corners: [DVec3; 3],
-    /// The smallest radius with which disks at the corners cover it, world units.
+    /// The smallest radius with which disks at the corners cover the triangle, world units.
     radius: f64,
-    /// It is covered with less by ellipses of its own shape.
+    /// Whether ellipses of the triangle's own shape cover it with less area.
     long: bool,
 }
 
-/// Of so much less than the circles' area ellipses are taken.
+/// Ellipses are used if their area is less than this fraction of the circles' area.
 const WORTH: f64 = 0.8;
 
 impl Facet {
-    /// The triangle of these vertices; none if it has no area or a vertex is nowhere that is drawn.
+    /// The triangle of these vertices; None if it has no area or a vertex has an unusable
+    /// coordinate.
     pub fn of(positions: &[[f64; 3]], corners: [u32; 3]) -> Option<Self> {
         let corners = corners.map(|corner| positions[corner as usize]);
         if !corners.iter().all(is_usable) {
@@ -41,7 +44,7 @@ impl Facet {
         let radius = covering_radius(a, b, c)?;
         let normal = double.try_normalize()?;
         let area = 0.5 * double.length();
-        // The ellipse of an equilateral triangle of area A has 4 π / (3 √3) A.
+        // The ellipse of an equilateral triangle of area A has the area 4 π / (3 √3) A.
         let ellipse = 4.0 * PI / (3.0 * 3f64.sqrt()) * area;
         let angle = |p: DVec3, q: DVec3| p.cross(q).length().atan2(p.dot(q));
         let angles = [angle(b - a, c - a), angle(c - b, a - b), angle(a - c, b - c)];
@@ -50,17 +53,18 @@ impl Facet {
 }
 
 impl Facet {
-    /// From one of its corners to the two that follow it.
+    /// The sides from one of its corners to the two that follow it.
     pub fn sides(&self, place: usize) -> [DVec3; 2] {
         [1, 2].map(|next| self.corners[(place + next) % 3] - self.corners[place])
     }
 }
 
-/// The ellipse `q q^T <= S` around a corner of a triangle, as S, with which, at each corner, it is covered. The two `sides` go from
-/// the corner, in its plane.
+/// Returns the ellipse `q q^T <= S` around a corner of a triangle, as S, such that these ellipses
+/// at all corners cover the triangle. The two `sides` go from the corner, in its plane.
 ///
-/// An equilateral triangle is covered by disks of its circumradius at its corners. Any other is the affine image of one, and so
-/// covered by the images of those disks: with corners q_i and their mean m, `S = 2/3 sum (q_i - m)(q_i - m)^T`.
+/// An equilateral triangle is covered by disks of its circumradius at its corners. Any other is an
+/// affine image of one, and so covered by the images of those disks: with corners q_i and their
+/// mean m, `S = 2/3 sum (q_i - m)(q_i - m)^T`.
 pub(super) fn wanted(facet: &Facet, [p, q]: [DVec2; 2]) -> DMat2 {
     if !facet.long {
         return DMat2::from_diagonal(DVec2::splat(facet.radius * facet.radius));
@@ -69,27 +73,31 @@ pub(super) fn wanted(facet: &Facet, [p, q]: [DVec2; 2]) -> DMat2 {
     (outer(mean) + outer(p - mean) + outer(q - mean)) * (2.0 / 3.0)
 }
 
-/// A line in a surfel's plane: what is kept has `normal . q >= offset`, world units from the surfel's centre.
+/// A line in a surfel's plane, which keeps `normal . q >= offset`, world units from the surfel's
+/// centre.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
     normal: DVec2,
     offset: f64,
-    /// The sine of half the angle that it makes with the other line: the point between them moves out by no more than the margin.
+    /// The sine of half the angle to the other line, so that their intersection moves out by no
+    /// more than the margin.
     sharp: f64,
 }
 
 impl Line {
-    /// The line as the disk of two half-axes has it ([`Clip`]), moved out by `margin`.
+    /// Returns the clip line of a disk with these half-axes ([`Clip`]), moved out by `margin`.
     pub fn on_disk(&self, major: DVec2, minor: DVec2, margin: f64) -> [f32; 3] {
         Clip::line(self.normal, self.offset - margin * self.sharp, [major, minor])
     }
 }
 
-/// Sides that enclose so much more than a straight angle are taken for one.
+/// Sides that enclose up to this much more than a straight angle, radians, count as a straight
+/// line.
 const STRAIGHT: f64 = 0.05;
 
-/// Where the surfels of a fan end, of which none is longer than `reach`: a list of at most two lines for each of them. `sides` go
-/// from the vertex to the two other corners of each triangle, in the fan's plane.
+/// Returns the lines at which the surfels of a fan end, at most two for each surfel. No surfel is
+/// longer than `reach`. The `sides` go from the vertex to the two other corners of each triangle,
+/// in the fan's plane.
 pub(super) fn lines(fan: &Fan, sides: &[[DVec2; 2]], reach: f64) -> Vec<Vec<Line>> {
     let mut opposite: Vec<Line> =
         fan.corners.iter().zip(sides).filter(|(corner, _)| corner.ends).filter_map(|(_, side)| across(*side)).collect();
@@ -111,10 +119,10 @@ pub(super) fn lines(fan: &Fan, sides: &[[DVec2; 2]], reach: f64) -> Vec<Vec<Line
     vec![vec![left, right]]
 }
 
-/// The line through the corners opposite to a triangle's vertex.
+/// The line through the two corners opposite the vertex.
 fn across([p, q]: [DVec2; 2]) -> Option<Line> {
     let normal = (q - p).perp().try_normalize()?;
-    // Counter-clockwise the vertex is on the left.
+    // Counter-clockwise, the vertex is on the left.
     let offset = normal.dot(p);
     (offset < 0.0).then_some(Line { normal, offset, sharp: 1.0 })
 }

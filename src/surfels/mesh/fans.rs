@@ -1,4 +1,4 @@
-//! The triangles around a vertex, in turn, and where the surface has an edge or a border between them.
+//! The fans of triangles around a vertex, between the edges and borders of the surface.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -6,43 +6,47 @@ use rayon::prelude::*;
 use super::cover::{self, Facet};
 use crate::surfels::ellipse::Ellipse;
 
-/// The cosine of the angle between the normals of two triangles past which their common edge is one of the surface: 30 degrees. Of 20
-/// to 60 degrees fewer gave better pictures of more surfels.
+/// The cosine of 30 degrees: the common side of two triangles at a larger angle is an edge of the
+/// surface. Among 20 to 60 degrees, smaller angles gave better pictures with more surfels.
 const EDGE: f64 = 0.866_025_403_784_438_6;
 
-/// The part of a mesh's diagonal by which a disk may stand off the triangles that it stands for. Of 1, 2, 3, 4 and 5 times 1e-4, on
-/// eleven models, 2 is where pictures of 1024x1024 hardly gain by more surfels.
+/// The largest distance of a disk from the triangles that it stands for, as a fraction of the
+/// mesh's diagonal. Among 1 to 5 times 1e-4, on eleven models, 2e-4 is where pictures of 1024x1024
+/// hardly gain from more surfels.
 pub(in crate::surfels) const TOLERANCE: f64 = 2e-4;
 
-/// An ellipse may be so much larger than what it is to cover where the surface ends, and where it goes on.
+/// An ellipse may be this many times larger than the area that it must cover: first where the
+/// surface ends, then where it continues.
 const WASTE: [f64; 2] = [2.0, 6.0];
 
-/// Fans of more triangles are cut in halves, wherever they turn: nobody should wait for the middle of a disk of a million.
+/// Fans of more triangles are always halved by angle, as otherwise the middle of a disk of a
+/// million triangles would take too long.
 const MANY: usize = 32;
 
-/// A triangle at a vertex: its two other corners, counter-clockwise seen from outside.
+/// A triangle at a vertex, with its two other corners counter-clockwise as seen from outside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
-    /// Which one.
+    /// The index of the triangle.
     pub triangle: u32,
-    /// Which of its corners is the vertex.
+    /// The index of the vertex among the triangle's corners.
     pub place: usize,
-    /// The corner that follows the vertex.
+    /// The corner after the vertex.
     pub next: u32,
-    /// The one after that.
+    /// The corner after `next`.
     pub last: u32,
-    /// The edge from `next` to `last` is one of the surface: a border, or an edge.
+    /// Whether the edge from `next` to `last` is a border, an edge of the surface, or a change of
+    /// look.
     pub ends: bool,
 }
 
-/// Triangles around a vertex that make one piece of a surface.
+/// Triangles around a vertex that form one piece of the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Fan {
-    /// In turn, counter-clockwise seen from outside.
+    /// In order, counter-clockwise as seen from outside.
     pub corners: Vec<Corner>,
-    /// It goes round the vertex: it has no sides.
+    /// Whether the fan goes all round the vertex and so has no sides.
     pub round: bool,
-    /// Unit, of its plane.
+    /// Unit normal of the fan's plane.
     pub normal: DVec3,
 }
 
@@ -54,7 +58,8 @@ impl Fan {
         Self { corners, round, normal: normal.unwrap_or(DVec3::Z) }
     }
 
-    /// How much larger one ellipse is than the parts of the triangles that it is to cover, and how far it reaches.
+    /// Returns the ratio of the ellipse's area, within the fan's angle, to the area that it must
+    /// cover, and its longer half-axis.
     fn waste(&self, facets: &[Option<Facet>]) -> (f64, f64) {
         let facet = |corner: &Corner| Some((facets[corner.triangle as usize].as_ref()?, corner.place));
         let (x, y) = self.normal.any_orthonormal_pair();
@@ -69,7 +74,8 @@ impl Fan {
             .map_or((0.0, 0.0), |ellipse| (0.5 * angle * ellipse.square() / area, ellipse.half_axes()[0].length()))
     }
 
-    /// The mean of the normals that its corners name, where that is on the plane's side; else the plane's.
+    /// The mean of the normals that the file gives for its corners, if it is on the plane's side;
+    /// else the plane's normal.
     pub fn seen_normal(&self, named: Option<&Vec<[[f32; 3]; 3]>>) -> DVec3 {
         let Some(normals) = named else { return self.normal };
         let named = |corner: &Corner| DVec3::from(normals[corner.triangle as usize][corner.place].map(f64::from));
@@ -79,29 +85,29 @@ impl Fan {
     }
 }
 
-/// Which triangles are around each vertex.
+/// The triangles around each vertex.
 pub(super) struct Around {
-    /// Those of vertex v, in order, are `triangles[starts[v]..starts[v + 1]]`.
+    /// The triangles of vertex v, in order, are `triangles[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     triangles: Vec<u32>,
-    /// For each side of each triangle, from its corner on: what is on the other side.
+    /// For each side of each triangle, from the corner of the same index: what is beyond it.
     beyond: Vec<[Beyond; 3]>,
 }
 
-/// What is on the other side of a triangle's side.
+/// The neighbour across a side of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Beyond {
-    /// A triangle that goes on with the surface.
+    /// A triangle that continues the surface.
     Surface(u32),
-    /// One that does too, but looks otherwise.
+    /// A triangle that continues the surface, with another look.
     Look,
     /// An edge, a border, or several triangles.
     Edge,
 }
 
 impl Around {
-    /// The fans of a mesh of so many `vertices`; triangles without an area are none. Two with a
-    /// side in common look like one surface where they `go_on`.
+    /// Finds the triangles around each of the `vertices`. Triangles without an area are ignored.
+    /// Two triangles with a common side look like one surface if they `go_on`.
     pub fn new(
         vertices: usize,
         triangles: &[[u32; 3]],
@@ -139,7 +145,7 @@ impl Around {
         &self.triangles[self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize]
     }
 
-    /// Vertices that no triangle names.
+    /// The number of vertices without a triangle that has an area.
     pub fn loose(&self) -> usize {
         self.starts.windows(2).filter(|pair| pair[0] == pair[1]).count()
     }
@@ -147,7 +153,7 @@ impl Around {
     fn beyond_side(&self, number: u32, side: usize, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Beyond {
         let corners = triangles[number as usize];
         let (from, to) = (corners[side], corners[(side + 1) % 3]);
-        // Looked for at the end that fewer triangles have.
+        // The search uses the end of the side that has fewer triangles.
         let (at, end) = if self.of(from).len() <= self.of(to).len() { (from, to) } else { (to, from) };
         let shares = |other: &&u32| **other != number && triangles[**other as usize].contains(&end);
         let mut others = self.of(at).iter().filter(shares);
@@ -163,9 +169,10 @@ impl Around {
         }
     }
 
-    /// The sides of a triangle, each from its corner on, past which the surface does not go on, or
-    /// looks otherwise. With `is_flat`, if all three are such sides, those where it goes on are
-    /// none.
+    /// Returns which sides of a triangle, each from the corner of the same index, are borders,
+    /// edges or changes of look.
+    ///
+    /// With `is_flat`, if all three are, only borders and edges count.
     pub fn ends(&self, triangle: u32, is_flat: bool) -> [bool; 3] {
         let beyond = self.beyond[triangle as usize];
         let ends = beyond.map(|beyond| !matches!(beyond, Beyond::Surface(_)));
@@ -183,7 +190,8 @@ impl Around {
     pub fn fans(&self, vertex: u32, triangles: &[[u32; 3]], facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
         let corners: Vec<Corner> =
             self.of(vertex).iter().filter_map(|&triangle| self.corner(triangle, vertex, triangles)).collect();
-        // What follows a triangle, counter-clockwise, lies beyond its side from the last corner to the vertex.
+        // The next triangle, counter-clockwise, is beyond the side from the last corner to the
+        // vertex.
         let follows = |corner: &Corner| match self.beyond[corner.triangle as usize][(corner.place + 2) % 3] {
             Beyond::Surface(other) => corners.binary_search_by_key(&other, |corner| corner.triangle).ok(),
             Beyond::Look | Beyond::Edge => None,
@@ -193,7 +201,7 @@ impl Around {
         after.iter().flatten().for_each(|&next| begins[next] = false);
         let mut seen = vec![false; corners.len()];
         let mut fans = Vec::new();
-        // First those with sides, from their first triangle on; what is left goes round.
+        // Fans with sides come first, from their first triangle; the others go all round.
         let firsts = (0..corners.len()).filter(|&k| begins[k]).chain((0..corners.len()).filter(|&k| !begins[k]));
         for first in firsts {
             let (mut fan, mut at) = (Vec::new(), Some(first));
@@ -210,8 +218,8 @@ impl Around {
     }
 }
 
-/// The parts of a fan that a disk each stands for well: where its triangles turn away from its plane, or one ellipse would be much
-/// larger than what it is to cover, it is cut.
+/// Cuts a fan into parts that one disk each stands for well. It is cut if its triangles turn away
+/// from its plane, or if one ellipse would be much larger than the area that it must cover.
 fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     let count = fan.corners.len();
     if count < 2 {
@@ -227,14 +235,14 @@ fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     if !bent && waste < WASTE[usize::from(!ends)] {
         return vec![fan];
     }
-    // Between a triangle and the one that follows it.
+    // The candidates for cuts: the sides between consecutive triangles.
     let mut sides: Vec<usize> = (0..count - usize::from(!fan.round)).collect();
     if bent && count <= MANY {
         let normal = |k: usize| facet(&fan.corners[k % count]).map_or(fan.normal, |facet| facet.normal);
         let turn = |k: usize| normal(k).dot(normal(k + 1));
         sides.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)).then(a.cmp(&b)));
     } else {
-        // Half of the angle each.
+        // The cut halves the fan's angle.
         let angles: Vec<f64> =
             fan.corners.iter().map(|corner| facet(corner).map_or(0.0, |f| f.angles[corner.place])).collect();
         let mut so_far = angles;
@@ -250,7 +258,7 @@ fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     if !fan.round {
         return [cut(&fan.corners[..=sides[0]]), cut(&fan.corners[sides[0] + 1..])].concat();
     }
-    // Two cuts: the part between them, and the one that goes on to the first.
+    // A round fan has two cuts, and so the part between them and the rest.
     let (low, high) = (sides[0].min(sides[1]) + 1, sides[0].max(sides[1]) + 1);
     let rest = [&fan.corners[high..], &fan.corners[..low]].concat();
     [cut(&fan.corners[low..high]), cut(&rest)].concat()

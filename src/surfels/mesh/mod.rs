@@ -1,12 +1,13 @@
-//! Surfels of a mesh, which cover it and end where the surface does.
+//! Surfels that cover a mesh and end where its surface ends.
 //!
-//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut
-//! along its sides ([`triangles`]), and the look of the triangle ([`skin`]). Where vertices have
-//! colours or normals of their own, surfels at them blend those from one to the next: the triangles
-//! around a vertex make a fan, or several where the surface has an edge or a border there
-//! ([`fans`]). Each fan has a surfel in its own plane, the least ellipse with which those of all
-//! corners cover the triangles ([`cover`]), cut along the fan's two sides ([`Clip`]): else disks
-//! would stand out past edges and borders by up to their radius.
+//! If vertices have no normals of their own, and the colours at the corners of each triangle are
+//! equal, each triangle gets a surfel that is cut along the triangle's sides ([`triangles`]) and
+//! has the triangle's look ([`skin`]). Otherwise surfels at the vertices blend their normals and
+//! colours across triangles. The triangles around a vertex form a fan, or several if the surface
+//! has an edge or a border there ([`fans`]). Each fan gets a surfel in its own plane: the smallest
+//! ellipse such that the surfels of all corners cover the triangles ([`cover`]). It is cut along
+//! the fan's two sides ([`Clip`]), as disks would otherwise stand out past edges and borders by up
+//! to their radius.
 
 mod cover;
 mod fans;
@@ -28,38 +29,41 @@ use crate::scene::{Clip, Colors};
 use crate::surfels::ellipse::Ellipse;
 use crate::surfels::gather::is_usable;
 
-/// How much larger disks are than needed to cover: a blending kernel fades towards its rim.
+/// The factor by which disks are larger than covering needs, as a blending kernel fades towards its
+/// rim.
 const OVERLAP: f64 = 1.1;
 
-/// How far past an edge or a border a disk goes, in its own shorter half-axes: two that end at one line leave no pixel between them
-/// out, whatever is rounded.
+/// The distance by which a disk extends past an edge or a border, in its own shorter half-axes, so
+/// that rounding leaves no gap between two disks that end at one line.
 pub(super) const MARGIN: f64 = 0.02;
 
 /// One surfel.
 struct Made {
-    /// The vertex, or the triangle.
+    /// The vertex or triangle that the surfel belongs to.
     of: u32,
     center: DVec3,
     normal: DVec3,
     s: DVec3,
     t: DVec3,
     clip: Clip,
-    /// None of a mesh that has no other colours than those of its vertices.
+    /// None if the mesh has no colours but those of its vertices.
     look: Option<Box<Look>>,
 }
 
-/// What the surfels of a mesh stand for.
+/// The elements of a mesh that surfels stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum By {
-    /// Its triangles where these are all there is to see, else its vertices.
+    /// Its triangles if all of them look flat (`are_plain`), else its vertices.
     Looks,
     /// Its vertices.
     Vertices,
 }
 
-/// The surfels of a mesh, painted as `painting` says; the vertices that no triangle with an area
-/// names cover nothing. A cloud, or one with a few triangles, stays as it is, and so does a mesh
-/// whose file says radii: its points have the colours of its triangles.
+/// Returns the surfels of a mesh, painted as `painting` says. Vertices without a triangle that has
+/// an area get none.
+///
+/// A cloud, or a cloud with a few triangles, stays as it is, and so does a mesh whose file has
+/// radii: its points get the colours of its triangles.
 pub(super) fn of_mesh(mut points: Points, by: By, painting: Painting) -> Points {
     let Some(faces) = points.faces.as_ref().filter(|_| points.of_mesh) else { return uncovered(points) };
     let triangles = &faces.triangles;
@@ -90,14 +94,14 @@ pub(super) fn of_mesh(mut points: Points, by: By, painting: Painting) -> Points 
     dressed(made, &all, painting)
 }
 
-/// Points that are none of a mesh's surfels, with the colours that triangles have there.
+/// Returns points that do not become the surfels of a mesh, with the colours of their triangles.
 fn uncovered(mut points: Points) -> Points {
     color_vertices(&mut points);
     points.faces = None;
     points
 }
 
-/// Parts of a mesh that have no surfels.
+/// The numbers of vertices and triangles of a mesh that have no surfels.
 struct LeftOut {
     loose: u64,
     stranded: u64,
@@ -105,7 +109,7 @@ struct LeftOut {
 }
 
 impl LeftOut {
-    /// Counts those of a mesh so many of whose vertices are corners of no facet.
+    /// Counts the parts left out of a mesh, given the number `bare` of vertices without a facet.
     fn of(positions: &[[f64; 3]], triangles: &[[u32; 3]], bare: usize) -> Self {
         if bare == 0 {
             return Self { loose: 0, stranded: 0, broken: 0 };
@@ -123,7 +127,7 @@ impl LeftOut {
     }
 }
 
-/// A surfel for each triangle, or three.
+/// Returns one surfel per triangle, or three.
 fn at_triangles(facets: &[Option<Facet>], around: &Around, skin: Option<&Skin<'_>>) -> Vec<Made> {
     let made = |(number, facet): (usize, &Option<Facet>)| {
         let number = number as u32;
@@ -137,7 +141,7 @@ fn at_triangles(facets: &[Option<Facet>], around: &Around, skin: Option<&Skin<'_
     facets.par_iter().enumerate().flat_map_iter(made).collect()
 }
 
-/// A surfel for each of the fans of each vertex, or two.
+/// Returns one or two surfels for each fan of each vertex.
 fn at_vertices(
     points: &Points,
     faces: &Faces,
@@ -158,7 +162,7 @@ fn at_vertices(
     (0..points.positions.len() as u32).into_par_iter().flat_map_iter(made).collect()
 }
 
-/// `points`, one for each surfel, with the surfels' looks.
+/// Gives `points`, one per surfel, the looks of the surfels.
 fn dressed(mut points: Points, all: &[Made], painting: Painting) -> Points {
     let look = |made: &Made| made.look.as_deref().copied().unwrap_or_default();
     points.averaged = all.iter().filter(|made| look(made).averaged).count() as u64;
@@ -177,7 +181,8 @@ fn dressed(mut points: Points, all: &[Made], painting: Painting) -> Points {
     points
 }
 
-/// The surfels of triangles. Each has the number and the colour of its first corner, and the mean place in the texture.
+/// Returns the surfels of triangles. Each has the attributes of its triangle's first corner, and
+/// the mean of the corners' texture coordinates.
 fn of_triangles(points: Points, triangles: &[[u32; 3]], all: &[Made]) -> Points {
     let corners = |made: &Made| triangles[made.of as usize];
     let place = |texture: &Vec<[f32; 2]>| {
@@ -188,7 +193,7 @@ fn of_triangles(points: Points, triangles: &[[u32; 3]], all: &[Made]) -> Points 
     let texture = points.texture.as_ref().map(place);
     let first = all.iter().map(|made| corners(made)[0]).collect();
     let positions = all.iter().map(|made| made.center.to_array()).collect();
-    // In no texture where its corners are in several.
+    // A triangle whose corners have different textures gets none.
     let number = |numbers: &Vec<u32>| {
         let own = |made: &Made| corners(made).map(|corner| numbers[corner as usize]);
         let one = |[a, b, c]: [u32; 3]| if a == b && a == c { a } else { u32::MAX };
@@ -198,7 +203,7 @@ fn of_triangles(points: Points, triangles: &[[u32; 3]], all: &[Made]) -> Points 
     shaped(Points { positions, texture, texture_numbers, ..taken(points, first) }, all)
 }
 
-/// `points`, one for each surfel, in the surfels' shapes.
+/// Gives `points`, one per surfel, the shapes of the surfels.
 fn shaped(points: Points, all: &[Made]) -> Points {
     let axes = |made: &Made| [made.s, made.t].map(|axis| axis.as_vec3().to_array());
     let radius = |made: &Made| made.s.length().max(made.t.length()) as f32;
@@ -211,11 +216,12 @@ fn shaped(points: Points, all: &[Made]) -> Points {
     }
 }
 
-/// The surfels of one of a vertex's fans: one, or where its sides enclose more than a straight angle, one on each side.
+/// Returns the surfels of one of a vertex's fans: one, or one along each side if the sides enclose
+/// more than a straight angle.
 fn surfels((vertex, normal): (u32, DVec3), fan: &Fan, positions: &[[f64; 3]], facets: &[Option<Facet>]) -> Vec<Made> {
     let at = |vertex: u32| DVec3::from(positions[vertex as usize]);
     let (x, y) = fan.normal.any_orthonormal_pair();
-    // As any_orthonormal_pair gives them x × y is the normal.
+    // For the axes of any_orthonormal_pair, x × y is the normal.
     let plane = |d: DVec3| DVec2::new(d.dot(x), d.dot(y));
     let center = at(vertex);
     let corners: Vec<[DVec2; 2]> =

@@ -1,10 +1,9 @@
-//! Looks of a mesh's surfels: the colours and images of the triangles that they stand
-//! for.
+//! The looks of a mesh's surfels: the colours and images of the triangles that they stand for.
 //!
-//! Surfels end where the look of triangles changes, as they do at edges: at the sides between two
-//! colours or images, and at the seams of one image, where the places of a corner differ. Within a
-//! piece of an image a surfel has the place of its centre, and what places gain along its plane,
-//! which tell a pixel's place in the image.
+//! Surfels end where the look of triangles changes, as they do at edges: at sides between two
+//! colours or images, and at the seams of one image, where the texture coordinates of a corner
+//! differ. Within a piece of an image, a surfel has the texture coordinates of its centre and their
+//! slopes along its plane, which give those of each pixel.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -17,41 +16,43 @@ use crate::scene::texture::straight;
 use crate::scene::{Colors, Texture};
 use crate::surfels::build::LARGEST_PLACE;
 
-/// Which images surfels are painted with.
+/// The images that surfels are painted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::surfels) enum Painting {
-    /// None: a surfel has the mean of its triangles' images.
+    /// None: a surfel has the mean colour of its triangles' images.
     Means,
-    /// One that is given for all.
+    /// One image that is given for all triangles.
     Given,
-    /// Each triangle's own looks, by its number.
+    /// Each triangle's own image, by number.
     Own,
 }
 
 /// The look of a surfel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Look {
-    /// None of its own: it has those of vertices, or of its image.
+    /// None if the surfel has the colour of its vertex, or only those of its image.
     pub(super) color: Option<[f32; 4]>,
     pub(super) placed: Option<Placed>,
-    /// The colour is the mean of an image.
+    /// Whether the colour is the mean of an image.
     pub(super) averaged: bool,
 }
 
-/// Where a surfel is in an image.
+/// The position of a surfel in an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
-    /// The number of the image.
+    /// The index of the image.
     pub(super) number: u32,
+    /// Texture coordinates of the surfel's centre.
     pub(super) center: [f32; 2],
-    /// Gains of u and v for a world unit along x, y and z.
+    /// Changes of u and v per world unit along x, y and z.
     pub(super) slopes: [[f32; 3]; 2],
 }
 
-/// The gain of coordinates that do not change: zero would say that it is not known.
+/// The slope that is stored if all slopes are zero, as zeros would mean unknown.
 const STILL: f32 = 1e-30;
 
-/// The most points along a side of a triangle of which the mean of its image is made.
+/// The largest number of points along a side of a triangle over which the mean of its image is
+/// taken.
 const MOST_ALONG: f64 = 16.0;
 
 /// The looks of a mesh's triangles.
@@ -60,9 +61,9 @@ pub(super) struct Skin<'a> {
     triangles: &'a [[u32; 3]],
     facets: &'a [Option<Facet>],
     painting: Painting,
-    /// Triangles without an image have the colours of their vertices.
+    /// Whether triangles without an image have the colours of their vertices.
     of_vertices: bool,
-    /// The colours of all triangles, where surfels have the means of images.
+    /// The colours of all triangles, if surfels have the means of images.
     means: Vec<Option<[f32; 4]>>,
 }
 
@@ -80,13 +81,14 @@ impl<'a> Skin<'a> {
         skin
     }
 
-    /// The places of a triangle's corners, if all of them can be used.
+    /// The texture coordinates of a triangle's corners, if all are usable.
     fn places(&self, triangle: usize) -> Option<[[f32; 2]; 3]> {
         let usable = |places: &&[[f32; 2]; 3]| places.as_flattened().iter().all(|turns| turns.abs() <= LARGEST_PLACE);
         self.paint.places.get(triangle).filter(usable).copied()
     }
 
-    /// The image of a triangle, by its number among those of the materials.
+    /// The image of a triangle, by its number among the materials' images, and its corners' texture
+    /// coordinates.
     fn image(&self, triangle: usize) -> Option<(u32, [[f32; 2]; 3])> {
         self.paint.number(triangle).zip(self.places(triangle))
     }
@@ -100,7 +102,8 @@ impl<'a> Skin<'a> {
         }
     }
 
-    /// The colour of a triangle that is not painted; none where vertices have it.
+    /// The colour of a triangle: the mean of its image times its own colour, if surfels have means;
+    /// else its own colour, or None if its vertices have colours.
     fn color(&self, triangle: usize) -> Option<[f32; 4]> {
         if let Some(mean) = self.means.get(triangle) {
             return *mean;
@@ -119,7 +122,7 @@ impl<'a> Skin<'a> {
         self.painting == Painting::Means && self.image(triangle).is_some()
     }
 
-    /// Whether two triangles that have a side in common look like one surface there.
+    /// Whether two triangles with a common side look like one surface there.
     pub(super) fn goes_on(&self, [a, b]: [u32; 2]) -> bool {
         match [a, b].map(|triangle| self.painted(triangle as usize)) {
             [Some((one, places)), Some((other, others))] => {
@@ -138,12 +141,13 @@ impl<'a> Skin<'a> {
         }
     }
 
-    /// Whether a triangle has one colour, so that a little of it past its sides shows little.
+    /// Whether a triangle is not painted with an image, so that a little of it past its sides is
+    /// hardly visible.
     pub(super) fn is_flat(&self, triangle: u32) -> bool {
         self.painted(triangle as usize).is_none()
     }
 
-    /// The look of a surfel of a triangle about `center`.
+    /// The look of a triangle's surfel with this centre.
     pub(super) fn of_triangle(&self, triangle: u32, center: DVec3) -> Look {
         let index = triangle as usize;
         let placed = self.painted(index).zip(self.facets[index].as_ref()).map(|((number, places), facet)| {
@@ -155,7 +159,7 @@ impl<'a> Skin<'a> {
         Look { color: self.color(index), placed, averaged: self.averages(index) }
     }
 
-    /// The look of a surfel of a fan about its vertex.
+    /// The look of a fan's surfel, centred at the vertex.
     pub(super) fn of_fan(&self, fan: &Fan) -> Look {
         let of = |triangle: u32| Some((self.facets[triangle as usize].as_ref()?.area, self.color(triangle as usize)?));
         let colors: Vec<_> = fan.corners.iter().filter_map(|corner| of(corner.triangle)).collect();
@@ -180,8 +184,8 @@ impl<'a> Skin<'a> {
     }
 }
 
-/// Gains of u and v for a world unit along x, y and z on a triangle whose corners have these
-/// places.
+/// Returns the changes of u and v per world unit along x, y and z on a triangle with these texture
+/// coordinates at its corners.
 fn gains(facet: &Facet, places: [[f32; 2]; 3]) -> [DVec3; 2] {
     let [p, q] = facet.sides(0);
     let normal = p.cross(q);
@@ -198,13 +202,13 @@ fn stored(gains: [DVec3; 2]) -> [[f32; 3]; 2] {
     if known && stored.as_flattened().iter().any(|gain| *gain != 0.0) { stored } else { [[STILL; 3]; 2] }
 }
 
-/// The mean of an image over a triangle, straight alpha.
+/// The mean colour of an image over a triangle, straight alpha.
 fn mean_over(texture: &Texture, places: [[f32; 2]; 3]) -> [f32; 4] {
     let [a, b, c] = places.map(|place| DVec2::from_array(place.map(f64::from)));
     let size = DVec2::from_array(texture.size().map(f64::from));
     let texels = [b - a, c - b, a - c].map(|side| (side * size).abs().max_element()).into_iter().fold(0.0, f64::max);
     let along = (0.5 * texels).ceil().clamp(1.0, MOST_ALONG);
-    // The middles of as many triangles as the square of that.
+    // The samples are the centroids of `along` squared equal parts of the triangle.
     let part = |i: u32, j: u32, third: f64| (f64::from(i) + third, f64::from(j) + third);
     let count = along as u32;
     let whole = (0..count).flat_map(|i| (0..count - i).map(move |j| part(i, j, 1.0 / 3.0)));
@@ -218,8 +222,8 @@ fn times(color: [f32; 4], factor: Option<[f32; 4]>) -> [f32; 4] {
     factor.map_or(color, |factor| std::array::from_fn(|k| color[k] * factor[k]))
 }
 
-/// Gives the vertices of a mesh, whose triangles nobody draws, the means of what these look like
-/// there.
+/// Sets the colours of a mesh's vertices to the mean look of the triangles there, which are not
+/// drawn.
 pub(in crate::surfels) fn color_vertices(points: &mut Points) {
     let Some((paint, triangles)) =
         points.faces.as_mut().and_then(|faces| Some((faces.paint.take()?, &faces.triangles)))

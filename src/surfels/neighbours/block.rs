@@ -1,9 +1,9 @@
-//! The nearest neighbours of positions that follow each other, found together.
+//! Nearest-neighbour search for blocks of consecutive positions.
 //!
-//! Positions next to each other in the order are mostly near in space and have mostly the same neighbours. One walk through
-//! the tree collects what lies within a guessed distance of a block of positions, and each of them looks through that list.
-//! A position whose farthest neighbour is nearer than the guess has found what a search of its own finds; for any other the
-//! guess was too short, and it makes that search.
+//! Consecutive positions are usually close in space and share most of their neighbours. One
+//! traversal of the tree collects the candidates within a guessed distance of a block of positions,
+//! and each position searches that list. If its farthest neighbour is within the guess, the result
+//! is exact; otherwise the guess was too short, and the position makes a search of its own.
 
 use std::ops::Range;
 
@@ -12,33 +12,34 @@ use super::{FAN, Neighbour, NeighbourSearch, larger, smaller, squared_length};
 /// Positions in a block.
 const BLOCK: usize = 16;
 
-/// A block that would have more candidates than this is halved, and at last its positions search alone: it lies across a
-/// jump of the curve, or the guess was made where positions are farther apart.
+/// The largest number of candidates of a block. A block with more is halved, down to searches for
+/// single positions: it lies across a jump of the Morton curve, or the guess was made where
+/// positions are farther apart.
 const MOST_CANDIDATES: usize = 256;
 
 /// The guess is the squared distance of the last block's farthest neighbour, times this.
 const WIDER: f64 = 1.2;
 
-/// What is kept from block to block.
+/// The state that carries over from block to block.
 struct Blocks<'a> {
     search: &'a NeighbourSearch<'a>,
     /// The guess: a squared distance, scaled units.
     reach: f64,
-    /// Positions within reach of the block, coordinate by coordinate, in order.
+    /// Coordinates of the candidates, the positions within reach of the block, in order.
     candidates: [Vec<f64>; 3],
     indices: Vec<u32>,
     /// Squared distances of the candidates from one position.
     distances: Vec<f64>,
-    /// The candidates that may be among the nearest.
+    /// Indices of the candidates within reach of one position.
     near: Vec<u32>,
-    /// The nearest of position `previous`.
+    /// The nearest neighbours of position `previous`.
     found: Vec<Neighbour>,
     previous: usize,
 }
 
 impl NeighbourSearch<'_> {
-    /// Calls `take` for each position of `range`, in order, with its nearest neighbours as [`NeighbourSearch::nearest`] finds
-    /// them.
+    /// Calls `take` for each position of `range`, in order, with its nearest neighbours as
+    /// [`NeighbourSearch::nearest`] finds them.
     pub fn of_range(&self, range: Range<usize>, mut take: impl FnMut(u32, &[Neighbour])) {
         let mut blocks = Blocks {
             search: self,
@@ -82,18 +83,19 @@ impl Blocks<'_> {
         self.reach = farthest * WIDER;
     }
 
-    /// Fills `found` by a search of its own.
+    /// Fills `found` by a search for this position alone.
     fn search_alone(&mut self, index: usize) {
         self.search.nearest(index as u32, &mut self.found);
         self.previous = index;
     }
 
-    /// The squared distance of the last of `found`, if there are as many as were asked for.
+    /// The squared distance of the last of `found`; None if there are fewer than requested.
     fn farthest(&self) -> Option<f64> {
         self.found.get(self.search.count.wrapping_sub(1)).map(|last| last.squared_distance)
     }
 
-    /// Collects what is within reach of the box around the block; false if that is too much.
+    /// Collects the candidates within reach of the block's bounding box; false if there are too
+    /// many.
     fn collect(&mut self, block: &Range<usize>) -> bool {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for position in &self.search.positions[block.clone()] {
@@ -138,7 +140,7 @@ impl Blocks<'_> {
         self.indices.len() <= MOST_CANDIDATES
     }
 
-    /// Fills `found` with the nearest of the candidates to position `index`, itself excluded.
+    /// Fills `found` with the candidates nearest to position `index`, without itself.
     fn look_through(&mut self, index: usize) {
         let at = self.search.positions[index];
         let reach = smaller(self.reach, self.reach_of(index));
@@ -147,7 +149,7 @@ impl Blocks<'_> {
         let [x, y, z] = &*candidates;
         distances.clear();
         distances.extend(x.iter().zip(y).zip(z).map(|((x, y), z)| squared_length([x - at[0], y - at[1], z - at[2]])));
-        // Which of them are within reach, without a branch that no processor could predict.
+        // Lists the candidates within reach without a branch, which would be unpredictable.
         near.clear();
         near.resize(distances.len(), 0);
         let mut count = 0;
@@ -164,7 +166,8 @@ impl Blocks<'_> {
                 continue;
             }
             kept = self.search.count.min(kept + 1);
-            // Candidates come in order, so one as far as another comes after it. The last of the sorted ones falls out.
+            // Candidates come in order, so of two at equal distance the later one goes behind. The
+            // last entry drops out of a full list.
             let mut place = kept;
             while place > 0 && found[place - 1].squared_distance > new.squared_distance {
                 if place < kept {
@@ -179,10 +182,11 @@ impl Blocks<'_> {
         found.truncate(kept);
     }
 
-    /// A squared distance within which position `index` has all its nearest: a ball of the last position's farthest one,
-    /// widened by the step from there, holds at least as many others.
+    /// Returns a squared distance within which position `index` has all its nearest neighbours. The
+    /// ball of the previous position, out to its farthest neighbour, holds enough positions;
+    /// widened by the step from there, it also holds them around this one.
     fn reach_of(&self, index: usize) -> f64 {
-        /// More than the rounding of the few operations below.
+        /// A margin above the rounding error of the few operations below.
         const SLACK: f64 = 1.0 + 1e-12;
         let Some(farthest) = self.farthest() else {
             return f64::INFINITY;

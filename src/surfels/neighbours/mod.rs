@@ -1,10 +1,12 @@
-//! The nearest neighbours of positions, the same for any order of the points.
+//! Search for the nearest neighbours of positions, with the same result for any order of the
+//! points.
 //!
-//! A tree of boxes over the Morton order: eight consecutive positions make a leaf, eight consecutive boxes a node. It
-//! needs no construction beyond the sort, has no trouble with coincident, collinear or coplanar positions (a flat scan
-//! is not split across its thickness), and its lower bounds hold in floating point: every operation of
-//! [`squared_length`] is monotone, so a box is never rounded to be farther than a position inside it. Ties are decided
-//! by the order of the positions. The result is thus exactly the first `count` by (distance, order).
+//! The search uses a tree of boxes over the Morton order: eight consecutive positions form a leaf,
+//! eight consecutive boxes a node. It is built by the sort alone. Coincident, collinear or coplanar
+//! positions do no harm (a flat scan is not split across its thickness). Its lower bounds hold in
+//! floating point: every operation of [`squared_length`] is monotone, so rounding never makes a box
+//! farther than a position inside it. Equal distances are sorted by the order of the positions. The
+//! result is thus exactly the first `count` by (distance, order).
 
 mod block;
 #[cfg(test)]
@@ -18,17 +20,17 @@ use super::positions::DistinctPositions;
 /// Positions in a leaf, and boxes in a node.
 const FAN: usize = 8;
 
-/// A neighbour, and how far it is.
+/// A neighbour and its distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Neighbour {
     /// Squared distance, scaled units.
     pub squared_distance: f64,
-    /// Which of the distinct positions.
+    /// Index among the distinct positions.
     pub index: u32,
 }
 
-/// The boxes of [`FAN`] leaves or nodes, coordinate by coordinate, so that eight distances are computed at once. Where
-/// there are fewer, the box is empty and infinitely far.
+/// The boxes of [`FAN`] leaves or nodes, stored per coordinate so that eight distances are computed
+/// at once. Missing boxes are empty and infinitely far.
 #[derive(Clone, Copy)]
 struct Node {
     low: [[f64; FAN]; 3],
@@ -38,7 +40,7 @@ struct Node {
 impl Node {
     const EMPTY: Self = Self { low: [[f64::INFINITY; FAN]; 3], high: [[f64::NEG_INFINITY; FAN]; 3] };
 
-    /// The boxes around groups of positions.
+    /// The bounding boxes of groups of positions.
     fn around<'a>(groups: impl Iterator<Item = &'a [[f64; 3]]>) -> Self {
         let mut node = Self::EMPTY;
         for (child, group) in groups.enumerate().take(FAN) {
@@ -52,7 +54,7 @@ impl Node {
         node
     }
 
-    /// The boxes around nodes.
+    /// The bounding boxes of nodes.
     fn above(nodes: &[Self]) -> Self {
         let mut node = Self::EMPTY;
         for (child, below) in nodes.iter().enumerate().take(FAN) {
@@ -64,7 +66,8 @@ impl Node {
         node
     }
 
-    /// Squared distances of the boxes from the one between `low` and `high`; zero where they overlap.
+    /// Squared distances of the boxes from the box between `low` and `high`; zero where they
+    /// overlap.
     fn squared_distances(&self, low: &[f64; 3], high: &[f64; 3]) -> [f64; FAN] {
         std::array::from_fn(|child| {
             squared_length(std::array::from_fn(|axis| {
@@ -75,7 +78,7 @@ impl Node {
     }
 }
 
-/// Plain comparisons: nothing here is NaN, and these are one instruction each.
+/// Plain comparisons, as nothing here is NaN and each is one instruction.
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
@@ -88,12 +91,12 @@ fn squared_length([x, y, z]: [f64; 3]) -> f64 {
     x * x + y * y + z * z
 }
 
-/// Finds the nearest of a set of distinct positions.
+/// Finds the nearest neighbours in a set of distinct positions.
 pub(crate) struct NeighbourSearch<'a> {
     positions: &'a [[f64; 3]],
-    /// From the nodes over leaves to the root, which is alone in its level.
+    /// The levels of the tree, from the nodes over leaves to the root, which is alone in its level.
     levels: Vec<Vec<Node>>,
-    /// How many neighbours each query returns, if there are as many.
+    /// The number of neighbours that a query returns, if there are as many.
     count: usize,
 }
 
@@ -112,13 +115,14 @@ impl<'a> NeighbourSearch<'a> {
         Self { positions, levels, count }
     }
 
-    /// Fills `found` with the nearest neighbours of position `index`, itself excluded, nearest first and equal
-    /// distances in the order of [`DistinctPositions`].
+    /// Fills `found` with the nearest neighbours of position `index`, without itself: the nearest
+    /// first, equal distances in the order of [`DistinctPositions`].
     pub fn nearest(&self, index: u32, found: &mut Vec<Neighbour>) {
         found.clear();
         let index = index as usize;
         let mut query = Query { search: self, index, at: self.positions[index], found, reach: f64::MAX };
-        // From the leaf of the query outward: most neighbours are found at once, and the rest is out of reach.
+        // The search goes outward from the query's own leaf, where most neighbours are found; most
+        // of the rest of the tree is then out of reach.
         let mut home = index / FAN;
         query.visit_leaf(home);
         for level in 0..self.levels.len() {
@@ -141,9 +145,10 @@ struct Query<'a> {
     search: &'a NeighbourSearch<'a>,
     index: usize,
     at: [f64; 3],
-    /// The nearest so far, sorted.
+    /// The nearest positions so far, sorted.
     found: &'a mut Vec<Neighbour>,
-    /// Squared distance beyond which nothing is wanted any more; finite, so an empty box is always beyond.
+    /// Squared distance beyond which positions are ignored; finite, so an empty box is always
+    /// beyond.
     reach: f64,
 }
 
@@ -173,7 +178,7 @@ impl Query<'_> {
         }
     }
 
-    /// Visits the children of a node within reach, nearest first, but not `done`.
+    /// Visits the children of a node within reach, the nearest first, except child `done`.
     fn visit_node(&mut self, level: usize, node: usize, done: Option<usize>) {
         let distances = self.search.levels[level][node].squared_distances(&self.at, &self.at);
         let mut order = [(0.0, 0); FAN];

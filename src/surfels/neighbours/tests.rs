@@ -1,4 +1,4 @@
-//! Searches against looking at every position.
+//! Comparison of searches with brute force.
 
 #![allow(clippy::unwrap_used)]
 use super::*;
@@ -10,7 +10,7 @@ fn distinct(points: &[[f64; 3]]) -> DistinctPositions {
     DistinctPositions::new(points, &bounds, DVec3::ZERO).unwrap()
 }
 
-/// Compares the search with looking at every position, for every `step`-th query.
+/// Compares the search with brute force, for every `step`-th query.
 fn check(points: &[[f64; 3]], count: usize, step: usize) {
     let distinct = distinct(points);
     for (point, &index) in points.iter().zip(distinct.of_point()) {
@@ -41,7 +41,7 @@ fn check(points: &[[f64; 3]], count: usize, step: usize) {
     }
 }
 
-/// Numbers in [0, 1) that look random.
+/// Pseudorandom numbers in [0, 1).
 fn noise(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = seed;
     std::iter::repeat_with(move || {

@@ -1,4 +1,5 @@
-//! Points that stand for the surface while samples are placed on it: many for each sample, evenly in each voxel.
+//! Candidates: points that represent the surface while samples are placed on it, several per
+//! sample, spread evenly in each voxel.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -7,16 +8,16 @@ use super::surface::{MeshSurface, Place};
 use super::voxels::{Voxel, fan_share};
 use crate::random::Random;
 
-/// Candidates for each sample: enough to tell the middle of its part of the surface.
+/// Candidates per sample: enough to find the centroid of its part of the surface.
 const FOR_EACH: f64 = 8.0;
 
-/// A point of the surface, and how much of it the point stands for.
+/// A point of the surface, and the area that it represents.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
     triangle: u32,
-    /// Of the first two corners.
+    /// The weights of the first two corners.
     weights: [f32; 2],
-    /// Square world units.
+    /// The area that it represents, square world units.
     pub(super) area: f32,
 }
 
@@ -31,10 +32,12 @@ impl Candidate {
     }
 }
 
-/// The candidates of all voxels, and the places at which `quotas` samples begin: every so many-th candidate of a voxel.
+/// Returns the candidates of all voxels and the start positions of `quotas` samples in each, at
+/// evenly spaced candidates of the voxel.
 ///
-/// There are as many candidates as a voxel's `priority`, the share of all samples that it should have, asks for, at least one;
-/// but none where no sample shall be.
+/// The `priority` of a voxel is the fractional number of samples that it should have. A voxel gets
+/// [`FOR_EACH`] candidates per sample of its priority, or of its quota if that is larger, rounded
+/// up; none if both are 0.
 pub(super) fn candidates(
     voxels: &[Voxel],
     quotas: &[usize],
@@ -59,12 +62,13 @@ pub(super) fn candidates(
     (candidates.into_iter().flatten().collect(), places.into_iter().flatten().collect())
 }
 
-/// `count` points of a voxel's surface, as triangles and corner weights: equal steps of area through the list of its patches,
-/// and in each patch the plane lattice R2 (Roberts 2018), moved by `shift`.
+/// Spreads `count` points over a voxel's surface, as triangles and corner weights: equal steps of
+/// area through the list of its patches, and in each patch the plane lattice R2 (Roberts 2018),
+/// shifted by `shift`.
 pub(super) fn spread(voxel: &Voxel, count: usize, shift: [f64; 3]) -> impl Iterator<Item = (u32, DVec3)> {
-    /// The root of x^3 = x + 1.
+    /// The real root of x^3 = x + 1.
     const PLASTIC: f64 = 1.324_717_957_244_746;
-    // Each patch as a fan of triangles, with the area up to its end.
+    // Each patch as a fan of triangles, with the cumulative area up to the end of each.
     let mut end = 0.0;
     let mut fans = Vec::with_capacity(voxel.patches.len());
     for patch in &voxel.patches {
@@ -85,7 +89,7 @@ pub(super) fn spread(voxel: &Voxel, count: usize, shift: [f64; 3]) -> impl Itera
         let (_, triangle, [a, b, c]) = fans[at];
         let turns = (k + 1) as f64;
         let (mut u, mut v) = ((turns / PLASTIC + shift[1]).fract(), (turns / (PLASTIC * PLASTIC) + shift[2]).fract());
-        // The far half of the unit square, turned over, is the near half.
+        // The far half of the unit square is reflected onto the near half.
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }

@@ -1,4 +1,5 @@
-//! The disk of each sample: in the plane that is nearest to its cell, the least ellipse that holds what the cell is there.
+//! The disk of each sample: the smallest ellipse, in the plane nearest to its Voronoi cell, that
+//! holds the cell.
 
 use std::array;
 use std::f64::consts::PI;
@@ -16,36 +17,42 @@ use crate::surfels::eigen::Symmetric3;
 use crate::surfels::ellipse::Ellipse;
 use crate::surfels::positions::DistinctPositions;
 
-/// How much larger a disk is than what it must cover.
+/// The factor by which a disk is larger than the ellipse that it must cover.
 const OVERLAP: f64 = 1.28;
 
-/// The slope of a part of a cell against the disk that is taken for the steepest, 60 degrees: from where a steeper one is seen
-/// best a disk is hardly seen, and no size helps.
+/// The slope of a part of a cell against its disk counts as at most this, 60 degrees. From the
+/// directions that see a steeper part best, the disk is hardly visible, and no size helps.
 const STEEPEST: f64 = 1.732;
 
-/// A cell whose mean square length is more than so many times that of its width is a line, and lies in many planes.
+/// A cell whose mean square length is more than this many times its mean square width is a line,
+/// and lies in many planes.
 const LONGEST: f64 = 1e12;
 
-/// The shorter half-axis is at least this part of how far the cell reaches: a needle would be covered by its neighbours' heights alone.
+/// The shorter half-axis is at least this fraction of the cell's largest reach. A needle-shaped
+/// cell would otherwise depend on the height terms of its neighbours' disks alone.
 const THINNEST: f64 = 0.25;
 
-/// In how many directions, evenly over half a turn, a cell's reach is measured. The polygon that they bound holds the cell;
-/// it is at most 1 / cos(PI / 16), 2 %, wider than a round one, and of one that is four times as long as wide by a quarter.
+/// The number of directions, evenly over half a turn, in which a cell's reach is measured.
+///
+/// The polygon that they bound holds the cell. It is wider than a round cell by at most a factor of
+/// 1 / cos(PI / 16), 2 %, and wider than a cell with an aspect ratio of four by a quarter.
 const DIRECTIONS: usize = 8;
 
-/// How far a cell reaches in its disk's plane from the sample, in either sense of each direction: the unit of [`Voronoi`].
+/// The reach of a cell from its sample, the larger of both senses of each direction in the disk's
+/// plane, in the scaled units of [`Voronoi`].
 type Reach = [f32; DIRECTIONS];
 
-/// The disks of all samples, one after the other.
+/// The disks of all samples, in the order of the samples.
 pub(super) struct Disks {
-    /// Half-axes s, the longer one, and t, perpendicular, world units; their cross product is along the normal.
+    /// Perpendicular half-axes s, the longer one, and t, world units; s x t is along the normal.
     pub axes: Vec<[DVec3; 2]>,
-    /// Where disks end before their rims; none if no disk does.
+    /// The clip lines of each disk; empty if no disk has any.
     pub clips: Vec<Clip>,
 }
 
 impl Disks {
-    /// Turns each disk to the side that the normal `named` for it is on. Whether all were.
+    /// Flips each disk to the side of its normal in `named`; returns whether no disk had to be
+    /// flipped.
     pub fn turn_to(&mut self, named: &[DVec3]) -> bool {
         let mut all = true;
         for (index, ([s, t], named)) in self.axes.iter_mut().zip(named).enumerate() {
@@ -60,7 +67,7 @@ impl Disks {
         all
     }
 
-    /// Unit.
+    /// The unit normals.
     pub fn normals(&self) -> Vec<DVec3> {
         self.axes.iter().map(|[s, t]| s.normalize().cross(t.normalize())).collect()
     }
@@ -70,41 +77,44 @@ impl Disks {
         self.axes.iter().map(|[s, _]| s.length() as f32).collect()
     }
 
-    /// Half-axes, world units.
+    /// The half-axes s and t, world units.
     pub fn half_axes(&self) -> Vec<[[f32; 3]; 2]> {
         self.axes.iter().map(|axes| axes.map(|axis| axis.as_vec3().to_array())).collect()
     }
 }
 
-/// Unit axes x and y of the plane across a unit normal, which is x × y.
+/// Unit axes x and y of the plane with this unit normal, which is x × y.
 fn plane(normal: DVec3) -> [DVec3; 2] {
     normal.any_orthonormal_pair().into()
 }
 
-/// The half-axes and the lines of each sample's disk.
+/// Computes the half-axes and the clip lines of each sample's disk.
 ///
 /// # The plane
 ///
-/// Of the planes through the sample it is the one from which the cell's mean square distance is the least: the normal is the
-/// eigenvector of the smallest eigenvalue of the cell's second moments about the sample, which are exact, of polygons. A cell
-/// that is flat lies in its disk's plane, whatever triangles it goes across; one of a rough surface has its disk amid the
-/// facets. What is of another side of the surface than the sample has no part in it.
+/// The plane through the sample with the least mean square distance to the cell: its normal is the
+/// eigenvector of the smallest eigenvalue of the cell's second moments about the sample. These are
+/// exact integrals over the cell's polygons. A flat cell lies in its disk's plane, however many
+/// triangles it spans; on a rough surface the disk lies amid the facets. Parts of the cell on
+/// another side of the surface than the sample are ignored.
 ///
 /// # The half-axes
 ///
-/// A disk must cover its cell from wherever it is seen. What lies a height h over or under its plane is seen past a rim that
-/// ends h tan(phi) beyond it, from an angle phi off the normal. So it reaches, in each direction of its plane, as far as the corners
-/// of its cell and their height more: from up to 45 degrees off its normal it covers all of its cell, whatever the others do, and
-/// where the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from
-/// farther off, so it takes the tangent of that slope for each unit of height. It is the least ellipse that holds
-/// the polygon of those reaches in a few directions.
+/// A disk must cover its cell from every direction. From an angle phi off the normal, a point at
+/// height h above or below the disk's plane appears h tan(phi) farther out. So in each direction of
+/// the plane the disk reaches as far as the cell's corners plus their heights: it then covers its
+/// whole cell by itself from up to 45 degrees off its normal, and a flat cell from everywhere. A
+/// part that slopes against the disk by more than 45 degrees is seen head-on from beyond 45
+/// degrees, so its heights are multiplied by the tangent of that slope. The disk is the smallest
+/// ellipse that holds the polygon of these reaches in a few directions.
 ///
-/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little
-/// larger. Of 31 million rays at samples of ten models, from 64 views each, 9 find a hole with 1.28, none of them at the fandisk.
+/// From farther off the normal, cells that are not flat are also covered by neighbouring disks,
+/// provided that [`OVERLAP`] makes all disks a little larger. With 1.28, 9 of 31 million rays at
+/// samples of ten models, from 64 views each, find a hole, none of them on the fandisk.
 pub(super) fn disks(surface: &MeshSurface<'_>, samples: &[Place], progress: &dyn Progress) -> Result<Disks> {
     let points: Vec<[f64; 3]> = samples.par_iter().map(|place| surface.point(*place).to_array()).collect();
     let distinct = DistinctPositions::new(&points, &surface.bounds, DVec3::ZERO)?;
-    // Samples that coincide have one cell; the first of them tells its normal.
+    // Samples that coincide share one cell; the first of them determines its normal.
     let mut sample_at = vec![u32::MAX; distinct.len()];
     for (sample, &position) in distinct.of_point().iter().enumerate().rev() {
         sample_at[position as usize] = sample as u32;
@@ -130,7 +140,7 @@ pub(super) fn disks(surface: &MeshSurface<'_>, samples: &[Place], progress: &dyn
     parts.into_iter().for_each(|(position, reach)| grow(&mut reaches[position as usize], reach));
     let ellipses = reaches.par_iter().map(|reach| ellipse(reach).map(|axis| axis * (OVERLAP / distinct.scale())));
     let mut ellipses: Vec<[DVec2; 2]> = ellipses.collect();
-    // A cell may be less than rounding: there the smallest disk will do.
+    // A cell may vanish in rounding: it gets a disk of the smallest size.
     let lengths = ellipses.iter().map(|[s, _]| s.length()).filter(|length| *length > 0.0);
     let smallest = lengths.fold(f64::INFINITY, f64::min);
     let nothing = |ellipse: &&mut [DVec2; 2]| ellipse[0] == DVec2::ZERO;
@@ -156,13 +166,14 @@ fn grow(reach: &mut Reach, by: Reach) {
     reach.iter_mut().zip(by).for_each(|(most, one)| *most = most.max(one));
 }
 
-/// The half-axes, the longer one first, of the least ellipse that holds the polygon of these reaches.
+/// Returns the half-axes of the smallest ellipse that holds the polygon of these reaches, the
+/// longer one first.
 fn ellipse(reach: &Reach) -> [DVec2; 2] {
     let farthest = f64::from(reach.iter().fold(0f32, |most, one| most.max(*one)));
     if farthest == 0.0 {
         return [DVec2::ZERO; 2];
     }
-    // In units of the farthest: squares of areas neither overflow nor underflow.
+    // The unit is the largest reach, so that squares of areas neither overflow nor underflow.
     let reach = |k: usize| f64::from(reach[k % DIRECTIONS]) / farthest;
     let (sine, cosine) = (PI / DIRECTIONS as f64).sin_cos();
     let corner = |(k, direction): (usize, DVec2)| {
@@ -172,7 +183,7 @@ fn ellipse(reach: &Reach) -> [DVec2; 2] {
     Ellipse::around_points(&corners, THINNEST).half_axes().map(|axis| axis * farthest)
 }
 
-/// Where each position's disk ends; none if no disk does.
+/// Returns the clip lines of each position's disk; empty if no disk has any.
 fn clips(ends: &Ends, voronoi: &Voronoi<'_>, axes: &[[DVec3; 2]], progress: &dyn Progress) -> Vec<Clip> {
     if ends.is_empty() {
         return Vec::new();
@@ -195,7 +206,8 @@ fn clips(ends: &Ends, voronoi: &Voronoi<'_>, axes: &[[DVec3; 2]], progress: &dyn
     if clips.iter().all(Clip::is_none) { Vec::new() } else { clips }
 }
 
-/// The normals of the planes that are nearest to each cell, on the side that the sample's triangle faces.
+/// Returns the normal of the plane nearest to each cell, on the side that the sample's triangle
+/// faces.
 fn nearest_planes(voronoi: &Voronoi<'_>, count: usize, progress: &dyn Progress) -> Vec<DVec3> {
     let parts = voronoi.measure(progress, |sample, triangle, corners| {
         if voronoi.is_of_side(sample, triangle) { second_moments(corners) } else { Symmetric3::ZERO }
@@ -208,7 +220,7 @@ fn nearest_planes(voronoi: &Voronoi<'_>, count: usize, progress: &dyn Progress) 
         let facet = voronoi.facet(position as u32);
         let ([_, width, length], [normal, ..]) = moments.eigen();
         let normal = if normal.dot(facet) < 0.0 { -normal } else { normal };
-        // Without a cell, or with a needle of one, the triangle's own plane is as near as any.
+        // If there is no cell, or it is a line, the triangle's own plane is as near as any.
         if width * LONGEST > length && normal.dot(facet) > SIDE { normal } else { facet }
     };
     moments.par_iter().enumerate().map(normal).collect()
@@ -220,8 +232,8 @@ fn second_moments(corners: &[DVec3]) -> Symmetric3 {
     let fan = others.windows(2).map(|pair| {
         let [b, c] = [pair[0], pair[1]];
         let area = 0.5 * (b - a).cross(c - a).length();
-        // Over a triangle of unit area a product of two linear functions is a twelfth of the sum over the corners and of that of
-        // the sums.
+        // Over a triangle of unit area, the integral of a product of two linear functions is 1/12
+        // of the sum of their products at the three corners and at the sum of the corners.
         Symmetric3::scatter([a, b, c, a + b + c].into_iter()) * (area / 12.0)
     });
     fan.fold(Symmetric3::ZERO, |sum, triangle| sum + triangle)
@@ -240,7 +252,8 @@ mod tests {
         let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
         let mesh = Mesh { positions: corners, triangles, ..Mesh::default() };
         let surface = MeshSurface::new(&mesh).unwrap();
-        // Most of them crowd in a corner, where no few neighbours tell how far a cell reaches to the other side.
+        // Most samples crowd in one corner, so a few neighbours do not bound the cells that reach
+        // across to the other side.
         let mut random = Random::stream(1, 0);
         let place = |k: u32| {
             let far = if k < 40 { 0.1 } else { 1.0 };
@@ -251,24 +264,25 @@ mod tests {
         let places: Vec<Place> = (0..55).map(place).collect();
         let made = disks(&surface, &places, &()).unwrap();
         let normals = made.normals();
-        // Sides are flat here: the nearest plane is that of the triangle.
+        // The sides are flat here, so the nearest plane is the triangle's.
         for (normal, place) in normals.iter().zip(&places) {
             assert!(normal.distance(surface.normal(*place)) < 1e-9, "{normal}");
         }
 
         let centers: Vec<DVec3> = places.iter().map(|place| surface.point(*place)).collect();
-        // The samples from the nearest on, of one side or of all.
+        // All samples by distance from a point, the nearest first.
         let by_distance = |at: DVec3| {
             let mut order: Vec<usize> = (0..places.len()).collect();
             order.sort_by(|&a, &b| centers[a].distance_squared(at).total_cmp(&centers[b].distance_squared(at)));
             order
         };
-        // The farthest that each cell reaches, and how far its disk would by itself as a part of how far it does in some direction.
+        // `reached`: the largest reach of each cell. `filled`: the largest ratio, over all
+        // directions, of the cell's reach to that of its disk without OVERLAP.
         let (mut reached, mut filled) = (vec![0f64; places.len()], vec![0f64; places.len()]);
         const STEPS: u32 = 200;
         let mut shared = 0;
         for (triangle, facet) in (0..4).zip(&surface.triangles) {
-            // The sides are at angles of more than 90 degrees.
+            // The angle between any two sides exceeds 90 degrees.
             let is_of_side = |sample: &usize| places[*sample].triangle == triangle;
             let is_shared = facet.corners.iter().any(|&corner| !by_distance(corner)[..16].iter().any(is_of_side));
             shared += u32::from(is_shared);
@@ -290,11 +304,13 @@ mod tests {
                 }
             }
         }
-        // Where only other sides' samples are near they share a triangle.
+        // A triangle is shared by the samples of all sides if only those of other sides are near
+        // one of its corners.
         assert!((1..4).contains(&shared), "{shared}");
         assert!(filled.iter().all(|filled| *filled < 1.0 + 1e-6), "{filled:?}");
-        // Corners of cells lie between the points that were tried, the longest edge is 1.42, and the sum above grows by at most
-        // twice a distance: |(1, STEEPEST)|. Of the reach in a few directions the disk is the least, but where it may be no thinner.
+        // The corners of cells lie between the tested points. The longest edge is 1.42, and the sum
+        // `length + over` grows by at most |(1, STEEPEST)| = 2 times a distance. The disk is the
+        // smallest for the reaches in a few directions, unless THINNEST limits it.
         let step = 2.0 * 1.42 / f64::from(STEPS);
         let mut of_rounds = (0.0, 0.0);
         for (k, [s, t]) in made.axes.iter().enumerate() {
@@ -310,7 +326,7 @@ mod tests {
     #[test]
     fn second_moments_are_those_of_many_points() {
         let corners = [[0.1, 0.2, 0.3], [1.0, 0.1, 0.2], [1.2, 0.9, 0.5], [0.4, 1.1, 0.4]].map(DVec3::from);
-        // A plane, of which the last corner is made a part.
+        // The last corner is moved into the plane of the first three.
         let [a, b, c, d] = corners;
         let normal = (b - a).cross(c - a).normalize();
         let corners = [a, b, c, d - normal * (d - a).dot(normal)];
@@ -319,7 +335,7 @@ mod tests {
         const STEPS: u32 = 300;
         for [a, b, c] in [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]] {
             let area = 0.5 * (b - a).cross(c - a).length();
-            // The middles of small triangles, of two kinds.
+            // The centroids of small triangles, upright and turned ones.
             let weight = area / f64::from(STEPS * STEPS);
             let at = |i: u32, j: u32, third: f64| {
                 let [u, v] = [i, j].map(|k| (f64::from(k) + third) / f64::from(STEPS));

@@ -1,9 +1,9 @@
-//! How many samples each voxel gets.
+//! The number of samples of each voxel.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// What the next sample in a voxel is worth.
+/// The bid of a voxel for the next sample.
 #[derive(PartialEq)]
 struct Bid {
     worth: f64,
@@ -13,7 +13,7 @@ struct Bid {
 impl Eq for Bid {}
 
 impl Ord for Bid {
-    /// Of equal worth the voxel that comes first is served first.
+    /// Among equal bids the voxel that comes first wins.
     fn cmp(&self, other: &Self) -> Ordering {
         self.worth.total_cmp(&other.worth).then(other.voxel.cmp(&self.voxel))
     }
@@ -25,19 +25,23 @@ impl PartialOrd for Bid {
     }
 }
 
-/// Hands out `count` samples (Tien 2008, section 3.2): each to the voxel whose priority is highest, which then falls.
+/// Distributes `count` samples, each to the voxel of the highest priority, which then falls (Tien
+/// 2008, section 3.2).
 ///
-/// The thesis leaves open to what it falls. Here a voxel of priority p with n samples bids `p / (n + u)`, with a u in (0, 1)
-/// of its own. A voxel whose fair share is f then gets `f` rounded down or up, up if the fraction of f exceeds u; as the u
-/// are evenly spread, also among voxels that lie together, rounding favours nobody. With one u for all, a flat wall of
-/// equal voxels of 4.4 samples each would be left with 4 everywhere, a tenth too few. Priorities that are not positive get
-/// none, unless none is positive: then all are taken for equal.
+/// The thesis does not say by how much it falls. Here a voxel of priority p with n samples bids
+/// `p / (n + u)`, with an offset u in (0, 1) of its own. A voxel whose fair share is f then gets f
+/// rounded down, or up if the fraction of f exceeds u. The offsets are evenly spread, also among
+/// neighbouring voxels, so the rounding is unbiased. With one u for all, a flat wall of equal
+/// voxels of 4.4 samples each would get 4 everywhere, a tenth too few.
+///
+/// Voxels whose priority is not positive get no samples, unless there are no others: then all count
+/// as equal.
 pub(super) fn distribute(priorities: &[f64], count: usize) -> Vec<usize> {
     let usable = |priority: f64| if priority.is_finite() && priority > 0.0 { priority } else { 0.0 };
     let none = priorities.iter().all(|priority| usable(*priority) == 0.0);
     let of = |voxel: usize| if none { 1.0 } else { usable(priorities[voxel]) };
     let mut samples = vec![0; priorities.len()];
-    // Multiples of the golden ratio, modulo 1, are evenly spread however many there are.
+    // Multiples of the golden ratio modulo 1 are evenly spread for any number of them.
     let offset = |voxel: usize| ((voxel as f64 + 0.5) * 0.618_033_988_749_894_9).fract();
     let bids = (0..priorities.len()).map(|voxel| Bid { worth: of(voxel) / offset(voxel), voxel });
     let mut heap: BinaryHeap<Bid> = bids.filter(|bid| bid.worth > 0.0).collect();
@@ -63,7 +67,7 @@ mod tests {
         assert_eq!(distribute(&[0.0, f64::INFINITY, 2.0], 3), [0, 0, 3]);
         assert_eq!(distribute(&[], 3), Vec::<usize>::new());
         assert!([[2, 8], [3, 7]].map(Vec::from).contains(&distribute(&[0.26, 0.74], 10)));
-        // Many equal ones together get what they should, though each gets a whole number.
+        // Many equal voxels get their fair share together, though each gets a whole number.
         let priorities: Vec<f64> = (0..1250).map(|k| if k < 1000 { 1.0 } else { 4.0 }).collect();
         let samples = distribute(&priorities, 6600);
         assert!(samples[..1000].iter().sum::<usize>().abs_diff(3300) <= 3, "{samples:?}");

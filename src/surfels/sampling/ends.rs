@@ -1,5 +1,5 @@
-//! Where the surface ends, at borders and sharp edges, and the lines at which disks end there (Zwicker et al. 2004, *Perspective
-//! Accurate Splatting*, section 5).
+//! The ends of a surface, at borders and sharp edges, and the clip lines of disks there (Zwicker et
+//! al. 2004, *Perspective Accurate Splatting*, section 5).
 
 use std::time::Duration;
 
@@ -20,58 +20,67 @@ use crate::surfels::lines::{self, Line, hull, nearest_share};
 use crate::surfels::mesh::{MARGIN, TOLERANCE};
 use crate::truth::TriangleTree;
 
-/// How much larger a box of the tree is than its side, in diagonals of the surface: more than the rounding of f32.
+/// The margin of a box of the tree around its side, in diagonals of the surface: more than the
+/// rounding of f32.
 const PADDING: f64 = 1e-6;
 
-/// A side that lies farther above or below a disk than so many of its longer half-axes is one of another part of the surface.
+/// A side that lies farther above or below a disk than this many of its longer half-axes belongs to
+/// another part of the surface.
 const HIGHEST: f64 = 0.5;
 
-/// The cosine of the angle between two triangles past which their common side is an end: 20 degrees.
+/// The cosine of 20 degrees: the common side of two triangles at a larger angle is an end.
 const EDGE: f64 = 0.939_692_620_785_908_4;
 
-/// The part of how far a disk should stand out past an end by the two triangles there that it must stand out by the whole surface, where
-/// it is farthest past it: else the end is one of the roughness that disks do not follow, or of a slit narrower than the disk.
+/// The distance of a disk's tip past an end from the whole surface must be at least this fraction
+/// of that predicted from the end's two triangles. Otherwise the end belongs to roughness that
+/// disks do not follow, or to a slit narrower than the disk.
 const CONFIRMED: f64 = 0.5;
 
-/// A disk's cell lies so many times nearer to its plane than the disk stands out, or the end is one of that roughness too.
+/// A disk must stand out past an end by this many times the largest height of its cell's corners
+/// over its plane. Otherwise the end belongs to roughness that disks do not follow.
 const ROUGH: f64 = 4.0;
 
-/// A side of a triangle past which the surface does not go on.
+/// A side of a triangle past which the surface does not continue.
 struct End {
-    /// From the one to the other the triangle is on the left, seen from outside. Relative to the surface's centre, world units.
+    /// From the first corner to the second, with the triangle on the left as seen from outside.
+    /// Relative to the surface's centre, world units.
     side: [DVec3; 2],
-    /// Of the triangle, unit.
+    /// Unit normal of the triangle.
     normal: DVec3,
-    /// How far a plane that goes on past it leaves the surface, for each unit: the sine of the angle by which that turns away, and 1
-    /// where it turns by more than a right angle, or ends.
+    /// The distance from the surface that a plane gains per unit of length past this side: the sine
+    /// of the angle by which the surface turns away, or 1 where it turns by more than a right
+    /// angle, or stops.
     leaves: f64,
 }
 
 /// All ends of a surface.
 pub(super) struct Ends {
-    /// All triangles; none where there are no ends.
+    /// All triangles; None if there are no ends.
     surface: Option<TriangleTree>,
     ends: Vec<End>,
-    /// Of each triangle, a number that those have that the surface goes on to without an end between.
+    /// The patch number of each triangle; triangles have the same one if the surface continues from
+    /// one to the other without an end between.
     pub patches: Vec<u32>,
     tree: Bvh2,
     padding: f64,
-    /// World coordinates of the surface's centre.
+    /// The surface's centre, world coordinates.
     center: DVec3,
-    /// How far disks may stand out past them, world units.
+    /// The distance by which disks may stand out past ends, world units.
     tolerance: f64,
 }
 
-/// A disk, and the corners of the cell that it must cover, relative to its centre. World units.
+/// A disk and the corners of the cell that it must cover, relative to the disk's centre. World
+/// units.
 pub(super) struct Covering<'a> {
     pub center: DVec3,
-    /// Half-axes, the longer one first; their cross product is along the normal.
+    /// Half-axes, the longer one first; s x t is along the normal.
     pub axes: [DVec3; 2],
     pub cell: &'a [DVec3],
 }
 
 impl Ends {
-    /// Vertices at one position are one: many files repeat them where only normals or texture coordinates differ.
+    /// Finds the ends of a surface. Vertices at one position are merged, as many files repeat a
+    /// vertex where only its normals or texture coordinates differ.
     pub fn new(surface: &MeshSurface<'_>) -> Result<Self> {
         let vertices = distinct(&surface.mesh.positions);
         let mut sides: Vec<Side> = Vec::with_capacity(3 * surface.triangles.len());
@@ -98,7 +107,7 @@ impl Ends {
         let diagonal = surface.bounds.extent().length();
         let padding = PADDING * diagonal;
         let boxes: Vec<Aabb> = ends.iter().map(|end| around(&end.side, padding)).collect();
-        // The builder takes no empty list in all of its steps.
+        // Not every step of the builder accepts an empty list.
         let tree = match boxes.is_empty() {
             true => Bvh2::default(),
             false => build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default()),
@@ -123,7 +132,7 @@ impl Ends {
         !self.near(center, radius).is_empty()
     }
 
-    /// How far a point is from the surface.
+    /// The distance of a point from the surface, world units.
     fn distance(&self, point: DVec3) -> f64 {
         self.surface.as_ref().map_or(0.0, |surface| surface.distance(self.center + point))
     }
@@ -139,10 +148,12 @@ impl Ends {
         found
     }
 
-    /// The lines that cut most from a disk of what stands out past ends, and nothing from its cell.
+    /// The clip lines that remove most of what stands out past ends, and nothing of the disk's
+    /// cell.
     ///
-    /// A line runs along an end, or as far outside as the cell's farthest corner beyond it: at an end that bends around the
-    /// disk's cell the line through one of its sides would cut off what lies in the cell past the next.
+    /// A line runs along an end, or farther out where the cell's corners reach beyond the end.
+    /// Where an end bends around the cell, a line along one of its sides would cut off the part of
+    /// the cell past the next side.
     pub fn clip(&self, disk: &Covering<'_>) -> Clip {
         let [s, t] = disk.axes;
         let normal = s.normalize().cross(t.normalize());
@@ -151,7 +162,7 @@ impl Ends {
         let rough = disk.cell.iter().map(|corner| corner.dot(normal).abs()).fold(0.0, f64::max);
         let least = self.tolerance.max(ROUGH * rough);
         let cell = hull(disk.cell.iter().map(|corner| flat(*corner)).collect());
-        // How far apart two lines of this direction are in the plane whose offsets differ by 1.
+        // The distance in the plane between two lines of this direction whose offsets differ by 1.
         let across = |line: &Line| 1.0 / DVec2::new(line.inward.x / radius, line.inward.y / least_radius).length();
         let past = |line: &Line, leaves: f64| (1.0 + line.offset) * across(line) * leaves;
         let line = |end: &End| {
@@ -163,7 +174,7 @@ impl Ends {
             if !is_near || end.normal.dot(normal) <= SIDE {
                 return None;
             }
-            // Moved out it leaves out less.
+            // A line that is moved outward cuts off less, so this test can reject it early.
             let line = Line::through(p, q).filter(|line| past(line, end.leaves) > least)?;
             let margin = (MARGIN * least_radius + rough) / across(&line);
             let line = line.keeping(&cell, margin);
@@ -181,7 +192,8 @@ impl Ends {
 /// A side of a triangle.
 struct Side {
     triangle: u32,
-    /// The corner that it begins at, and that and the next as numbers of positions.
+    /// The corner that it starts at, 0 to 2; `ends` has the position numbers of that corner and the
+    /// next.
     place: usize,
     ends: [u32; 2],
 }
@@ -193,8 +205,9 @@ impl Side {
     }
 }
 
-/// How far a plane that goes on past these sides of triangles, which have the same ends, leaves the surface, for each unit; None if
-/// they are two between which it goes on.
+/// The distance from the surface that a plane gains per unit of length past these sides of
+/// triangles, which have the same ends; None if there are two sides and the surface continues
+/// between them.
 fn leaves(sides: &[Side], normal: impl Fn(&Side) -> DVec3) -> Option<f64> {
     let [one, other] = sides else { return Some(1.0) };
     if one.ends == other.ends {

@@ -1,15 +1,21 @@
-//! From a mesh to points on it, by priority and evenly (Tien 2008, chapter 3).
+//! Sampling of a mesh at evenly spread points, whose density follows a priority.
 //!
-//! 1. [`voxels`]: a tree of boxes, halved across their longest side where triangles are (`overlap`), ends in voxels.
-//! 2. [`priority`]: each voxel has a priority; any function of voxels will do.
-//! 3. `distribute`: a heap hands out the samples, always to the voxel of the highest priority, which then falls.
-//! 4. `candidates`: each voxel's samples begin evenly spread over the triangles in it.
-//! 5. `relax`: they move apart, also from those of other voxels, and stay on the triangles.
-//! 6. `voronoi`: the part of the surface that is nearest to each sample is cut out of the triangles; and `disks`: a disk covers
-//!    it, in the plane that is nearest to it; and `ends` at lines, where the surface ends.
+//! The method is that of Tien 2008, chapter 3, with the following steps:
 //!
-//! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
-//! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
+//! 1. [`voxels`]: a tree of boxes, halved across their longest side where triangles are
+//!    (`overlap`), ends in voxels.
+//! 2. [`priority`]: each voxel has a priority, from any function of voxels.
+//! 3. `distribute`: a heap gives each sample to the voxel of the highest priority, which then
+//!    falls.
+//! 4. `candidates`: the samples of each voxel start evenly spread over the triangles in it.
+//! 5. `relax`: samples move apart, across voxels too, and stay on the triangles.
+//! 6. `voronoi`: the part of the surface nearest to each sample is cut out of the triangles;
+//!    `disks`: a disk in the plane nearest to that part covers it; `ends`: clip lines end the disk
+//!    where the surface ends.
+//!
+//! The thesis projects one or several points per voxel onto its triangles and does not say which
+//! points. Their choice decides how well a surface is sampled: independent random points leave gaps
+//! three times as wide as needed.
 
 mod candidates;
 mod disks;
@@ -40,45 +46,48 @@ use crate::progress::Progress;
 use crate::scene::{Colors, Up, body};
 use crate::surfels::guess_up;
 
-/// The most samples.
+/// The largest number of samples.
 pub const MOST: usize = 1 << 28;
 
-/// Samples for each voxel where the depth of the tree is not given. Fewer voxels follow the priority less closely; with
-/// more, many a voxel's share is less than one sample.
+/// Samples per voxel if the depth of the tree is not given. Fewer voxels follow the priority less
+/// closely; with more, the share of many voxels is less than one sample.
 const FOR_EACH_VOXEL: usize = 4;
 
-/// The most voxels, unless there are more samples: they take 600 bytes each.
+/// The largest number of voxels, unless there are more samples. A voxel takes 600 bytes.
 const MOST_VOXELS: usize = 1 << 21;
 
-/// Memory that a sample takes, bytes at most: of voxels, of points of the surface around it, of its
-/// cell; and of an independent point.
+/// Memory per sample, bytes at most: its voxels, its candidates on the surface around it, and its
+/// cell.
 const OF_SAMPLE: u64 = 1500;
+/// Memory per independent random point, bytes at most.
 const OF_UNIFORM: u64 = 250;
 
-/// How samples are placed.
+/// The method that places samples.
 pub enum Method<'a> {
     /// By the priority of voxels.
     Stratified {
         /// The priority function.
         priority: &'a PriorityFunction<'a>,
-        /// How often boxes are halved, but not beyond 2^21 voxels or as many as samples; None for as many voxels as samples allow.
+        /// The number of halvings of boxes, limited to 2^21 voxels or as many as samples, whichever
+        /// is more. If None, the limit is one voxel for every 4 samples.
         depth: Option<u32>,
     },
-    /// By the priority of voxels, where Tien 2008 places samples (section 3.2): a baseline.
+    /// By the priority of voxels, at the points that Tien 2008 uses (section 3.2): a baseline.
     Projected {
         /// The priority function.
         priority: &'a PriorityFunction<'a>,
-        /// As of [`Method::Stratified`].
+        /// As in [`Method::Stratified`].
         depth: Option<u32>,
     },
-    /// Independent random points, evenly by area: a baseline. Their radii are left to [`build`](super::build).
+    /// Independent random points, uniform by area: a baseline. [`build`](super::build) computes
+    /// their radii.
     Uniform,
 }
 
-/// What was done to a mesh on the way to samples.
+/// A record of the sampling of a mesh.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Sampling {
-    /// Points.
+    /// The number of samples.
     pub samples: u64,
     /// Triangles that have an area.
     pub triangles: u64,
@@ -86,20 +95,21 @@ pub struct Sampling {
     pub dropped_non_finite: u64,
     /// Triangles left out because they have no area.
     pub dropped_flat: u64,
-    /// Voxels that hold some of the surface; 0 for [`Method::Uniform`].
+    /// Voxels that contain a part of the surface; 0 for [`Method::Uniform`].
     pub voxels: u64,
-    /// Of these, voxels that got no sample.
+    /// Voxels among these that got no sample.
     pub empty_voxels: u64,
-    /// No triangle was left out for its coordinates, and each disk is turned as its triangles are, whatever normals the mesh gives.
+    /// Whether no triangle was left out for its coordinates and every disk faces as its triangles
+    /// are wound, also where the mesh has normals.
     pub faces_as_wound: bool,
-    /// How often boxes were halved.
+    /// The number of times that boxes were halved.
     pub halvings: u32,
-    /// How many of the halvings that were asked for were left out, as there would have been too many voxels.
+    /// Requested halvings that were left out, as they would give too many voxels.
     pub undone: u32,
 }
 
 impl Sampling {
-    /// What a user should hear of: a sentence for everything that was left out.
+    /// Returns a sentence for the user about each thing that was left out.
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
         let notes = [
@@ -118,16 +128,19 @@ impl Sampling {
     }
 }
 
-/// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
-/// mesh has them, and, but by [`Method::Uniform`], half-axes with which the disks cover it. Without normals of the mesh those are
-/// those of the disks' planes, which lie nearest to the part that each sample stands for, or of [`Method::Uniform`] of triangles.
+/// Samples a mesh at `count` points.
 ///
-/// The same seed gives the same points, whatever the machine's number of threads.
+/// The points have positions on the triangles, normals, and the texture coordinates and colours
+/// that the mesh has. Except for [`Method::Uniform`], they have half-axes such that the disks cover
+/// the surface. If the mesh has no normals, each normal is that of the disk's plane, which is
+/// nearest to the sample's part of the surface; for [`Method::Uniform`] it is the triangle's.
+///
+/// The same seed gives the same points for any number of threads.
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`] for a mesh without a triangle that has an area, [`Error::Usage`] for a count of none or more than
-/// [`MOST`], or for a mesh whose parts do not fit each other, and [`Error::NoMemory`].
+/// [`Error::EmptyScene`] if no triangle has an area; [`Error::Usage`] if the count is 0 or more
+/// than [`MOST`], or the parts of the mesh do not fit each other; and [`Error::NoMemory`].
 pub fn sample(
     mesh: &Mesh,
     count: usize,
@@ -171,7 +184,8 @@ pub fn sample(
     Ok((points, sampling))
 }
 
-/// The voxels of a surface, how many of `count` samples each gets, and how many it should have.
+/// Returns the voxels of a surface, the number of samples of each, and the fractional number of
+/// samples that its priority asks for.
 fn divided(
     surface: &MeshSurface<'_>,
     count: usize,
@@ -189,14 +203,15 @@ fn divided(
     progress.end();
     sampling.voxels = voxels.len() as u64;
     sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;
-    // As the heap takes them; where none is positive, quotas alone decide.
+    // As in the heap, only positive priorities count. If there is none, all shares are 0 and the
+    // quotas alone decide.
     let usable = |priority: &f64| if priority.is_finite() && *priority > 0.0 { *priority } else { 0.0 };
     let sum = priorities.iter().map(usable).sum::<f64>().max(f64::MIN_POSITIVE);
     let fair = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
     (voxels, quotas, fair)
 }
 
-/// Samples with half-axes with which they cover the surface.
+/// The samples, with half-axes such that their disks cover the surface.
 fn covering(
     surface: &MeshSurface<'_>,
     places: &[Place],
@@ -221,14 +236,14 @@ fn normals_at(surface: &MeshSurface<'_>, places: &[Place]) -> Vec<DVec3> {
     places.par_iter().map(|place| surface.normal(*place)).collect()
 }
 
-/// Up of a mesh that does not say, as for its vertices.
+/// The up direction of a mesh that does not state one, guessed as for its vertices.
 fn guessed_up(mesh: &Mesh) -> Up {
     guess_up(&body(mesh.positions.len(), |index| DVec3::from_array(mesh.positions[index])).0)
 }
 
 fn points(surface: &MeshSurface<'_>, places: &[Place], normals: Vec<DVec3>, colors: Option<Vec<[f32; 4]>>) -> Points {
     let places = places.par_iter();
-    // A place on no texture may be any.
+    // A sample without a texture may have any texture coordinates.
     let place_of = |place: &Place| surface.texture(*place).unwrap_or_default();
     Points {
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),

@@ -1,14 +1,15 @@
-//! Whether a triangle and a box have a point in common, by the separating axis theorem.
+//! The intersection test of a triangle and a box, by the separating axis theorem.
 
 use glam::DVec3;
 
 use crate::scene::Bounds;
 
-/// Whether the triangle meets the closed box.
+/// Returns whether the triangle meets the closed box.
 ///
-/// Two convex bodies are apart if and only if they are apart along a normal of a face of either, or along the product of
-/// an edge of one with an edge of the other (the separating axis theorem): three normals of the box, one of the
-/// triangle, nine products. A triangle that comes as near as rounding counts as meeting it.
+/// Two convex bodies are disjoint if and only if they are separated along a face normal of either,
+/// or along the cross product of an edge of one with an edge of the other (the separating axis
+/// theorem): three normals of the box, one of the triangle, nine products. A triangle within
+/// rounding error of the box counts as meeting it.
 pub(super) fn overlaps(corners: &[DVec3; 3], bounds: &Bounds) -> bool {
     let (center, half) = (bounds.center(), 0.5 * bounds.extent());
     let corners = corners.map(|corner| corner - center);
@@ -44,11 +45,12 @@ mod tests {
     #[test]
     fn known_cases() {
         let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
-        // A corner of the box within the triangle's bounds on every axis, but beyond its plane; then beyond an edge.
+        // The triangle's bounding box contains a corner of the box, which lies beyond the
+        // triangle's plane; then beyond an edge.
         assert!(!overlaps(&[3.1 * x, 3.1 * y, 3.1 * z], &UNIT) && overlaps(&[2.9 * x, 2.9 * y, 2.9 * z], &UNIT));
         let beside = |d: f64| [DVec3::new(2.0 + d, 0.0, 0.5), DVec3::new(d, 2.0, 0.5), DVec3::new(2.0 + d, 2.0, 0.5)];
         assert!(overlaps(&beside(-0.01), &UNIT) && !overlaps(&beside(0.01), &UNIT));
-        // Touching in a corner, an edge and a face; around the whole box; a point and a line.
+        // Contact in a corner, an edge and a face; a triangle around the whole box; points.
         assert!(overlaps(&[DVec3::ONE, 2.0 * DVec3::ONE, DVec3::new(3.0, 2.0, 2.0)], &UNIT));
         assert!(overlaps(&[DVec3::new(-9.0, -9.0, 1.0), DVec3::new(9.0, -9.0, 1.0), DVec3::new(0.0, 9.0, 1.0)], &UNIT));
         assert!(!overlaps(
@@ -65,7 +67,7 @@ mod tests {
         for _ in 0..4000 {
             let mut corner = || DVec3::new(3.0 * next() - 1.0, 3.0 * next() - 1.0, 3.0 * next() - 1.0);
             let corners = [corner(), corner(), corner()];
-            // How deep the deepest of many points of the triangle lies in the box, or how far outside.
+            // The largest depth in the box of many points of the triangle; negative outside.
             let mut depth = f64::NEG_INFINITY;
             for i in 0..=60 {
                 for j in 0..=60 - i {
@@ -79,7 +81,7 @@ mod tests {
                 assert!(found, "{corners:?}");
                 met += 1;
             } else if depth < -0.08 {
-                // Farther outside than samples are apart.
+                // The distance exceeds the spacing of the points.
                 assert!(!found, "{corners:?} {depth}");
                 missed += 1;
             }

@@ -1,4 +1,4 @@
-//! What makes a voxel worth a sample.
+//! The priorities of voxels.
 
 use std::str::FromStr;
 
@@ -9,44 +9,46 @@ use super::surface::{MeshSurface, Place};
 use super::voxels::{Patch, Voxel};
 use crate::error::Error;
 
-/// The priorities of voxels, one for each; samples are handed out in proportion. Replace it to sample by anything else.
+/// A function that returns one priority per voxel; the number of samples is proportional to it.
+/// Pass another function to sample by anything else.
 pub type PriorityFunction<'a> = dyn Fn(&MeshSurface<'_>, &[Voxel]) -> Vec<f64> + Sync + 'a;
 
-/// A priority that is built in.
+/// A built-in priority.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Priority {
-    /// The number of triangles, each counted in a voxel by the share of its area there.
+    /// The number of triangles, each weighted by the fraction of its area in the voxel.
     #[default]
     Triangles,
-    /// The number of triangles that have a part in the voxel, as in Tien 2008 (section 3.1): it favours voxels that the surface only just
-    /// reaches into.
+    /// The number of triangles that reach into the voxel, as in Tien 2008 (section 3.1). It favours
+    /// voxels that the surface only just reaches into.
     Touched,
-    /// The area of the surface.
+    /// The area of the surface in the voxel.
     Area,
-    /// The area times the variance of the normals, so with the square of the curvature.
+    /// The area times the variance of the normals, which grows with the square of the curvature.
     Curvature,
-    /// The area times the standard deviation of the colours, so with the gradient of the texture.
+    /// The area times the standard deviation of the colours, which grows with the gradient of the
+    /// texture.
     Texture,
 }
 
-/// What of the samples [`Priority::Curvature`] and [`Priority::Texture`] spread by area alone: a plane in one colour too is
-/// a surface that must be covered.
+/// The fraction of the samples that [`Priority::Curvature`] and [`Priority::Texture`] distribute by
+/// area alone, as a plane in one colour must be covered too.
 const EVEN: f64 = 0.25;
 
-/// Points of a voxel at which its colour is looked at.
+/// The points of a voxel at which its colour is evaluated.
 const PROBES: usize = 16;
 
 impl Priority {
-    /// Each priority with its name and what it is, for a command line's help.
+    /// Each priority with its name and its description in the command line's help.
     pub const ALL: [(Self, &'static str, &'static str); 5] = [
         (Self::Triangles, "triangles", "where the mesh has many"),
-        (Self::Touched, "touched", "the same, each counted wholly wherever it reaches"),
+        (Self::Touched, "touched", "the same, but each counts as one in every voxel that it reaches"),
         (Self::Area, "area", "evenly"),
         (Self::Curvature, "curvature", "where the surface bends"),
         (Self::Texture, "texture", "where the colour changes"),
     ];
 
-    /// The priorities of voxels.
+    /// Returns the priority of each voxel.
     pub fn of(self, surface: &MeshSurface<'_>, voxels: &[Voxel]) -> Vec<f64> {
         let share = |patch: &Patch| patch.area / surface.triangles[patch.triangle as usize].area;
         match self {
@@ -59,7 +61,8 @@ impl Priority {
     }
 }
 
-/// The area times a quantity, and so much of the area alone that the samples which follow it are the share [`EVEN`].
+/// The area times `quantity`, plus a multiple of the area that attracts the fraction [`EVEN`] of
+/// the samples.
 fn blended(voxels: &[Voxel], quantity: impl Fn(&Voxel) -> f64 + Sync) -> Vec<f64> {
     let weighted: Vec<f64> = voxels.par_iter().map(|voxel| voxel.area * quantity(voxel)).collect();
     let (sum, area) = (weighted.iter().sum::<f64>(), voxels.iter().map(|voxel| voxel.area).sum::<f64>());
@@ -67,14 +70,14 @@ fn blended(voxels: &[Voxel], quantity: impl Fn(&Voxel) -> f64 + Sync) -> Vec<f64
     weighted.iter().zip(voxels).map(|(weighted, voxel)| weighted + even * voxel.area).collect()
 }
 
-/// The variance of the unit normals, by area.
+/// The variance of the unit normals, weighted by area.
 fn bend(surface: &MeshSurface<'_>, voxel: &Voxel) -> f64 {
     let normals = voxel.patches.iter().map(|patch| surface.triangles[patch.triangle as usize].normal * patch.area);
     let mean = normals.sum::<DVec3>() / voxel.area;
     (1.0 - mean.length_squared()).max(0.0)
 }
 
-/// The standard deviation of the linear colours over a few points.
+/// The standard deviation of the linear colours at [`PROBES`] points.
 fn contrast(surface: &MeshSurface<'_>, voxel: &Voxel) -> f64 {
     let places = super::candidates::spread(voxel, PROBES, [0.5; 3]);
     let colors: Vec<DVec3> = places

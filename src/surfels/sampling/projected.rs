@@ -1,8 +1,9 @@
-//! Samples where Tien 2008 places them (section 3.2): points in each voxel, projected onto its triangles. A baseline for what [`relax`] does
-//! beyond that.
+//! Samples at the points that Tien 2008 uses (section 3.2): points in each voxel, projected onto
+//! its triangles. A baseline for [`relax`].
 //!
-//! The thesis does not say where in a voxel points are. Here one is at the middle; several are spread over the box by the multiples of the
-//! powers of 1 / g, modulo 1, with g⁴ = g + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), from the middle on.
+//! The thesis does not say where in a voxel the points are. Here the first one is at the centre.
+//! Further ones are spread over the box by adding multiples of the powers of 1 / g, modulo 1, with
+//! g⁴ = g + 1 (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences").
 //!
 //! [`relax`]: mod@super::relax
 
@@ -13,10 +14,11 @@ use super::surface::{MeshSurface, Place};
 use super::voxels::Voxel;
 use crate::truth::nearest::closest_weights;
 
-/// Powers of 1 / g.
+/// The first three powers of 1 / g.
 const STEP: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_1);
 
-/// `quotas` samples in each voxel, each at the nearest point of the triangles that the voxel holds parts of.
+/// Places `quotas` samples in each voxel, each at the nearest point of the triangles that reach
+/// into the voxel.
 pub(super) fn places(surface: &MeshSurface<'_>, voxels: &[Voxel], quotas: &[usize]) -> Vec<Place> {
     let of_voxel = |(voxel, quota): (&Voxel, &usize)| {
         let point = |k: usize| {

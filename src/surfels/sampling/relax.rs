@@ -1,4 +1,4 @@
-//! Samples move apart until each is in the middle of the surface that is nearest to it.
+//! Relaxation: samples move apart until each is near the centroid of its part of the surface.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,11 +15,11 @@ use crate::truth::nearest::closest_weights;
 /// Rounds of relaxation.
 const ROUNDS: usize = 10;
 
-/// The candidates that are nearest to each sample.
+/// The candidates nearest to each sample.
 pub(super) struct Cells {
-    /// Candidates, sample by sample.
+    /// Indices of candidates, sorted by sample.
     members: Vec<u32>,
-    /// Where each sample's begin in `members`, and where the last one's end.
+    /// The start of each sample's candidates in `members`, and the end of the last one's.
     starts: Vec<usize>,
 }
 
@@ -27,7 +27,7 @@ impl Cells {
     fn new(surface: &MeshSurface<'_>, candidates: &[Candidate], samples: &[Place]) -> Result<Self> {
         let points: Vec<[f64; 3]> = samples.par_iter().map(|place| surface.point(*place).to_array()).collect();
         let distinct = DistinctPositions::new(&points, &surface.bounds, DVec3::ZERO)?;
-        // Samples that coincide are one; the first has the cell, the others stay where they are.
+        // The first of several coincident samples gets the cell; the others stay where they are.
         let mut sample_at = vec![u32::MAX; distinct.len()];
         for (sample, &position) in distinct.of_point().iter().enumerate().rev() {
             sample_at[position as usize] = sample as u32;
@@ -64,10 +64,10 @@ impl Cells {
     }
 }
 
-/// Moves each sample to the point of its own part of the surface that is nearest to that part's centroid (Lloyd 1982), in
-/// rounds; and tells which part each then has.
+/// Moves each sample, [`ROUNDS`] times, to the point of its part of the surface that is nearest to
+/// that part's centroid (Lloyd 1982). Returns the final parts.
 ///
-/// A few rounds are far from the rest that Lloyd's method ends in, and keep the samples' density; see [`ROUNDS`].
+/// These few rounds keep the samples' density; Lloyd's method would converge only much later.
 pub(super) fn relax(
     surface: &MeshSurface<'_>,
     candidates: &[Candidate],
@@ -88,7 +88,8 @@ pub(super) fn relax(
     Cells::new(surface, candidates, samples)
 }
 
-/// The centroid of some candidates, projected onto the nearest of their triangles. None for no candidates.
+/// The centroid of some candidates, projected onto the nearest of their triangles. None if there
+/// are no candidates.
 fn middle<'a>(surface: &MeshSurface<'_>, cell: impl Iterator<Item = &'a Candidate> + Clone) -> Option<Place> {
     let count = cell.clone().count();
     let centroid = cell.clone().map(|candidate| candidate.point(surface)).sum::<DVec3>() / count as f64;
@@ -103,7 +104,8 @@ fn middle<'a>(surface: &MeshSurface<'_>, cell: impl Iterator<Item = &'a Candidat
     places.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, place)| place)
 }
 
-/// The mean colour of each sample's cell: the surface's colours without what is too fine for the samples.
+/// Returns the mean colour of each sample's cell: the surface's colours without details too fine
+/// for the samples.
 pub(super) fn colors(
     surface: &MeshSurface<'_>,
     candidates: &[Candidate],

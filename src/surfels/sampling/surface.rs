@@ -1,4 +1,5 @@
-//! The surface that is sampled: the triangles of a mesh that have an area, and what the mesh says at a point of them.
+//! The surface that is sampled: the triangles of a mesh that have an area, and the mesh's
+//! attributes at points of them.
 
 use glam::DVec3;
 
@@ -10,25 +11,25 @@ use crate::surfels::LARGEST_COORDINATE;
 /// A triangle that has an area.
 #[derive(Clone, Debug)]
 pub struct Facet {
-    /// Relative to the surface's centre, world units.
+    /// The corners, relative to the surface's centre, world units.
     pub corners: [DVec3; 3],
-    /// Unit.
+    /// Unit normal.
     pub normal: DVec3,
-    /// Square world units.
+    /// The area, square world units.
     pub area: f64,
-    /// Which of the mesh's triangles.
+    /// The index among the mesh's triangles.
     pub index: usize,
 }
 
 /// The triangles of a mesh that can be sampled.
 pub struct MeshSurface<'a> {
-    /// Where they are from.
+    /// The mesh that they belong to.
     pub mesh: &'a Mesh,
-    /// World coordinates of the point that all others are relative to.
+    /// The point that all positions are relative to: the middle of the bounds, world coordinates.
     pub center: DVec3,
-    /// Of the triangles, relative to the centre.
+    /// The bounds of the triangles, relative to the centre.
     pub bounds: Bounds,
-    /// The triangles.
+    /// The triangles that have an area.
     pub triangles: Vec<Facet>,
     /// Triangles left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
@@ -37,11 +38,11 @@ pub struct MeshSurface<'a> {
 }
 
 impl<'a> MeshSurface<'a> {
-    /// The triangles of `mesh` that have an area.
+    /// Collects the triangles of `mesh` that have an area.
     ///
     /// # Errors
     ///
-    /// [`Error::EmptyScene`] if there is none, and what [`Mesh::check`] fails with.
+    /// [`Error::EmptyScene`] if there is none, and the errors of [`Mesh::check`].
     pub fn new(mesh: &'a Mesh) -> Result<Self> {
         mesh.check()?;
         let corner = |vertex: &u32| DVec3::from(mesh.positions[*vertex as usize]);
@@ -77,18 +78,19 @@ impl<'a> MeshSurface<'a> {
         Ok(Self { mesh, center, bounds, triangles, dropped_non_finite, dropped_flat })
     }
 
-    /// Square world units.
+    /// The sum of the triangles' areas, square world units.
     pub fn area(&self) -> f64 {
         self.triangles.iter().map(|triangle| triangle.area).sum()
     }
 
-    /// The point with these corner weights, relative to the centre.
+    /// The position of a point, relative to the centre, world units.
     pub(super) fn point(&self, at: Place) -> DVec3 {
         let [a, b, c] = self.triangles[at.triangle as usize].corners;
         a * at.weights.x + b * at.weights.y + c * at.weights.z
     }
 
-    /// The unit normal there: that of the corners, interpolated, or, where they are missing or cancel, the triangle's.
+    /// The unit normal of a point: interpolated from the corners' normals, or the triangle's if
+    /// these are missing or cancel.
     pub(super) fn normal(&self, at: Place) -> DVec3 {
         let facet = &self.triangles[at.triangle as usize];
         let unit = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero();
@@ -97,18 +99,20 @@ impl<'a> MeshSurface<'a> {
         mean.and_then(DVec3::try_normalize).unwrap_or(facet.normal)
     }
 
-    /// Texture coordinates there, if the mesh has any.
+    /// The texture coordinates of a point, if the mesh has any.
     pub(super) fn texture(&self, at: Place) -> Option<[f32; 2]> {
         self.mesh.texture_at(self.triangles[at.triangle as usize].index, at.weights)
     }
 
-    /// Which of the mesh's triangles a point is on.
+    /// The index of a point's triangle among the mesh's triangles.
     pub(super) fn index(&self, at: Place) -> usize {
         self.triangles[at.triangle as usize].index
     }
 
-    /// The number of each of the mesh's triangles' texture, if there are several, or some triangles
-    /// have none or no place in it; [`u32::MAX`] means none.
+    /// Returns the texture number of each of the mesh's triangles, [`u32::MAX`] for none; None if
+    /// the mesh has no texture coordinates, or all triangles have the same texture.
+    ///
+    /// A triangle whose texture coordinates are not finite has none.
     pub(super) fn texture_numbers(&self) -> Option<Vec<u32>> {
         let places = self.mesh.texture.as_ref()?;
         let (textures, numbers) = self.mesh.textures();
@@ -121,12 +125,12 @@ impl<'a> MeshSurface<'a> {
         (textures.len() > 1 || numbers.iter().any(|number| *number != 0)).then_some(numbers)
     }
 
-    /// Whether the mesh says anything of colours.
+    /// Whether the mesh has colours of vertices, faces or materials.
     pub fn is_colored(&self) -> bool {
         self.mesh.colors.is_some() || self.mesh.face_colors.is_some() || self.mesh.material.is_some()
     }
 
-    /// The colour there: linear RGB, straight alpha.
+    /// The colour of a point: linear RGB, straight alpha.
     pub(super) fn color(&self, at: Place) -> [f32; 4] {
         self.mesh.color_at(self.triangles[at.triangle as usize].index, at.weights)
     }
@@ -135,8 +139,8 @@ impl<'a> MeshSurface<'a> {
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
-    /// Which of [`MeshSurface::triangles`].
+    /// An index into [`MeshSurface::triangles`].
     pub triangle: u32,
-    /// Of its corners; their sum is 1.
+    /// The weights of the triangle's corners; their sum is 1.
     pub weights: DVec3,
 }

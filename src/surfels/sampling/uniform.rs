@@ -1,12 +1,12 @@
-//! Independent random points, evenly by area: the baseline of every other way to sample.
+//! Independent random points, uniform by area: the baseline of all other methods.
 
 use glam::DVec3;
 
 use super::surface::{MeshSurface, Place};
 use crate::random::Random;
 
-/// `count` points of the surface: each a triangle with a probability in proportion to its area, and in it a point evenly
-/// (Turk 1990).
+/// Returns `count` points of the surface: random triangles with probabilities proportional to their
+/// areas, and a uniformly distributed point in each (Turk 1990).
 pub(super) fn places(surface: &MeshSurface<'_>, count: usize, seed: u64) -> Vec<Place> {
     let mut end = 0.0;
     let ends: Vec<f64> = surface

@@ -1,12 +1,15 @@
-//! The part of the surface that is nearest to each sample, exactly: the Voronoi diagram of the samples, restricted to the
-//! triangles (Yan et al. 2009, "Isotropic remeshing with fast and exact computation of restricted Voronoi diagram").
+//! The exact Voronoi diagram of the samples restricted to the surface: for each sample, the part of
+//! the triangles that is nearest to it (Yan et al. 2009, "Isotropic remeshing with fast and exact
+//! computation of restricted Voronoi diagram").
 //!
-//! In a triangle the cell of a sample is a convex polygon: the triangle, cut by planes halfway to other samples. From one cell
-//! the next are those across the cuts.
+//! Within a triangle the cell of a sample is a convex polygon: the triangle, cut by the bisector
+//! planes to other samples. Starting from one cell, the search continues with the samples across
+//! its cuts.
 //!
-//! Where a surface has a sharp edge, or is thin, the nearest sample may be one of another side, whose disk is seen edge-on from
-//! where the triangle is seen best: however large, it covers nothing there. So a triangle is shared among the samples of its own
-//! side alone, and of those to which the surface goes on from it without an edge, as long as there are some near enough.
+//! At a sharp edge or on a thin surface, the nearest sample may be on another side, and its disk is
+//! edge-on from where the triangle is seen best: however large, it covers nothing there. So a
+//! triangle is divided only among samples on its own side that the surface reaches from it without
+//! an edge, as long as some are near enough.
 
 use std::collections::HashSet;
 
@@ -19,30 +22,35 @@ use crate::surfels::graph::NeighbourGraph;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 use crate::surfels::positions::DistinctPositions;
 
-/// Neighbours that a cell is cut by at first, and among which a sample of a triangle's own side mostly is. All that matter are
-/// among them unless a triangle reaches far past the samples around, or these are spaced unevenly.
+/// The number of neighbours that cut a cell at first, and among which a sample on a triangle's own
+/// side is usually found. They include all that matter unless a triangle reaches far past the
+/// samples around it, or samples are spaced unevenly.
 const NEIGHBOURS: usize = 16;
 
-/// The same at the tip of a sharp corner, where samples of all sides crowd: one of its own side is among so many,
+/// The number of neighbours searched at the tip of a sharp corner, where samples of all sides
+/// crowd.
 const MANY: usize = 64;
 
-/// and at most so many times as far as the last of those. Others are of another part of the surface.
+/// A sample among [`MANY`] counts only within this many times the distance of the last of
+/// [`NEIGHBOURS`]. Farther ones belong to another part of the surface.
 const FARTHER: f64 = 1.5;
 
-/// A sample must be nearer by this part of the distance to cut off a corner: rounding decides nothing.
+/// A sample must be nearer by this fraction of the distance to cut off a corner, so that rounding
+/// decides nothing.
 const NEARER: f64 = 1e-9;
 
-/// The cosine of the angle between two triangles up to which they are on one side of the surface: 55 degrees, more than there is
-/// between neighbours on a scan that is rough, less than at the edges of regular bodies.
+/// The cosine of 55 degrees: two triangles at a smaller angle are on one side of the surface. The
+/// angle is larger than those between neighbours on a rough scan, and smaller than those at the
+/// edges of regular bodies.
 pub(super) const SIDE: f64 = 0.5736;
 
-/// The samples, and what their cells are cut out with.
+/// The samples, and the searches that cut out their cells.
 pub(super) struct Voronoi<'a> {
     surface: &'a MeshSurface<'a>,
     distinct: &'a DistinctPositions,
     /// The triangle that each position lies in.
     triangles: &'a [u32],
-    /// Of each triangle, which others the surface goes on to.
+    /// The patch number of each triangle; equal where the surface continues without an end between.
     patches: &'a [u32],
     graph: NeighbourGraph,
     one: NeighbourSearch<'a>,
@@ -63,17 +71,17 @@ impl<'a> Voronoi<'a> {
         Self { surface, distinct, triangles, patches, graph, one, several, many }
     }
 
-    /// Where a sample is, world units relative to the surface's centre.
+    /// The position of a sample, world units relative to the surface's centre.
     pub fn position(&self, sample: u32) -> DVec3 {
         self.distinct.position(sample) / self.scale()
     }
 
-    /// Scaled units for each of the world's.
+    /// Scaled units per world unit.
     pub fn scale(&self) -> f64 {
         self.distinct.scale()
     }
 
-    /// Whether a triangle is on the side of the surface that a sample is on.
+    /// Whether a triangle is on the same side of the surface as a sample.
     pub fn is_of_side(&self, sample: u32, triangle: &Facet) -> bool {
         self.facet(sample).dot(triangle.normal) > SIDE
     }
@@ -83,8 +91,11 @@ impl<'a> Voronoi<'a> {
         self.surface.triangles[self.triangles[sample as usize] as usize].normal
     }
 
-    /// What `measure` says of each part of a cell, and whose cell that is; in the order of triangles. A part lies in one triangle
-    /// and is told by its corners relative to the sample, scaled units.
+    /// Returns `measure` of each part of each cell, with the sample whose cell it is, in the order
+    /// of triangles.
+    ///
+    /// A part lies in one triangle. `measure` gets its sample, its triangle, and its corners
+    /// relative to the sample in scaled units.
     pub fn measure<T: Send>(
         &self,
         progress: &dyn Progress,
@@ -113,8 +124,8 @@ impl<'a> Voronoi<'a> {
         measured
     }
 
-    /// The parts of a triangle that are nearest to each of those samples that may have some. None where there is no such
-    /// sample among the nearest ones.
+    /// Divides a triangle among the samples that `may` have a part. None if there is no such sample
+    /// among the nearest ones.
     fn parts(
         &self,
         triangle: &Facet,
@@ -147,7 +158,8 @@ impl<'a> Voronoi<'a> {
             let mut is_whole = false;
             for &other in self.graph.of(sample) {
                 let position = self.distinct.position(other);
-                // What lies twice as far as the farthest corner, or farther, is not nearer to any.
+                // A sample twice as far as the farthest corner, or farther, is nearer to no point
+                // of the cell.
                 is_whole = position.distance(center) >= 2.0 * cell.reach(center);
                 if is_whole || cell.corners.is_empty() {
                     break;
@@ -156,7 +168,7 @@ impl<'a> Voronoi<'a> {
                     cell.cut(center, position, other);
                 }
             }
-            // All corners of a convex polygon are in a convex cell where the polygon is.
+            // A convex polygon lies in a convex cell exactly if all its corners do.
             while !is_whole && !cell.corners.is_empty() {
                 let mut beyond = None;
                 for &corner in &cell.corners {
@@ -167,7 +179,7 @@ impl<'a> Voronoi<'a> {
                         break;
                     }
                 }
-                // A cut that rounding makes none is none.
+                // If rounding makes the cut remove nothing, the cell is done.
                 is_whole = !beyond.is_some_and(|other| cell.cut(center, self.distinct.position(other), other));
             }
             open.extend(cell.cut_by.iter().flatten().filter(|other| seen.insert(**other)));
@@ -177,11 +189,11 @@ impl<'a> Voronoi<'a> {
     }
 }
 
-/// What one triangle after the other is cut in.
+/// Buffers that are reused from triangle to triangle.
 #[derive(Default)]
 struct Scratch {
     found: Vec<Neighbour>,
-    /// The samples whose cells were cut out, or shall be.
+    /// The samples whose cells are done or in `open`.
     seen: HashSet<u32>,
     open: Vec<u32>,
 }
@@ -189,17 +201,19 @@ struct Scratch {
 /// A convex polygon in a triangle's plane.
 struct Polygon {
     corners: Vec<DVec3>,
-    /// Of the edge from the corner of the same index to the next: the sample beyond it. None for the triangle's own.
+    /// The sample beyond the edge from the corner of the same index to the next; None for the
+    /// triangle's own edges.
     cut_by: Vec<Option<u32>>,
 }
 
 impl Polygon {
-    /// The distance of the farthest corner.
+    /// The largest distance of a corner from `center`.
     fn reach(&self, center: DVec3) -> f64 {
         self.corners.iter().map(|corner| corner.distance(center)).fold(0.0, f64::max)
     }
 
-    /// Keeps what is nearer to `center` than to `position`, where the sample `other` is. Tells whether that is less.
+    /// Removes what is nearer to the sample `other` at `position` than to `center`; returns whether
+    /// it removed anything.
     fn cut(&mut self, center: DVec3, position: DVec3, other: u32) -> bool {
         let (middle, across) = (0.5 * (center + position), position - center);
         let beyond: Vec<f64> = self.corners.iter().map(|corner| (corner - middle).dot(across)).collect();

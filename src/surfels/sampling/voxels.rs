@@ -1,4 +1,4 @@
-//! A mesh as the voxels that it passes through, and the part of it in each.
+//! The voxels that a mesh passes through, and the part of the mesh in each.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -7,40 +7,42 @@ use super::overlap::overlaps;
 use super::surface::MeshSurface;
 use crate::scene::Bounds;
 
-/// A leaf of the tree: a box, and what of the surface lies in it.
+/// A leaf of the tree: a box, and the part of the surface in it.
 #[derive(Clone, Debug)]
 pub struct Voxel {
-    /// World units, relative to the surface's centre.
+    /// The box, relative to the surface's centre, world units.
     pub bounds: Bounds,
-    /// The parts of triangles in the box; the parts of all voxels together are the surface.
+    /// The parts of triangles in the box. The parts of all voxels together are the surface.
     pub patches: Vec<Patch>,
-    /// Their area, square world units.
+    /// The area of the patches, square world units.
     pub area: f64,
 }
 
 /// The part of a triangle that lies in a voxel.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    /// Which of the surface's triangles.
+    /// The index among the surface's triangles.
     pub triangle: u32,
-    /// Square world units.
+    /// The area of the part, square world units.
     pub area: f64,
-    /// The corners of a convex polygon, each as the weights of the triangle's corners.
+    /// The corners of the part, a convex polygon, each as the weights of the triangle's corners.
     pub(super) outline: Vec<DVec3>,
 }
 
-/// A node of the tree on its way to become voxels.
+/// A node of the tree: its box, and the triangles that meet it.
 struct Cell {
     bounds: Bounds,
     triangles: Vec<u32>,
 }
 
-/// How often boxes are halved at most: 2^60 times the volume.
+/// The largest number of halvings: a voxel has at least 2^-60 of the box's volume.
 const DEEPEST: u32 = 60;
 
-/// The voxels of a surface (Tien 2008, section 3.1): its box is halved across its longest side, and the halves in turn, those
-/// that no triangle meets left out. It ends after `depth` halvings, or before there would be more than `most` voxels. Returns
-/// them and the halvings.
+/// Divides a surface into voxels (Tien 2008, section 3.1); returns them and the number of halvings.
+///
+/// Its bounding box is halved across its longest side, and the halves in turn; halves that meet no
+/// triangle are dropped. This ends after `depth` halvings, or before there would be more than
+/// `most` voxels.
 pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> (Vec<Voxel>, u32) {
     let all = (0..surface.triangles.len() as u32).collect();
     let mut cells = vec![Cell { bounds: surface.bounds, triangles: all }];
@@ -57,7 +59,8 @@ pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize)
     (voxels.filter(|voxel| voxel.area > 0.0).collect(), halvings)
 }
 
-/// A triangle that lies in the plane between the halves belongs to the upper one.
+/// Returns the halves that meet triangles. A triangle in the plane between the halves belongs to
+/// the upper one.
 fn halves(surface: &MeshSurface<'_>, cell: &Cell) -> impl Iterator<Item = Cell> + use<> {
     let extent = cell.bounds.extent();
     let axis = if extent.x >= extent.y.max(extent.z) {
@@ -95,13 +98,14 @@ fn voxel(surface: &MeshSurface<'_>, cell: Cell) -> Voxel {
     Voxel { bounds: cell.bounds, area: patches.iter().map(|patch| patch.area).sum(), patches }
 }
 
-/// The part of a triangle in a box, as corner weights: the triangle is cut by each of the six planes in turn.
+/// The part of a triangle in a box, as corner weights: the triangle is cut by each of the six
+/// planes in turn.
 fn clipped(corners: &[DVec3; 3], bounds: &Bounds) -> Vec<DVec3> {
     let mut outline = vec![DVec3::X, DVec3::Y, DVec3::Z];
     for axis in DVec3::AXES {
         let coordinate = DVec3::new(corners[0].dot(axis), corners[1].dot(axis), corners[2].dot(axis));
         for (sign, limit) in [(1.0, bounds.max.dot(axis)), (-1.0, bounds.min.dot(axis))] {
-            // Not positive inside.
+            // The signed distance outside the plane.
             let beyond = |weights: DVec3| sign * (coordinate.dot(weights) - limit);
             let mut kept = Vec::with_capacity(outline.len() + 1);
             for (k, &at) in outline.iter().enumerate() {
@@ -120,13 +124,14 @@ fn clipped(corners: &[DVec3; 3], bounds: &Bounds) -> Vec<DVec3> {
     outline
 }
 
-/// The area of a polygon of corner weights, as a share of the triangle.
+/// The area of a polygon of corner weights, as a fraction of the triangle's.
 fn share(outline: &[DVec3]) -> f64 {
     let Some(&first) = outline.first() else { return 0.0 };
     outline.windows(2).map(|pair| fan_share(first, pair[0], pair[1])).sum()
 }
 
-/// The same of a triangle in it. Weights sum to one, so the plane of the first two shows areas as twice their share.
+/// The area of a triangle of corner weights, as a fraction of the whole triangle's. Weights sum to
+/// one, and in the plane of the first two, the whole triangle has the area 1/2.
 pub(super) fn fan_share(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     (b - a).truncate().perp_dot((c - a).truncate()).abs()
 }
@@ -169,7 +174,8 @@ mod tests {
         };
         let (bounded, halvings) = of(60, 1000);
         assert!(bounded.len() <= 1000 && bounded.len() > 300 && halvings < 20, "{} {halvings}", bounded.len());
-        // What is bounded is what the halvings that are left would make, and a bound that is not met changes nothing.
+        // A bounded division equals one with the remaining halvings; a bound that is not reached
+        // changes nothing.
         assert_eq!(of(halvings, usize::MAX), (bounded, halvings));
         assert_eq!(of(7, usize::MAX), of(7, 1000));
     }

@@ -1,14 +1,19 @@
-//! Sizes from clusters of three points, by a binary space partition along principal axes.
+//! Sizes from clusters of three points, by binary space partition along principal axes.
 //!
-//! From "a simple scheme to render point-sampled surfaces", section 3.3: a set of points is split by a plane across the
-//! eigenvector of its covariance's greatest eigenvalue, and its halves again, until a cluster holds exactly three points
-//! that are not collinear; the triangle they span gives the size of all three. The paper finds such clusters by their
-//! eigenvalues l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 + l1 + l2) = 0, and they are collinear if
-//! l1 is zero as well. It does not say where the plane lies; here it parts off a multiple of three of the points, as near
-//! to the middle as there is one, so that all clusters but the last have three, and that one up to five.
+//! The source is "a simple scheme to render point-sampled surfaces", section 3.3. A plane across
+//! the eigenvector of the largest eigenvalue of its covariance splits a set of points, then its
+//! halves, until a cluster holds exactly three points that are not collinear. The triangle that
+//! they span gives the size of all three. The paper finds such clusters by their eigenvalues
+//! l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 + l1 + l2) = 0, and are
+//! collinear if l1 is zero as well.
 //!
-//! As the section is written ([`common_radius`]) all surfels have one radius. Planes lie at centroids, as in the clustering that it goes by
-//! (Pauly et al. 2002), so clusters end with one to three points; of those with three that are not collinear the mean is taken.
+//! The paper does not say where the plane lies. In [`bsp_radii`] it splits off a multiple of three
+//! points, as near to the middle as possible, so that all clusters but the last have three points,
+//! and the last one up to five.
+//!
+//! In [`common_radius`] all surfels have one radius, as in the section to the letter. Planes go
+//! through centroids, as in the clustering that it is based on (Pauly et al. 2002), so clusters end
+//! with one to three points. The radius is the mean over those of three that are not collinear.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -18,7 +23,7 @@ use crate::Progress;
 use crate::surfels::eigen::Symmetric3;
 use crate::surfels::positions::DistinctPositions;
 
-/// A position in a cluster: how far it is along the axis that is split, and at last its size.
+/// A position in a cluster, with its coordinate along the axis of the split, and finally its size.
 #[derive(Clone, Copy)]
 struct Member {
     value: f64,
@@ -31,11 +36,14 @@ const SEQUENTIAL: usize = 4096;
 /// A cluster of fewer points than this is not split.
 const TWO_TRIANGLES: usize = 6;
 
-/// Below this ratio of l1 to l2 three points are collinear, as far as rounded coordinates tell.
+/// Three points are collinear if the ratio of l1 to l2 is below this, within the rounding of
+/// coordinates.
 const COLLINEAR: f64 = 1e-12;
 
-/// The radius of each position's disk, scaled units, and how many positions have only collinear ones in their cluster:
-/// those take the mean length of the edges. Zero for a position that is alone.
+/// Returns the radius of each position's disk, scaled units, and the number of positions whose
+/// cluster is collinear.
+///
+/// Positions in such a cluster get the mean length of the edges; a position that is alone gets 0.
 pub(crate) fn bsp_radii(distinct: &DistinctPositions, triangle: Triangle, progress: &dyn Progress) -> (Vec<f64>, u64) {
     progress.begin("splitting into clusters", distinct.len() as u64);
     let mut members: Vec<Member> =
@@ -49,7 +57,8 @@ pub(crate) fn bsp_radii(distinct: &DistinctPositions, triangle: Triangle, progre
     (radii, collinear)
 }
 
-/// Splits until the clusters are small enough, and gives their members sizes; how many of them are collinear.
+/// Splits a cluster until its parts are small enough and sets the sizes of its members. Returns the
+/// number of members in collinear clusters.
 fn split(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member], progress: &dyn Progress) -> u64 {
     let count = cluster.len();
     if count < TWO_TRIANGLES {
@@ -68,24 +77,27 @@ fn split(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member
     low + high
 }
 
-/// How far each member lies from the centroid along the axis of the greatest variance.
+/// Sets `value` to the offset of each member from the centroid along the axis of the largest
+/// variance.
 fn along_principal_axis(distinct: &DistinctPositions, cluster: &mut [Member]) {
     let at = |member: &Member| distinct.position(member.index);
     let mean = cluster.iter().map(at).sum::<DVec3>() / cluster.len() as f64;
     let largest = cluster.iter().fold(0.0, |m: f64, member| m.max((at(member) - mean).abs().max_element()));
-    // Of about one, so that squares are as exact for small clusters as for large ones. Distinct positions have an extent.
+    // Offsets are scaled to at most 1, so that squares are as exact for small clusters as for large
+    // ones. Positions are distinct, so `largest` is not 0.
     let (_, axes) = Symmetric3::scatter(cluster.iter().map(|member| (at(member) - mean) / largest)).eigen();
     for member in &mut *cluster {
         member.value = axes[2].dot(at(member) - mean);
     }
 }
 
-/// Gives the members of a cluster of up to five points their sizes; how many of them are collinear.
+/// Sets the sizes of the members of a cluster of up to five points. Returns the number of those in
+/// collinear clusters.
 fn measure(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member]) -> u64 {
     let corners: Vec<DVec3> = cluster.iter().map(|member| distinct.position(member.index)).collect();
     let mut collinear = 0;
     for (own, member) in corners.iter().zip(cluster) {
-        // In a cluster of three these are all of it.
+        // The edges to the other members. In a cluster of three, the two shortest are all of them.
         let mut edges: Vec<DVec3> =
             corners.iter().map(|corner| corner - own).filter(|edge| *edge != DVec3::ZERO).collect();
         edges.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
@@ -105,12 +117,12 @@ fn measure(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Memb
     collinear
 }
 
-/// Sums over the clusters of a part.
+/// Sums over the clusters of one part of the tree.
 #[derive(Clone, Copy, Default)]
 struct Clusters {
-    /// Sizes of clusters that span a triangle, and how many they are.
+    /// The sum of the sizes of clusters that span a triangle, and their number.
     triangles: (f64, u64),
-    /// Lengths of edges between points of others.
+    /// The sum of the edge lengths of other clusters, and their number.
     edges: (f64, u64),
 }
 
@@ -121,8 +133,10 @@ impl Clusters {
     }
 }
 
-/// One radius for all positions, scaled units: the mean of the clusters of three; where none spans a triangle that of the edges in
-/// clusters, and 0 where there is none either.
+/// Returns one radius for all positions, scaled units: the mean size of the clusters of three.
+///
+/// If none spans a triangle, it is the mean length of the edges in clusters; if there are no edges,
+/// 0.
 pub(crate) fn common_radius(distinct: &DistinctPositions, triangle: Triangle, progress: &dyn Progress) -> f64 {
     progress.begin("splitting into clusters", distinct.len() as u64);
     let mut members: Vec<Member> = (0..distinct.len() as u32).map(|index| Member { value: 0.0, index }).collect();
@@ -135,8 +149,10 @@ pub(crate) fn common_radius(distinct: &DistinctPositions, triangle: Triangle, pr
     }
 }
 
-/// Splits at centroids until clusters have three points at most. Each cut leaves points on both sides, and coordinates have too few digits and
-/// exponents for thousands of cuts in a row that part off a point or two.
+/// Splits a cluster at centroids until its parts have at most three points.
+///
+/// The recursion depth is limited: each cut leaves points on both sides, and coordinates have too
+/// few digits and exponents for thousands of successive cuts that split off only a point or two.
 fn split_at_means(
     distinct: &DistinctPositions,
     triangle: Triangle,
@@ -160,7 +176,8 @@ fn split_at_means(
     }
     along_principal_axis(distinct, cluster);
     cluster.sort_unstable_by(|a, b| a.value.total_cmp(&b.value).then(a.index.cmp(&b.index)));
-    // Of points whose differences are below the mean's rounding all may lie on one side of it.
+    // If the points differ by less than the rounding error of the mean, all may lie on one side of
+    // it.
     let middle = match cluster.partition_point(|member| member.value < 0.0) {
         below if below == 0 || below == count => count / 2,
         below => below,
@@ -179,10 +196,11 @@ fn mean_edge(a: DVec3, b: DVec3) -> f64 {
     (a.length() + b.length() + a.distance(b)) / 3.0
 }
 
-/// The size of the triangle with corners at 0, `a` and `b`, or None if they are collinear.
+/// The size of the triangle with corners at 0, `a` and `b`; None if they are collinear.
 fn triangle_size(triangle: Triangle, a: DVec3, b: DVec3) -> Option<f64> {
     let longest = a.length().max(b.length()).max(a.distance(b));
-    // In units of the longest edge: l1 l2 is the squared area over 3 of the scatter matrix, and l2 is 1/2 to 2/3.
+    // The unit is the longest edge. The scatter matrix has l1 l2 = (doubled area)^2 / 3, and l2 is
+    // 1/2 to 2/3, so (doubled area)^2 is l1 / l2 within a third.
     let (a, b) = (a / longest, b / longest);
     let doubled_area = a.cross(b).length();
     if doubled_area * doubled_area <= COLLINEAR {

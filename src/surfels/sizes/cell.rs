@@ -5,51 +5,61 @@ use glam::DVec3;
 use crate::surfels::ellipse::Ellipse;
 use crate::surfels::gaps::{Cell, is_beside};
 
-/// How many neighbours the distance is the mean of that sizes go by: the first two rings of a square grid.
+/// The number of neighbours whose mean distance is the unit of sizes: the first two rings of a
+/// square grid.
 pub(crate) const RADIUS_NEIGHBOURS: usize = 8;
 
-/// Half-axes are at least so many mean distances long where neighbours are all around.
+/// The least half-axis of a point with neighbours all around, in mean distances.
 const LEAST: f64 = 0.6;
 
-/// Where nothing is known on one side, they are at least so many mean distances long: 1.2 spacings on a square grid.
+/// The least half-axis of a point without neighbours on one side, in mean distances: 1.2 spacings
+/// on a square grid.
 const LEAST_OPEN: f64 = 1.0;
 
-/// A disk reaches past the corners of its cell by at least this factor, where neighbours lie in its plane and none is missing.
+/// The least factor by which a disk reaches past the corners of its cell: for neighbours in its
+/// plane, and none missing.
 const PAST_CORNER: f64 = 1.1;
 
-/// The factor grows by so much times the mean square of the sines of the neighbours' elevations over the plane: where a surface bends,
-/// disks leave gaps between them, seen from the side.
+/// The factor grows by this much times the mean squared sine of the neighbours' elevations over the
+/// plane. Where a surface is curved, gaps open between its disks, seen from the side.
 const PER_BEND: f64 = 3.0;
 
-/// The factor grows by so much for each mean distance by which a corner is farther than one: where points are random, cells of several
-/// are ragged at once. Beyond 1.5 [`LARGEST`] bounds what it adds.
+/// The factor grows by this much per mean distance by which the farthest corner is farther than
+/// one: where points are random, several cells are ragged at once. Beyond 1.5 mean distances,
+/// [`LARGEST`] limits the disk.
 const PER_GAP: f64 = 0.3;
 
-/// The factor never becomes larger. This one everywhere costs vertices of eleven models 0.4 dB: disks stand out past outlines.
+/// The largest factor. Used everywhere, it would cost 0.4 dB on the vertices of eleven models:
+/// disks stand out past outlines.
 const MOST_PAST_CORNER: f64 = 1.35;
 
-/// Where the cell ends that no neighbour bounds, in distances to the farthest neighbour: a corner beyond is of no gap that they know.
+/// Clip radius of an unbounded cell, in distances to the farthest neighbour. A corner beyond it
+/// does not belong to a gap between the neighbours.
 const CELL_REACH: f64 = 1.5;
 
-/// No disk becomes larger than so many mean distances for the sake of its cell. At a ragged boundary corners lie outside of the surface.
+/// A disk's half-axes are enlarged for its cell to at most this many mean distances. At a ragged
+/// boundary, corners lie outside the surface.
 const LARGEST: f64 = 1.8;
 
-/// A mean distance is at most this many times that of the neighbours from their own centre, which is a point's own mean distance
-/// where points surround it, and stays small for an outlier that sees a far surface.
+/// A mean distance is at most this many times the neighbours' mean distance from their centroid.
+/// Where points surround a point, that is about the same as its own mean distance; for an outlier
+/// beside a far surface it stays small.
 const LARGEST_LOCAL_RATIO: f64 = 2.0;
 
-/// A mean distance is at least this part of itself for it.
+/// The limit reduces a mean distance to no less than this fraction of itself.
 const SMALLEST: f64 = 1e-9;
 
-/// The least radius of a disk beyond which nothing is known on one side, by the offsets of [`RADIUS_NEIGHBOURS`] neighbours, in their
-/// unit. Zero without any.
+/// Returns the least radius of a disk without neighbours on one side, from the offsets of its
+/// [`RADIUS_NEIGHBOURS`] nearest neighbours and in their unit. Zero without neighbours.
 pub(crate) fn open_radius(near: impl Iterator<Item = DVec3>) -> f64 {
     let (sum, count) = near.fold((0.0, 0), |(sum, count), offset| (sum + offset.length(), count + 1));
     LEAST_OPEN * sum / f64::from(count.max(1))
 }
 
-/// The half-axes s, the longer one, and t, with s x t along the unit vector `normal`, of the least ellipse that holds the [cell](Cell)
-/// of a point in the plane across it. The `offsets` are those of the nearest neighbours, the nearest first, of which there is one;
+/// Returns the half-axes s, the longer one, and t of the smallest ellipse that holds a point's
+/// [cell](Cell) in the plane across the unit vector `normal`; s x t is along `normal`.
+///
+/// The `offsets` are those of the nearest neighbours, at least one, the nearest first. The
 /// half-axes are in their unit.
 pub(crate) fn cell_ellipse(offsets: &[DVec3], normal: DVec3) -> [DVec3; 2] {
     let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
@@ -61,12 +71,12 @@ pub(crate) fn cell_ellipse(offsets: &[DVec3], normal: DVec3) -> [DVec3; 2] {
     }
     let center = near.iter().sum::<DVec3>() / count;
     let spread = near.iter().map(|o| o.distance(center)).sum::<f64>() / count;
-    // Seen from afar, the neighbours of an outlier may all be at one place.
+    // Seen from an outlier, all neighbours may be at one place.
     let mean = mean.min(LARGEST_LOCAL_RATIO * spread).max(SMALLEST * mean);
     let reach = CELL_REACH * offsets.last().map_or(0.0, |farthest| farthest.length());
     let cell = Cell::new(offsets, normal, (reach, LEAST * mean / MOST_PAST_CORNER));
     let past_corner = past_corner(near, normal, &cell, mean);
-    // In mean distances: the squares of areas neither overflow nor underflow.
+    // Corners are in mean distances, so that squares of areas neither overflow nor underflow.
     let corners = cell.closed().map(|corner| (past_corner / mean * corner).clamp_length_max(LARGEST));
     let least = if cell.is_closed() { LEAST } else { LEAST_OPEN };
     let [x, y] = cell.basis();
@@ -74,8 +84,8 @@ pub(crate) fn cell_ellipse(offsets: &[DVec3], normal: DVec3) -> [DVec3; 2] {
     ellipse.half_axes().map(|axis| (x * axis.x + y * axis.y) * mean)
 }
 
-/// How far past the corners of its `cell` a disk reaches, as a factor, beside neighbours at the offsets `near`, of the mean distance
-/// `mean`.
+/// The factor by which a disk reaches past the corners of its `cell`, given the offsets `near` of
+/// its neighbours and their mean length `mean`.
 fn past_corner(near: &[DVec3], normal: DVec3, cell: &Cell, mean: f64) -> f64 {
     let beside = near.iter().filter(|offset| is_beside(**offset, normal));
     let (sum, count) = beside
@@ -90,7 +100,7 @@ fn past_corner(near: &[DVec3], normal: DVec3, cell: &Cell, mean: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The lengths of the half-axes, and the longer one's direction.
+    /// The lengths of the half-axes, and the direction of the longer one.
     fn ellipse(mut offsets: Vec<DVec3>) -> ([f64; 2], DVec3) {
         offsets.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         offsets.truncate(16);
@@ -108,7 +118,8 @@ mod tests {
     fn the_cell_of_a_grid_lies_within() {
         let ([s, t], _) = ellipse(grid(1.0, -6..7));
         assert!((s - PAST_CORNER * 0.5f64.sqrt()).abs() < 1e-9 && (t - s).abs() < 1e-9, "{s} {t}");
-        // Stretched by three, the corners of a rectangle of 3 by 1 lie within, and half-axes stay above the least.
+        // On a grid stretched by three, the corners of a cell of 3 by 1 are inside, and the
+        // half-axes exceed the minimum.
         let ([s, t], along) = ellipse(grid(3.0, -6..7));
         assert!(along.x.abs() > 1.0 - 1e-9 && t < 0.9 * s, "{s} {t}");
         let corner = PAST_CORNER * DVec3::new(1.5 / s, 0.5 / t, 0.0);
@@ -129,7 +140,7 @@ mod tests {
         let farthest = DVec3::new(1.5, 0.5, 0.0).length();
         let longer = ellipse(missing).0[0];
         assert!(longer > 1.02 * PAST_CORNER * farthest, "{longer} {farthest}");
-        // A sheet over a plane does not bend it.
+        // A second sheet above the plane does not count as curvature.
         let above = grid(1.0, -6..7).into_iter().chain([DVec3::Z * 1.1, DVec3::new(0.3, 0.2, 1.1)]);
         assert!((ellipse(above.collect()).0[0] - flat).abs() < 1e-9);
     }
@@ -141,16 +152,16 @@ mod tests {
             lengths.sort_by(f64::total_cmp);
             lengths[..8].iter().sum::<f64>() / 8.0
         };
-        // Nothing is known to the left.
+        // There are no neighbours on the left.
         let border = grid(1.0, 0..7);
         let mean = near(&border);
         let ([s, t], _) = ellipse(border.clone());
         assert!(t >= LEAST_OPEN * mean - 1e-9 && s <= LARGEST * mean, "{s} {t} {mean}");
         assert!((open_radius(border.iter().copied().take(0))).abs() < 1e-300);
-        // From afar all others are at one place, and how far they lie apart says how large it is.
+        // Seen from afar all others are at one place, and their spread determines the size.
         let ([s, t], _) = ellipse(vec![DVec3::X * 1e17; 16]);
         assert!(s.is_finite() && t > 0.0 && s < 1e10, "{s} {t}");
-        // Fewer neighbours than say something of a cell.
+        // Too few neighbours for a cell.
         let ([s, t], _) = ellipse(vec![DVec3::X, DVec3::Y * 2.0]);
         assert!((s - 1.5 * LEAST_OPEN).abs() < 1e-12 && (t - s).abs() < 1e-12);
     }

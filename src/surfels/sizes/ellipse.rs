@@ -2,27 +2,32 @@
 
 use glam::DVec3;
 
-/// How many neighbours an ellipse bounds: the first two rings of a square grid.
+/// The number of neighbours that an ellipse bounds: the first two rings of a square grid.
 pub(crate) const ELLIPSE_NEIGHBOURS: usize = 8;
 
-/// The shorter half-axis is at least this part of the longer one. The neighbours of a point in a scan line may all lie on
-/// that line, which says nothing about how far the next line is.
+/// The shorter half-axis is at least this fraction of the longer one. The neighbours of a point in
+/// a scan line may all lie on that line, which does not tell how far away the next line is.
 const SLIMMEST: f64 = 0.2;
 
-/// The half-axes s (the longer) and t, with s x t along the unit vector `normal`, of the ellipse around the origin that
-/// bounds the projections of `offsets` onto the plane across `normal`, in the offsets' unit. Zero if all projections are.
+/// Returns the half-axes s (the longer one) and t, with s x t along the unit vector `normal`, of
+/// the ellipse around the origin that bounds the projections of `offsets` onto the plane across
+/// `normal`.
 ///
-/// Pajarola et al. 2003, section 3.4, around the point itself and not around the mean (their Eq. 2 allows any centre):
-/// the covariance in the plane has the eigenvalues of Eq. 5, whose trace term is -trace(M) lambda, misprinted there.
-/// Eigenvalues are variances, so half-axes go with their square roots, before one factor f scales both until no
-/// projection is outside: f^2 is the largest x^2/a^2 + y^2/b^2.
+/// They are in the unit of the offsets, and zero if all projections are.
+///
+/// The source is Pajarola et al. 2003, section 3.4, but around the point itself instead of the mean
+/// (their Eq. 2 allows any centre). The covariance in the plane has the eigenvalues of Eq. 5, whose
+/// trace term is -trace(M) lambda, misprinted there. Eigenvalues are variances, so the half-axes
+/// are proportional to their square roots. One factor f then scales both until no projection is
+/// outside: f^2 is the largest x^2/a^2 + y^2/b^2.
 pub(crate) fn bounding_ellipse(offsets: impl Iterator<Item = DVec3> + Clone, normal: DVec3) -> [DVec3; 2] {
     let largest = offsets.clone().fold(0.0, |m: f64, o| m.max(o.abs().max_element()));
     if largest == 0.0 {
         return [DVec3::ZERO; 2];
     }
     let (e1, e2) = normal.any_orthonormal_pair();
-    // Of about one, so that fourth powers of lengths neither overflow nor underflow.
+    // Offsets are scaled to at most 1, so that fourth powers of lengths neither overflow nor
+    // underflow.
     let plane = offsets.map(|offset| {
         let offset = offset / largest;
         (offset.dot(e1), offset.dot(e2))
@@ -37,8 +42,8 @@ pub(crate) fn bounding_ellipse(offsets: impl Iterator<Item = DVec3> + Clone, nor
     [s, normal.cross(s) * slimness]
 }
 
-/// The unit direction of the longer half-axis and the ratio of the shorter one to it, of an ellipse like that of a covariance [xx, xy, yy]; None
-/// if that is zero.
+/// Returns the unit direction of the longer half-axis, and the ratio of the shorter half-axis to
+/// it, of the ellipse of a covariance matrix [xx, xy, yy]; None if that is zero.
 pub(crate) fn shape([xx, xy, yy]: [f64; 3]) -> Option<([f64; 2], f64)> {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let root = (half * half + xy * xy).sqrt();
@@ -46,7 +51,7 @@ pub(crate) fn shape([xx, xy, yy]: [f64; 3]) -> Option<([f64; 2], f64)> {
     if large == 0.0 {
         return None;
     }
-    // Of the two columns of M - small I, which are both along the eigenvector, the one that has not cancelled.
+    // Both columns of M - small I are along the eigenvector; this is the one without cancellation.
     let (x, y) = if half >= 0.0 { (half + root, xy) } else { (xy, root - half) };
     let length = (x * x + y * y).sqrt();
     let direction = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
@@ -72,7 +77,8 @@ mod tests {
                 .map(|i| (a * (f64::from(i % 3) - 1.0) * stretch + b * (f64::from(i / 3) - 1.0)) * size)
                 .collect();
             let [s, t] = bounding_ellipse(ring.iter().copied(), normal);
-            // The corners of the ring are on the rim: (stretch / a)^2 + (1 / b)^2 = 1 with a = stretch b.
+            // The corners of the ring are on the rim: (stretch / a)^2 + (1 / b)^2 = 1, with
+            // a = stretch b.
             let (half_axis, slim) = (2f64.sqrt() * size, stretch);
             assert!((s.length() / (half_axis * slim) - 1.0).abs() < 1e-12, "{stretch}");
             assert!((t.length() / half_axis - 1.0).abs() < 1e-12, "{stretch}");
@@ -80,7 +86,8 @@ mod tests {
             if stretch > 1.0 {
                 assert!(s.normalize().cross(a).length() < 1e-12);
             }
-            // Eigenvalues in place of their roots would give an axis ratio of stretch squared.
+            // Eigenvalues instead of their square roots would give an axis ratio of stretch
+            // squared.
             assert!((s.length() / t.length() - stretch).abs() < 1e-12 * stretch);
         }
     }

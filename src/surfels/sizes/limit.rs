@@ -1,4 +1,4 @@
-//! How large a disk may be beside its neighbours' disks.
+//! The largest radius that a disk may have, given the disks of its neighbours.
 
 use rayon::prelude::*;
 
@@ -6,14 +6,15 @@ use super::RADIUS_NEIGHBOURS;
 use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, median};
 use crate::surfels::graph::NeighbourGraph;
 
-/// The largest radius of each position's disk: `factor` times the median of its neighbours' radii, and, unless it is infinite, never more
-/// than [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
-/// nothing of others.
+/// Returns the largest radius of each position's disk, in the unit of `radii`.
 ///
-/// No disk is larger than `lone` says of its position, unless `factor` is infinite.
+/// It is `factor` times the median of the neighbours' radii and, unless `factor` is infinite, at
+/// most [`LARGEST_MEDIAN_RATIO`] times the median of all radii, and at most `lone` of the position.
+/// A position whose radius is zero has no limit from its neighbours and is left out of all medians.
 ///
-/// At a boundary and around an outlier, points have neighbours on one side only, or far away, and so large radii; their
-/// neighbours' do not, wherever those have points around them. Densities that differ from place to place do not matter.
+/// At a boundary and around an outlier, points have neighbours on one side only, or far away, and
+/// therefore large radii. Their neighbours do not, if they are surrounded by points. Densities that
+/// vary from place to place do not matter.
 pub(crate) fn local_limits(
     graph: &NeighbourGraph,
     radii: &[f64],

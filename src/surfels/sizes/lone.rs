@@ -1,4 +1,4 @@
-//! Points that no surface surrounds: leaves, wires, spray.
+//! Lone points, which no surface surrounds: leaves, wires, spray.
 
 use glam::DVec3;
 
@@ -7,33 +7,35 @@ use crate::surfels::estimate::NORMAL_NEIGHBOURS;
 use crate::surfels::graph::NeighbourGraph;
 use crate::surfels::positions::DistinctPositions;
 
-/// A point is lone if no more of its [`NORMAL_NEIGHBOURS`] neighbours lie on one surface with it.
-/// In a crown of random leaves 55 % of the points are, on noisy ground one of 2,000, of the
-/// vertices of the Stanford bunny none.
+/// A point is lone if at most this many of its [`NORMAL_NEIGHBOURS`] neighbours lie on one surface
+/// with it. In a crown of random leaves 55 % of the points are lone, on noisy ground one of 2,000,
+/// and none of the vertices of the Stanford bunny.
 const MOST_BESIDE: usize = 4;
 
-/// The cosine of the angle between two planes of one surface: 45 degrees.
+/// The cosine of 45 degrees: the planes of two points of one surface differ by a smaller angle.
 const ONE_SURFACE: f64 = 0.7;
 
-/// The sine of the elevation of a point over the plane of another one of its surface: 30 degrees.
+/// The sine of 30 degrees: a point is at a lower elevation over the plane of another one of its
+/// surface.
 const LOWEST: f64 = 0.5;
 
-/// The disk of a lone point has this part of its mean distance to [`RADIUS_NEIGHBOURS`] neighbours:
-/// about what the nearest one is away, where they are random.
+/// The disk of a lone point has this fraction of its mean distance to [`RADIUS_NEIGHBOURS`]
+/// neighbours as its radius: about the distance of the nearest one among random points.
 const PART: f64 = 0.5;
 
-/// All neighbours of a point lie on a line with it if none is farther from the line to the farthest
-/// one than this part of the way to it. Of a surface with 16 neighbours none does, unless its scan
-/// lines lie as far apart as eight of their points.
+/// A point lies on a line with its neighbours if none is farther from the line to the farthest one
+/// than this fraction of that one's distance. With 16 neighbours on a surface this does not occur,
+/// unless its scan lines are as far apart as eight of their points.
 const LINE: f64 = 0.12;
 
-/// The disk of a point on a line has this part of its mean distance to [`RADIUS_NEIGHBOURS`]
-/// neighbours: three quarters of the spacing, where that is even.
+/// The disk of a point on a line has this fraction of its mean distance to [`RADIUS_NEIGHBOURS`]
+/// neighbours as its radius: three quarters of the spacing, if that is even.
 const PART_OF_LINE: f64 = 0.3;
 
-/// The largest radius of the disk of a lone position, in the unit of positions; None for one that
-/// has a surface around it, and where there are too few points to tell. `normal` gives the unit
-/// normal at a position, of any side; zero where it is not known.
+/// Returns the largest radius of the disk of a lone position, in the unit of positions.
+///
+/// None if a surface surrounds the position, or there are too few points to tell. `normal` is the
+/// unit normal at a position, with either sign, or zero if it is unknown.
 pub(crate) fn lone_radius(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     index: u32,
@@ -58,8 +60,8 @@ pub(crate) enum Surroundings {
 }
 
 impl Surroundings {
-    /// The part of the mean distance of neighbours that is the largest radius of a disk; None for
-    /// any.
+    /// The largest radius of a disk, as a fraction of the mean distance to the neighbours; None if
+    /// there is no limit.
     fn part(self) -> Option<f64> {
         match self {
             Self::Surface => None,
@@ -69,8 +71,8 @@ impl Surroundings {
     }
 }
 
-/// The surroundings of a point of this unit normal, by the offsets and the unit normals of its
-/// neighbours, the nearest first, of any side and zero where they are not known.
+/// Classifies the surroundings of a point from its unit normal `own` and the offsets and unit
+/// normals of its neighbours, the nearest first. Normals have either sign, and are zero if unknown.
 pub(crate) fn surroundings(own: DVec3, around: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Surroundings {
     let around = around.take(NORMAL_NEIGHBOURS);
     let Some((farthest, _)) = around.clone().nth(NORMAL_NEIGHBOURS - 1) else { return Surroundings::Surface };
@@ -95,8 +97,8 @@ mod tests {
     use crate::surfels::estimate::fitted_normal;
     use rayon::prelude::*;
 
-    /// The share of lone points among 2,000 in a unit cube that is flattened to this height, by the
-    /// planes through their neighbours.
+    /// The fraction of lone points among 2,000 in a unit cube that is flattened to this height,
+    /// with normals of the planes through their neighbours.
     fn lone(height: f64) -> f64 {
         let mut random = Random::stream(11, 0);
         let mut number = || random.number();

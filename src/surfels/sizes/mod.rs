@@ -1,4 +1,4 @@
-//! How large the surfel of a point is.
+//! The size of each point's surfel.
 
 mod bsp;
 mod cell;
@@ -25,25 +25,28 @@ use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::{Error, Result};
 
-/// How the size of a surfel follows from the points around it.
+/// The method that computes the size of a surfel from the points around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Size {
-    /// The least ellipse that holds the point's Voronoi cell in the tangent plane, which is what is nearer to it than to any neighbour.
+    /// The smallest ellipse that holds the point's Voronoi cell in the tangent plane, the part that
+    /// is nearer to the point than to any neighbour.
     #[default]
     Knn,
-    /// The ellipse that bounds 8 neighbours in the tangent plane, with the half-axes of their covariance there (Pajarola et
-    /// al. 2003, section 3.4).
+    /// The ellipse that bounds 8 neighbours in the tangent plane, with the axes of their covariance
+    /// there (Pajarola et al. 2003, section 3.4).
     Ellipse,
-    /// A disk from clusters of three points, by a binary space partition along principal axes ("a simple scheme to render
-    /// point-sampled surfaces", section 3.3).
+    /// A disk per point from clusters of three points, found by binary space partition along
+    /// principal axes ("a simple scheme to render point-sampled surfaces", section 3.3).
     Bsp(Triangle),
-    /// One disk for all, as large as such clusters are in the mean: the section as it is written ("each point as a surfel with fixed radius").
+    /// One radius for all disks, the mean over such clusters: the section to the letter ("each
+    /// point as a surfel with fixed radius").
     BspGlobal(Triangle),
-    /// At the vertices of a mesh, disks as large as the largest circle about a triangle there (Rusinkiewicz and Levoy 2000).
+    /// At each vertex of a mesh, a disk as large as the largest bounding circle of a triangle there
+    /// (Rusinkiewicz and Levoy 2000).
     Qsplat,
 }
 
-/// What is taken of a cluster of three points as its size.
+/// The measure that is used as the size of a cluster of three points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Triangle {
     /// The mean length of the triangle's edges.
@@ -54,7 +57,7 @@ pub enum Triangle {
 }
 
 impl Size {
-    /// Every way to a size, with its name.
+    /// Every size, with its name on the command line.
     pub const ALL: [(Self, &'static str); 7] = [
         (Self::Knn, "knn"),
         (Self::Ellipse, "ellipse"),
@@ -67,7 +70,7 @@ impl Size {
 }
 
 impl Size {
-    /// Whether it is of disks, which say how large they are and not of what surface.
+    /// Whether the size is a radius alone, without the shape of the surface; such disks stay flat.
     pub fn is_of_disks(self) -> bool {
         matches!(self, Self::Bsp(_) | Self::BspGlobal(_) | Self::Qsplat)
     }
@@ -84,7 +87,8 @@ impl FromStr for Size {
     }
 }
 
-/// The offsets of the `count` nearest neighbours of position `index`, scaled units, the nearest first.
+/// The offsets of the `count` nearest neighbours of position `index`, scaled units, the nearest
+/// first.
 pub(crate) fn offsets<'a>(
     distinct: &'a DistinctPositions,
     graph: &'a NeighbourGraph,
@@ -95,8 +99,9 @@ pub(crate) fn offsets<'a>(
     graph.of(index).iter().take(count).map(move |&other| distinct.position(other) - center)
 }
 
-/// The half-axes of position `index` across `normal`, by its neighbours, scaled units: s, the longer one, and t. Zero where nothing
-/// says how long they are, and of a size by clusters.
+/// Returns the half-axes at position `index` across `normal` from its neighbours, scaled units: s,
+/// the longer one, and t. Zero if the neighbours do not determine them, and for sizes from clusters
+/// or triangles.
 pub(crate) fn half_axes_at(
     size: Size,
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
@@ -108,7 +113,7 @@ pub(crate) fn half_axes_at(
     match size {
         Size::Knn if !near.is_empty() => cell_ellipse(&near, normal),
         Size::Ellipse => match bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal) {
-            // All neighbours lie along the normal: only their distances say how large a disk is.
+            // All neighbours lie along the normal, so only their distances determine a size.
             [DVec3::ZERO, _] => {
                 let radius = open_radius(near.iter().copied().take(ELLIPSE_NEIGHBOURS));
                 <[DVec3; 2]>::from(normal.any_orthonormal_pair()).map(|axis| axis * radius)

@@ -1,18 +1,22 @@
-//! Sizes of the vertices of a mesh by their triangles, as QSplat has them (Rusinkiewicz and Levoy 2000, section 3.1): a sphere about each
-//! vertex as large as the largest bounding circle of the triangles that touch it, so that neighbours cover each triangle.
+//! Sizes of the vertices of a mesh from their triangles, as in QSplat (Rusinkiewicz and Levoy 2000,
+//! section 3.1).
+//!
+//! The sphere around each vertex is as large as the largest bounding circle of the triangles that
+//! touch it, so that neighbours cover each triangle.
 
 use glam::DVec3;
 
 use crate::io::Points;
 use crate::{Error, Result};
 
-/// Gives the vertices of `points` those radii, world units; 0 where no triangle is.
+/// Sets the radii of the vertices of `points`, world units; 0 for vertices without a triangle.
 ///
 /// # Errors
+///
 /// [`Error::Usage`] if there are no triangles.
 pub(crate) fn measure(points: &mut Points) -> Result<()> {
     let Some(faces) = &points.faces else {
-        return Err(Error::Usage("--size qsplat goes by the triangles of a mesh, and an input has none".into()));
+        return Err(Error::Usage("--size qsplat needs triangles, and an input has none: take another size".into()));
     };
     let mut radii = vec![0.0f32; points.positions.len()];
     for triangle in &faces.triangles {
@@ -26,8 +30,8 @@ pub(crate) fn measure(points: &mut Points) -> Result<()> {
     Ok(())
 }
 
-/// The radius of the smallest circle about a triangle: half its longest edge where that faces a right angle or more, else the circle through
-/// its corners.
+/// The radius of the smallest circle around a triangle: half the longest edge if the angle opposite
+/// is 90 degrees or more, else the circumradius.
 fn bounding_circle([a, b, c]: [DVec3; 3]) -> f64 {
     let mut edges = [a.distance(b), b.distance(c), c.distance(a)];
     edges.sort_by(f64::total_cmp);
@@ -51,7 +55,7 @@ mod tests {
         let mut points = Points { positions, faces: Some(faces), ..Points::default() };
         measure(&mut points).unwrap();
         let radii = points.radii.unwrap();
-        // A right angle; and a blunt one, which is not at the corner that the two share.
+        // A right triangle, and an obtuse one whose obtuse angle is not at a shared corner.
         let obtuse = bounding_circle([[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [-1.0, 0.1, 0.0]].map(DVec3::from_array));
         assert_eq!(radii, [2.5, 2.5, 2.5, obtuse as f32, 0.0]);
         let equal = bounding_circle([DVec3::X, DVec3::Y, DVec3::Z]);

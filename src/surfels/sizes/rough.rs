@@ -1,10 +1,10 @@
-//! How rough a surface is: how far points lie off it, along its normal.
+//! The roughness of a surface: the distances of points from it, along its normal.
 //!
-//! Two disks whose points lie off a surface are at two heights. Seen from above they overlap as
-//! disks of a smooth surface do; seen from ten degrees over it, a gap opens between them that is
-//! 5.7 times as wide as the heights differ, and the background shows through. So disks of rough
-//! surfaces are larger. A bend is no roughness: disks of a smooth surface that are too large stand
-//! out past its outlines.
+//! Two disks whose points lie off a surface have different heights. From above they overlap like
+//! the disks of a smooth surface. From ten degrees over the surface, a gap opens between them that
+//! is 5.7 times as wide as the heights differ, and the background shows through. So the disks of
+//! rough surfaces are larger. Curvature is not roughness: disks of a smooth surface that are too
+//! large stand out past its outlines.
 
 use glam::{DMat3, DVec3};
 
@@ -13,42 +13,43 @@ use crate::surfels::estimate::median;
 use crate::surfels::gaps::is_beside;
 use crate::surfels::graph::NeighbourGraph;
 
-/// A half-axis grows by so many times the heights of the neighbours, times the share of their
-/// squares that no paraboloid explains. On an airborne scan seen from ten degrees 2 % of the pixels
-/// are pinholes without it, and 0.09 % with it.
+/// A half-axis grows by this many times the RMS height of the neighbours, times the fraction of
+/// their squared heights that no paraboloid explains. On an airborne scan seen from ten degrees,
+/// 2 % of the pixels are pinholes without this, and 0.09 % with it.
 const PER_HEIGHT: f64 = 3.3;
 
-/// Where neighbours are so high, in mean distances, nothing grows: the surface is not known well
-/// enough, or there is none.
+/// The growth falls to zero where neighbours have this RMS height, in mean distances: the surface
+/// is not known well enough, or there is none.
 const HIGHEST: f64 = 0.2;
 
-/// A half-axis grows by at most this part of itself.
+/// A half-axis grows by at most this fraction of itself.
 const MOST: f64 = 0.5;
 
-/// The determinant of a paraboloid's equations is at least this part of the cube of their trace;
-/// else its neighbours lie on few lines.
+/// The least determinant of a paraboloid's normal equations, as a fraction of their trace cubed.
+/// Below it the neighbours lie on few lines, and no paraboloid is fitted.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// The neighbours of a point that lie beside it, over its plane.
+/// The heights of a point's neighbours over its plane; neighbours above or below the point do not
+/// count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Rough {
-    /// Mean distance to [`RADIUS_NEIGHBOURS`] neighbours, in the unit of their offsets.
+    /// Mean distance to [`RADIUS_NEIGHBOURS`] neighbours, in the unit of the offsets.
     mean: f32,
     /// Mean square of their heights over the plane, in mean distances.
     heights: f32,
-    /// The same of what a paraboloid through the point leaves of them, for each neighbour more than
-    /// it has coefficients.
+    /// Mean square of the residuals of a paraboloid through the point, per degree of freedom: the
+    /// number of neighbours minus its three coefficients.
     left: f32,
 }
 
 impl Rough {
-    /// By the offsets of a point's neighbours, the nearest first, over the plane across the unit
-    /// vector `normal`.
+    /// Measures the offsets of a point's neighbours, the nearest first, over the plane across the
+    /// unit vector `normal`.
     pub(crate) fn of(offsets: &[DVec3], normal: DVec3) -> Self {
         let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
         let mean = near.iter().map(|offset| offset.length()).sum::<f64>() / near.len().max(1) as f64;
         let (e1, e2) = normal.any_orthonormal_pair();
-        // Each with the coefficients of its equation, and its height.
+        // The coefficients of each neighbour's equation, and its height.
         let mut rows = [(DVec3::ZERO, 0.0); RADIUS_NEIGHBOURS];
         let mut count = 0;
         for offset in near.iter().filter(|offset| is_beside(**offset, normal)) {
@@ -75,9 +76,12 @@ impl Rough {
         Self { mean: mean as f32, heights: each(heights, count), left: each(left, count - 3) }
     }
 
-    /// How much longer the half-axes of position `index` are to be, in the unit of offsets, by its
-    /// own heights and by how rough the surface is around it: by the medians of its neighbours, so
-    /// that an edge is not taken for roughness. `at` gives those of a position.
+    /// Returns the length by which the half-axes of position `index` should grow, in the unit of
+    /// offsets.
+    ///
+    /// It depends on the position's own heights and on the roughness around it. That is a median
+    /// over its neighbours, so that an edge does not count as roughness. `at` returns the roughness
+    /// of a position.
     pub(crate) fn growth(graph: &NeighbourGraph, index: u32, at: impl Fn(u32) -> Self) -> f64 {
         let own = at(index);
         let around = || std::iter::once(index).chain(graph.of(index).iter().copied().take(RADIUS_NEIGHBOURS)).map(&at);
@@ -95,7 +99,7 @@ impl Rough {
     }
 }
 
-/// The half-axes, each longer by `growth`, or by the part of itself that it may grow.
+/// Returns the half-axes, each longer by `growth`, but at most by the fraction [`MOST`] of itself.
 pub(crate) fn grown(axes: [DVec3; 2], growth: f64) -> [DVec3; 2] {
     axes.map(|axis| {
         let length = axis.length();
@@ -112,8 +116,7 @@ mod tests {
     use crate::surfels::positions::DistinctPositions;
     use rayon::prelude::*;
 
-    /// The mean growth on a grid of the spacing 1 with these heights over a surface, and its
-    /// slopes.
+    /// The mean growth on a grid of spacing 1 with these heights and slopes of a surface.
     fn growth(height: impl Fn(f64, f64) -> f64, slopes: impl Fn(f64, f64) -> [f64; 2]) -> f64 {
         let positions: Vec<[f64; 3]> = (0..400)
             .map(|k| (f64::from(k % 20) - 9.5, f64::from(k / 20) - 9.5))
@@ -142,7 +145,7 @@ mod tests {
         };
         let (slight, rough) = (noise(0.02), noise(0.06));
         assert!(slight > 0.02 && rough > 2.0 * slight && rough < 0.4, "{slight} {rough}");
-        // Beyond, nobody knows where the surface is.
+        // Noise this strong leaves no surface.
         assert!(noise(2.0) < 1e-9);
         assert!(growth(|_, _| 0.0, |_, _| [0.0; 2]) == 0.0);
         let bowl = growth(

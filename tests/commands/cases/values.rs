@@ -135,7 +135,7 @@ fn a_few_points_have_the_spacing_of_a_few() {
     for (name, points) in [("few_8.ply", 8), ("few_9.ply", 9)] {
         let file = case(name);
         let (_, told) = drawn(&folder, &[&file, "--facing", "circle", "--size", "64x64"]);
-        let said = format!("{points} points have no radius and took one for all, by the mean spacing: ");
+        let said = format!("{points} points have no radius and got a common one from the mean spacing: ");
         let radius = told.split(&said).nth(1).and_then(|rest| rest.split(' ').next()).expect(&told);
         assert!((0.1..0.6).contains(&radius.parse::<f64>().unwrap()), "{name}: {radius}");
     }

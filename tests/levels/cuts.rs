@@ -91,13 +91,15 @@ fn a_device_makes_the_cut_of_its_twin() {
         let (ways, adapters) = if name == "plain" { (4, 4) } else { (1, 2) };
         let options = options.into_iter().take(ways);
         let fading = options.clone().map(|(projection, options)| (projection, fading(&options)));
-        for (projection, options) in options.chain(fading) {
+        for (step, (projection, options)) in options.chain(fading).enumerate() {
             let camera = sphere_camera(100, projection);
             let (twins, flat) = cut(&scene, &camera, &options);
             let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
             assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
             assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
-            for (on, backend) in backends.iter().take(adapters) {
+            // The first adapter draws all of them, and the others a third each, as kernels take seconds to compile.
+            let draws = |on: usize| name != "plain" || on == 0 || (on + step) % 3 == 0;
+            for (_, (on, backend)) in backends.iter().take(adapters).enumerate().filter(|(on, _)| draws(*on)) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
                 assert_eq!(report.cut, Some(drawn as u64), "{name} {on} {options:?}");
                 assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, backend)), "{name} {on} {options:?}");
@@ -430,7 +432,8 @@ fn children_are_drawn_together_where_each_would_be() {
                 };
                 let right = of(&alone);
                 assert!(of(&together) == right, "{eye}, {options:?}");
-                noticed.iter_mut().zip(&broken).for_each(|(noticed, broken)| *noticed |= of(broken) != right);
+                let unnoticed = noticed.iter_mut().zip(&broken).filter(|(noticed, _)| !**noticed);
+                unnoticed.for_each(|(noticed, broken)| *noticed = of(broken) != right);
             }
         }
     }

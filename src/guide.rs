@@ -3,33 +3,33 @@
 //! Its chapters are the files of `src/guide`, which read as well in the repository.
 
 /// Cameras, units, depth tolerance, kernels and light.
-#[doc = include_str!("guide/conventions.md")]
+#[cfg_attr(doc, doc = include_str!("guide/conventions.md"))]
 pub mod conventions {}
 
 /// Surfels from points.
-#[doc = include_str!("guide/points.md")]
+#[cfg_attr(doc, doc = include_str!("guide/points.md"))]
 pub mod points {}
 
 /// Surfels and triangles from meshes.
-#[doc = include_str!("guide/meshes.md")]
+#[cfg_attr(doc, doc = include_str!("guide/meshes.md"))]
 pub mod meshes {}
 
 /// Surfaces that show through, inputs that are kept apart, and Gaussian surfels.
-#[doc = include_str!("guide/transparency.md")]
+#[cfg_attr(doc, doc = include_str!("guide/transparency.md"))]
 pub mod transparency {}
 
 /// Levels of detail.
-#[doc = include_str!("guide/levels.md")]
+#[cfg_attr(doc, doc = include_str!("guide/levels.md"))]
 pub mod levels {}
 
 /// Files that are read and written.
-#[doc = include_str!("guide/files.md")]
+#[cfg_attr(doc, doc = include_str!("guide/files.md"))]
 pub mod files {}
 
 /// Adapters and accumulators.
-#[doc = include_str!("guide/adapters.md")]
+#[cfg_attr(doc, doc = include_str!("guide/adapters.md"))]
 pub mod adapters {}
 
 /// The papers' pictures.
-#[doc = include_str!("guide/papers.md")]
+#[cfg_attr(doc, doc = include_str!("guide/papers.md"))]
 pub mod papers {}

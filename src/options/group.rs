@@ -56,6 +56,8 @@ macro_rules! group {
         #[derive(Clone, Debug, Default, PartialEq)]
         #[cfg_attr(feature = "cli", derive(clap::Args))]
         $(#[$of_group])*
+        // Help texts write what may be left out as [:L], which is no link.
+        #[allow(rustdoc::broken_intra_doc_links)]
         pub struct $group {
             $($(#[$of_field])* pub $field: $type,)*
         }

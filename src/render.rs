@@ -1,4 +1,4 @@
-//! The sequence: project, visibility, accumulate, resolve, on every backend.
+//! Renders frames on a device or with the f64 reference: project, visibility, accumulate, resolve.
 
 mod cut;
 mod encoded;
@@ -32,16 +32,16 @@ use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 pub use taken::taken;
 
-/// Who renders.
+/// The renderer: a graphics device or the processor.
 pub enum Backend {
-    /// The compute kernels, on an adapter.
+    /// The compute kernels (or the rasteriser) on an adapter.
     Gpu {
         /// The open device.
         gpu: Box<Gpu>,
-        /// The kernels' texts.
+        /// The WGSL files of the kernels.
         sources: Sources,
     },
-    /// The twins in f64, on the processor's threads.
+    /// The f64 twins of the kernels, on all threads of the processor.
     Reference,
 }
 
@@ -52,10 +52,10 @@ impl Backend {
     }
 }
 
-/// Renders a scene, or what else is a [`Source`], once.
+/// Renders one frame of a scene or of another [`Source`].
 ///
 /// # Errors
-/// Those of [`Renderer::new`] and [`Renderer::frame`].
+/// The errors of [`Renderer::new`] and [`Renderer::frame`].
 pub fn render(
     source: &dyn Source,
     camera: &Camera,
@@ -66,27 +66,29 @@ pub fn render(
     Renderer::new(source, options, backend)?.frame(camera, progress)
 }
 
-/// A scene on a backend, and what stays from frame to frame: the uploaded surfels, the buffers, the kernels, and what earlier frames
-/// have shown. The second frame costs its passes alone.
+/// A scene on a backend, with all that is reused from frame to frame: the uploaded surfels, the
+/// buffers, the compiled kernels and the sizes measured so far. A second frame costs only its
+/// passes.
 ///
-/// Scene (or another [`Source`]) and backend are borrowed or owned: `Renderer::new(&scene, &options, &backend)`, or with an [`Arc`](std::sync::Arc) of each
-/// something that another program can keep.
+/// The scene (or another [`Source`]) and the backend are borrowed or owned: `Renderer::new(&scene,
+/// &options, &backend)`, or an [`Arc`](std::sync::Arc) of each for a renderer that owns its inputs.
 pub struct Renderer<S, B> {
     source: S,
     backend: B,
-    /// That of the colour.
+    /// The part that renders the colour.
     kept: Kept,
-    /// Those of maps that are made in another way.
+    /// The parts that render maps with other options than the colour's ([`parts::parts`]).
     of_maps: Vec<Kept>,
-    /// What was asked for: of a number of splats each view has a size of its own.
+    /// The level of detail in the options. A number of splats becomes another node size in each
+    /// view.
     detail: Detail,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
-    /// A renderer of what `source` has; nothing is uploaded yet.
+    /// Creates a renderer of `source` without uploading anything yet.
     ///
     /// # Errors
-    /// [`Error::Usage`] for options, scenes and backends that do not go together.
+    /// [`Error::Usage`] if options, scene and backend do not go together.
     pub fn new(source: S, options: &RenderOptions, backend: B) -> Result<Self> {
         let reference = matches!(backend.borrow(), Backend::Reference);
         check::options(options, reference)?;
@@ -100,10 +102,10 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         Ok(Self { source, backend, kept: Kept::new(facts, colors), of_maps, detail })
     }
 
-    /// One frame.
+    /// Renders one frame.
     ///
     /// # Errors
-    /// A limit of the adapter, and whatever a device may report.
+    /// [`Error::Limit`] if a limit of the adapter is too small, and any error of the device.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
         let start = Instant::now();
         let detail = self.sized(camera);
@@ -113,7 +115,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let one = |kept: &mut Kept| one(&*source, (*backend).borrow(), kept, camera, progress);
         let mut maps = Vec::new();
         for part in of_maps {
-            // What is on the device serves all of them, as far as they need the same of it.
+            // All parts share the uploaded surfels as far as their needs agree.
             part.store = kept.store.take();
             maps.push(one(part)?);
             kept.store = part.store.take();
@@ -130,7 +132,8 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         Ok((frame, report))
     }
 
-    /// The size of nodes in the view of `camera`, by the colour's part: all parts have the same.
+    /// Returns the node size for the view of `camera`. It follows from the colour's part and holds
+    /// for all parts.
     fn sized(&self, camera: &Camera) -> Detail {
         let (facts, options) = (&self.kept.facts, RenderOptions { detail: self.detail, ..self.kept.options.clone() });
         let wanted = Wanted::of(&options, culls_back(facts, camera, &options));
@@ -138,13 +141,13 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         tree.map_or(self.detail, |tree| select::sized(tree, facts.origin, camera, &wanted))
     }
 
-    /// Device memory that the last frame was rendered with; none for the reference.
+    /// Device memory of the last frame; zero for the reference.
     pub fn device_bytes(&self) -> DeviceBytes {
         self.kept.device_bytes()
     }
 }
 
-/// A frame of what `kept` is of.
+/// Renders one part of a frame on `backend`.
 fn one(
     source: &dyn Source,
     backend: &Backend,
@@ -181,7 +184,7 @@ mod tests {
     use crate::hardcases::cases;
     use crate::scene::{Map, Maps};
 
-    /// A device of its own; none where there is no adapter and none is required.
+    /// Opens a device. Returns `None` if there is no adapter and the environment requires none.
     fn opened() -> Option<Gpu> {
         match Gpu::open(None) {
             Ok(gpu) => Some(gpu),
@@ -190,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Whether the programs of a render count their loops.
+    /// For each program that a render compiles, whether it counts the rounds of its loops.
     fn counted(without: &[Optimisation]) -> Option<Vec<bool>> {
         let backend = Backend::gpu(opened()?);
         let case = cases().unwrap().swap_remove(0);
@@ -208,10 +211,10 @@ mod tests {
         assert!(!by_counters.is_empty() && by_counters.iter().all(|counted| *counted), "{by_counters:?}");
     }
 
-    /// Another map changes some kernels and not others, which are compiled once, whoever asks.
+    /// Another map changes some kernels; the unchanged ones are compiled once for all renders.
     #[test]
     fn kernels_that_are_the_same_are_compiled_once() {
-        // Elsewhere kernels are told in WGSL, whose constants are set later.
+        // Other APIs get the kernels as WGSL, with constants that are set later.
         let Some(gpu) = opened().filter(|gpu| gpu.adapter.api == "vulkan") else { return };
         let case = cases().unwrap().swap_remove(0);
         let after = |maps: &[Map]| {

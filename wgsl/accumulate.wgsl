@@ -1,12 +1,14 @@
-// Stage 3: at every pixel, the weighted sums over the fragments within epsilon of the nearest depth. One invocation a
-// splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
-// depend on the order.
+// Stage 3: at every pixel, sums the weights and weighted attributes of the fragments within epsilon
+// of the nearest depth. One invocation per splat, one workgroup per large splat. Integer
+// accumulators quantise each fragment's terms before they add them, so their sums do not depend on
+// the order.
 // Twin: src/passes/accumulate.rs.
 // All loops end, by 2, 4 of src/gpu/loops.rs: 0x1c18d5be7c903b06
 
-// The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
-// finds the invocation's next fragment and then adds it if it is accepted, so that the invocations of a subgroup, whose
-// fragments lie at different places, do the costly part together. Most are accepted: what is hidden was left out.
+// Accumulates the splat's pixels from `offset` on, in steps of `step`, with one invocation. Each
+// round of the outer loop first finds the next fragment and then adds it if it is accepted. So the
+// invocations of a subgroup, whose fragments lie at different pixels, do the expensive part
+// together. Most fragments are accepted, because hidden splats were skipped.
 fn accumulate_splat(surfel: u32, splat: Splat, filter_: Filter, pixels: Rectangle, offset: vec2<u32>, step: u32) {
     let first = pixels.first + offset;
     let attributes = attributes_of(surfel, splat);

@@ -1,5 +1,5 @@
-// Sums in f32 by compare and exchange: accumulator_float where there are no f32 atomics. Error bound:
-// src/passes/accumulate.rs.
+// Sums in f32 by compare and exchange: replaces accumulator_float.wgsl on adapters without f32
+// atomics. Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
@@ -12,7 +12,7 @@ fn quantise(weight: f32) -> Term {
     return weight;
 }
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return weight;
 }

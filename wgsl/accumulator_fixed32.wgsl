@@ -1,15 +1,15 @@
-// Sums in fixed point of one word. FRACTION_BITS follow from the scene, at least 24: sums of more than 2^(32 - bits)
-// full weights wrap, which is noticed, and the frame is rendered again with accumulator_fixed.
-// Error bound: src/passes/accumulate.rs.
+// Sums in fixed point, one word each. FRACTION_BITS depends on the scene and is at least 24. A sum
+// of 2^(32 - FRACTION_BITS) full weights wraps; this is detected, and the frame is rendered again
+// with accumulator_fixed. Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 override FRACTION_BITS: u32;
 
-// Two words come first: how many fragments made a sum wrap, and none.
+// Word 0 counts the fragments that made a sum wrap, word 1 is unused, and the sums follow.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
 const HEAD: u32 = 2u;
 
-// The fragment in work did.
+// Whether a sum wrapped while the current fragment was added.
 var<private> wrapped: bool;
 
 alias Term = u32;
@@ -23,12 +23,13 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * one()));
 }
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return f32(weight) / one();
 }
 
-// The weight came from an f32, so it has at most 24 significant bits and is exact as f32.
+// weight * value, for a value in [0, 1]. The weight came from an f32, so it has at most 24
+// significant bits and converts back exactly.
 fn term(weight: Term, value: f32) -> Term {
     return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
 }
@@ -38,7 +39,7 @@ fn add(pixel: u32, channel: u32, value: Term) {
     wrapped |= before + value < before;
 }
 
-// After a fragment's terms.
+// Counts a fragment that made a sum wrap, after all its terms were added.
 fn settle(pixel: u32) {
     if (wrapped) {
         atomicAdd(&sums[0], 1u);

@@ -1,11 +1,11 @@
-// Sums of terms_wide.wgsl in fixed point of one u64: room for 2^24 full weights, or for all surfels. Needs 64-bit atomics.
-// Error bound: src/passes/accumulate.rs.
+// Sums of the terms of terms_wide.wgsl in fixed point, one u64 each. A sum can hold 2^24 full
+// weights, or one of every surfel. Needs 64-bit atomics. Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
-// A term is cut below the unit, as the two words of accumulator_fixed_wide.wgsl are.
+// Truncates a term to whole units, as the two words of accumulator_fixed_wide.wgsl do.
 fn add(pixel: u32, channel: u32, value: Term) {
     atomicAdd(&sums[pixel * CHANNELS + channel], u64(value));
 }
@@ -17,9 +17,9 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 
 fn settle(pixel: u32) {}
 
-// Rounded as accumulator_fixed_wide.wgsl does, which has the same sums in two words.
 fn show(pixel: u32) {}
 
+// Rounds like accumulator_fixed_wide.wgsl, which stores the same sums in two words.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     let sum = atomicLoad(&sums[pixel * CHANNELS + channel]);
     return f32(u32(sum >> 32u)) * 4294967296.0 + f32(u32(sum & 0xfffffffflu));

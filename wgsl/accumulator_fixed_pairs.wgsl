@@ -1,16 +1,18 @@
-// The sums of accumulator_fixed.wgsl, bit for bit, for adapters with 64-bit atomics: two neighbouring sums in the halves
-// of one u64, so that a fragment makes half as many additions. What wraps in the low half runs into the high one; both
-// halves' carries are counted in a u64 of their own, which follows, so that it can be taken out again.
+// The sums of accumulator_fixed.wgsl, bit for bit, for adapters with 64-bit atomics. Two
+// neighbouring sums are the halves of one u64, so that a fragment takes half as many additions. A
+// low half that wraps carries into the high half. The carries of both halves are counted in a
+// second u64, which follows, so that the carry into the high half can be subtracted again.
 // Error bound: src/passes/accumulate.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0x8d89caff991eca3f
 
 override CHANNELS: u32;
 
-// For each pair of a pixel's channels a u64 of sums and one of carries.
+// For each pair of a pixel's channels: a u64 of sums and a u64 of carries.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
-// What wrapped under the fragment in work, three bits a pair: whether its low half did, and how often its high half, which
-// carries reach twice where the halves are added one by one.
+// The carries of the current fragment, three bits per pair: one for the low half, and two that
+// count those of the high half. The high half may wrap twice if the halves are added one by one,
+// the first time by a carry from the low half.
 var<private> carries: u32;
 
 fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
@@ -18,7 +20,7 @@ fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
     let before_low = u32(before & 0xfffffffflu);
     let before_high = u32(before >> 32u);
     let from_low = select(0u, 1u, before_low + low < before_low);
-    // A term is less than 2^32 - 1.
+    // A term is less than 2^32 - 1, so `high + from_low` does not wrap.
     let from_high = select(0u, 2u, before_high + (high + from_low) < before_high);
     carries += (from_low + from_high) << (3u * pair);
 }
@@ -32,7 +34,8 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
     add_halves(pixel, channel >> 1u, first, second);
 }
 
-// After a fragment's terms: carries are rare, so one loop over all pairs is less work than a branch for each.
+// Adds the carries of a fragment. They are rare, so one loop over all pairs costs less than a
+// branch for each.
 fn settle(pixel: u32) {
     while (carries != 0u) {
         let pair = firstTrailingBit(carries) / 3u;
@@ -42,10 +45,11 @@ fn settle(pixel: u32) {
     }
 }
 
-// The sums when all is added: sums and carries of a pair.
+// The finished sums: for each pair its sums and its carries.
 @group(0) @binding(37) var<storage, read> added: array<vec2<u64>>;
 
-// The sums of the pixel that is shown, low and high words: both of a pair are read at once.
+// The sums of the pixel that show() loaded, low and high words. Both sums of a pair are read at
+// once.
 var<private> shown_low: array<u32, 18>;
 var<private> shown_high: array<u32, 18>;
 
@@ -65,7 +69,7 @@ fn show(pixel: u32) {
     }
 }
 
-// A sum of the shown pixel, in the units of the terms; ratios of two sums have no unit.
+// Returns a sum of the loaded pixel, in units of the terms. The unit cancels in ratios of two sums.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     return f32(shown_high[channel]) * 4294967296.0 + f32(shown_low[channel]);
 }

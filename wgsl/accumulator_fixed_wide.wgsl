@@ -1,5 +1,6 @@
-// Sums in fixed point of terms that may reach into the high word, two words a sum (low, high): those of terms_wide.wgsl, and
-// terms of surfels that stand for several (copies.wgsl). Most additions are two; accumulator_fixed.wgsl has one.
+// Sums in fixed point, two words each (low, high), of terms that may exceed one word: those of
+// terms_wide.wgsl, and those of surfels that stand for several copies (copies.wgsl). Most terms
+// take two atomic additions; in accumulator_fixed.wgsl they take one.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
@@ -16,7 +17,7 @@ fn add(pixel: u32, channel: u32, value: Term) {
     }
 }
 
-// Two sums that are neighbours; the first is an even channel.
+// Adds to two neighbouring sums, of which the first has an even channel.
 fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
     add(pixel, channel, first);
     add(pixel, channel + 1u, second);
@@ -26,7 +27,7 @@ fn settle(pixel: u32) {}
 
 fn show(pixel: u32) {}
 
-// A sum read back, in the units of the terms; ratios of two sums have no unit.
+// Reads a sum, in units of the terms. The unit cancels in ratios of two sums.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     let word = 2u * (pixel * CHANNELS + channel);
     return f32(atomicLoad(&sums[word + 1u])) * 4294967296.0 + f32(atomicLoad(&sums[word]));

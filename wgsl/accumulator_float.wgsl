@@ -1,5 +1,6 @@
-// Sums in f32 by atomic add: what a hardware blender with float targets does. The rounding depends on the order, so two
-// runs may differ. Needs f32 atomics. Error bound: src/passes/accumulate.rs.
+// Sums in f32 by atomic add, like those of a hardware blender with float targets. The rounding
+// depends on the order, so two runs may differ. Needs f32 atomics. Error bound:
+// src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
@@ -12,7 +13,7 @@ fn quantise(weight: f32) -> Term {
     return weight;
 }
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return weight;
 }

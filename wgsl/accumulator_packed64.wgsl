@@ -1,14 +1,15 @@
-// Two neighbouring sums in the halves of one u64: half the atomic operations of accumulator_fixed32, and the same terms
-// and overflow. Needs 64-bit atomics. Error bound: src/passes/accumulate.rs.
+// Two neighbouring sums in the halves of one u64: half the atomic operations of
+// accumulator_fixed32, with the same terms and the same overflow. Needs 64-bit atomics. Error
+// bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 override FRACTION_BITS: u32;
 
-// One comes first: how many fragments made a sum wrap.
+// The first u64 counts the fragments that made a sum wrap; the sums follow.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 const HEAD: u32 = 1u;
 
-// A sum wrapped under the fragment in work.
+// Whether a sum wrapped while the current fragment was added.
 var<private> wrapped: bool;
 
 alias Term = u32;
@@ -22,7 +23,7 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * one()));
 }
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return f32(weight) / one();
 }
@@ -35,11 +36,12 @@ fn add_halves(pair: u32, low: Term, high: Term) {
     let before = atomicAdd(&sums[pair], (u64(high) << 32u) | u64(low));
     let before_low = u32(before & 0xfffffffflu);
     let before_high = u32(before >> 32u);
-    // A low half that wraps carries into the high one, which is as wrong as a high half that wraps.
+    // A low half that wraps carries into the high half, which is as wrong as a high half that
+    // wraps.
     wrapped |= before_low + low < before_low || before_high + high < before_high;
 }
 
-// After a fragment's terms.
+// Counts a fragment that made a sum wrap, after all its terms were added.
 fn settle(pixel: u32) {
     if (wrapped) {
         atomicAdd(&sums[0], 1lu);

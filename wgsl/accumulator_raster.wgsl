@@ -1,8 +1,9 @@
-// Sums by the rasteriser's blender, four channels a target: a fragment's terms are gathered, then returned at once. What
-// blending makes of them depends on the format, and on the order. Bounds: src/passes/raster.rs.
+// Sums by the rasteriser's blender, four channels per target. The terms of a fragment are collected
+// and returned together. The result of blending depends on the format of the targets and on the
+// order of the fragments. Error bounds: src/passes/raster.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x9dd5c527955ba572
 
-// What terms are multiplied with, so that the sums of formats that end at 1 do not.
+// The factor on terms that keeps sums below 1 in formats that cannot hold more.
 override BLEND_SCALE: f32;
 
 alias Term = f32;
@@ -14,7 +15,7 @@ fn quantise(weight: f32) -> Term {
     return weight;
 }
 
-// The weight of its term.
+// The weight that a term stands for.
 fn part_of(weight: Term) -> f32 {
     return weight;
 }
@@ -49,7 +50,7 @@ fn weight_at(pixel: u32) -> f32 {
     return sum_at(pixel, WEIGHT_CHANNEL);
 }
 
-// The covered tiles (covered.wgsl).
+// Only the list of covered tiles (covered.wgsl): the rasteriser stores no depths in this buffer.
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 

@@ -1,5 +1,6 @@
-// What surfels have beside their shape: of each a record of as many words as the render needs, whose places the host says
-// (src/plan/surfel.rs). Another attribute is some more words and no binding.
+// The attributes of surfels beside their shape. Each surfel has a record of as many words as the
+// render needs, laid out by the host (src/plan/surfel.rs), so that one more attribute takes words
+// but no further binding.
 
 override ATTRIBUTE_WORDS: u32;
 
@@ -9,7 +10,7 @@ fn attribute_word(index: u32, word: u32) -> u32 {
     return attributes[index * ATTRIBUTE_WORDS + word];
 }
 
-// Four from `word` on.
+// Reads four floats from `word` on.
 fn attribute_vector(index: u32, word: u32) -> vec4<f32> {
     let at = index * ATTRIBUTE_WORDS + word;
     return bitcast<vec4<f32>>(vec4<u32>(attributes[at], attributes[at + 1u], attributes[at + 2u], attributes[at + 3u]));

@@ -1,4 +1,5 @@
-// The half-axes of a point that faces the camera: right and down in the image. Same interface as axes_own.wgsl.
+// The half-axes of a point that faces the camera: to the right and down in the image. Same
+// interface as axes_own.wgsl.
 // Twin: src/passes/facing.rs.
 
 struct Axes {
@@ -8,7 +9,7 @@ struct Axes {
     t_world: vec3<f32>,
 }
 
-// Of the radius in the image, rows of samples.
+// The limits of the radius in the image, in rows of samples.
 override LEAST_RADIUS: f32;
 override MOST_RADIUS: f32;
 
@@ -22,7 +23,7 @@ fn half_axes(surfel: Surfel, depth: f32) -> Axes {
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let row = widening(depth) / held.intrinsics.y;
     let limited = min(max(max(norm3(s), norm3(t)), LEAST_RADIUS * row), MOST_RADIUS * row);
-    // And no smaller than a sample, at which it shows.
+    // The point is no smaller than a sample, so that it shows at one.
     let r = max(limited, 0.5 * widening(depth) / min(held.intrinsics.x, held.intrinsics.y));
     return Axes(
         vec3<f32>(r, 0.0, 0.0),

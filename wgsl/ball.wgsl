@@ -1,4 +1,5 @@
-// Balls that hold surfels, as the camera sees them: of batches (cull.wgsl) and of nodes (select.wgsl). Twin: src/passes/cull.rs.
+// Bounding balls of surfels as the camera sees them: of batches (cull.wgsl) and of tree nodes
+// (select.wgsl). Twin: src/passes/cull.rs.
 
 // How far a low-pass may reach past its disk, pixels.
 override FILTER_REACH: f32;
@@ -7,12 +8,12 @@ struct Ball {
     // Camera space, device units.
     center: vec3<f32>,
     radius: f32,
-    // Depths of its fragments.
+    // The range of depths of the fragments in the ball.
     nearest: f32,
     farthest: f32,
 }
 
-// That of a centre relative to the eye, world axes, and a radius; device units.
+// The ball with a centre relative to the eye, in world axes, and a radius; device units.
 fn ball_at(relative: vec3<f32>, radius: f32) -> Ball {
     var b: Ball;
     b.center = rotate_plain(relative);
@@ -22,7 +23,7 @@ fn ball_at(relative: vec3<f32>, radius: f32) -> Ball {
     return b;
 }
 
-// Whether it reaches the near depth, so that its place in the image says nothing.
+// Whether the ball reaches the near depth, so that its image has no useful bounds.
 fn reaches_near(ball: Ball) -> bool {
     return !(ball.nearest > held.near);
 }

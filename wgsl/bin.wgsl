@@ -1,30 +1,31 @@
-// Between stages 2 and 3, for tiles: each cell of the image gets a list of the splats that may touch it, by count, scan and
-// place. A small splat's cells are the tiles; a large one's are blocks of them, as it touches many. The order within a list
-// depends on the schedule, but no minimum or sum does. Host side: src/passes/tiles.rs.
+// Between stages 2 and 3, for tiles: makes for each cell of the image a list of the splats that may
+// touch it, by count, scan and place. The cells of small splats are the tiles; those of large
+// splats, which touch many, are blocks of tiles. The order within a list depends on the schedule,
+// but no minimum or sum depends on that order. Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xce41422d9aa244b7
 
-// Words 0 and 1 say how long all lists together, and the longest, were at most. For cell t, word LIST_ENDS + t + 1 is at first
-// its count, then where its list starts, and at last where it ends, and word LIST_ENDS is 0; the lists follow from
-// lists_start on.
+// Words 0 and 1 are the greatest length so far of all lists together, and of one list. For cell t,
+// word LIST_ENDS + t + 1 is first its count, then the start of its list, and at last the end; word
+// LIST_ENDS is 0. The lists follow from lists_start on.
 @group(0) @binding(26) var<storage, read_write> lists: array<atomic<u32>>;
 
 const LIST_ENDS: u32 = 2u;
 
-// Pixels of a large splat's cell.
+// The side of a large splat's cell, pixels.
 const BLOCK_SIDE: u32 = 16u;
 const BLOCK_SIZE: vec2<u32> = vec2<u32>(BLOCK_SIDE, BLOCK_SIDE);
 
-// Of a small one's, which is a tile.
+// The size of a small splat's cell, which is a tile.
 fn tile_size() -> vec2<u32> {
     return vec2<u32>(TILE_WIDTH, TILE_ROWS);
 }
 
-// Cells of `size` pixels in a row of the image.
+// The number of cells of `size` pixels in a row of the image.
 fn cells_across(size: vec2<u32>) -> u32 {
     return (held.width + size.x - 1u) / size.x;
 }
 
-// Cells of `size` pixels in the band.
+// The number of cells of `size` pixels in the band.
 fn cells_in_band(size: vec2<u32>) -> u32 {
     return cells_across(size) * ((held_band.rows + size.y - 1u) / size.y);
 }
@@ -34,14 +35,14 @@ fn lists_start(size: vec2<u32>) -> u32 {
     return LIST_ENDS + 1u + cells_in_band(size);
 }
 
-// The cells that hold `pixels`, which are some, x and y.
+// The first and the last cell, by column and row, that contain `pixels`, which must not be empty.
 fn cells_of(pixels: Rectangle, size: vec2<u32>) -> Rectangle {
     let top = vec2<u32>(0u, held_band.first_row);
     return Rectangle((pixels.first - top) / size, (pixels.last - top) / size);
 }
 
-// Counts the splat in its cells, of each row those from `offset` on in steps of `step`; once counts are starts, this `enters`
-// it in their lists.
+// Counts the splat in its cells: in each row, in those from `offset` on in steps of `step`. Once
+// the counts have become starts, a call with `enters` also writes the splat into their lists.
 fn list_in_cells(slot: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {
@@ -58,7 +59,7 @@ fn list_in_cells(slot: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u3
     }
 }
 
-// A row of the workgroup for each large splat.
+// Each row of the workgroup lists one large splat.
 fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, enters: bool) {
     let slot = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
     if (slot < arrayLength(&projected)) {
@@ -66,7 +67,7 @@ fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, ent
     }
 }
 
-// One invocation a splat. One that is hidden gets empty bounds, by which no later pass sees it.
+// One invocation per splat. A hidden splat gets empty bounds, so that no later pass draws it.
 @compute @workgroup_size(WORKGROUP)
 fn bin_count(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -129,7 +130,8 @@ fn bin_place_large(
 const SCANNERS: u32 = 256u;
 var<workgroup> partial: array<u32, SCANNERS>;
 
-// Counts of small splats become starts. One workgroup; each invocation has a run of cells.
+// Turns the counts of small splats into starts. One workgroup; each invocation has a range of
+// cells.
 @compute @workgroup_size(SCANNERS)
 fn bin_scan(@builtin(local_invocation_index) local: u32) {
     hold();

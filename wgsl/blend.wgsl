@@ -1,18 +1,18 @@
-// What an accepted fragment adds to its pixel's sums, whoever keeps them: the attribute pass of compute (accumulate.wgsl)
-// or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
+// Adds an accepted fragment to its pixel's sums, in the attribute pass of the compute path
+// (accumulate.wgsl) or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
 
-// 2^-24: see LEAST_WEIGHT in src/scene/kernel.rs.
+// 2^-24; see LEAST_WEIGHT in src/scene/kernel.rs.
 const LEAST_WEIGHT: f32 = 5.9604644775390625e-8;
-// Kernel::floor there.
+// Kernel::floor in src/scene/kernel.rs.
 override KERNEL_FLOOR: f32;
 
 struct Attributes {
     color: vec4<f32>,
     normal: vec3<f32>,
     bend: Bend,
-    // Device units; 0 where epsilon does not depend on it.
+    // The shorter half-axis, device units; 0 if epsilon does not depend on it.
     radius: f32,
-    // In a texture.
+    // The texture coordinates.
     place: Place,
 }
 
@@ -21,7 +21,7 @@ fn attributes_of(index: u32, splat: Splat) -> Attributes {
     return Attributes(color_of(index, splat), normal_of(index, splat), bend_of(index), radius_of(index), place_of(index));
 }
 
-// Those that a list of fragments or the rasteriser hands on, neither of which draws textures.
+// The attributes of a fragment from a list or from the rasteriser, neither of which draws textures.
 fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, bend: Bend, radius: f32) -> Attributes {
     var nowhere: Place;
     return Attributes(color, normal, bend, radius, nowhere);
@@ -44,7 +44,7 @@ fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
     blend_weighted(pixel, weighed, fragment.depth, front, normal_at(attributes, fragment.spot), attributes);
 }
 
-// All but places in a texture. A weight of 0 adds nothing to any sum.
+// Adds all terms except texture coordinates. A weight of 0 adds nothing to any sum.
 fn blend_weighted(
     pixel: u32,
     weight: Term,

@@ -1,5 +1,5 @@
 // The orthographic camera x = fx X + cx. Same interface as camera_pinhole.wgsl.
-// Twin: src/passes/homography.rs and src/passes/footprint.rs.
+// Twins: src/passes/homography.rs and src/passes/footprint.rs.
 
 fn image_of(position: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -21,14 +21,14 @@ fn ball_sine(radius: f32, distance: f32) -> f32 {
     return 0.0;
 }
 
-// The part of the image (low x, y; high x, y) that a ball covers.
+// The part of the image that a ball covers: least x and y, greatest x and y, pixels.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     let image = center.xy * held.intrinsics.xy + held.intrinsics.zw;
     let extent = radius * held.intrinsics.xy;
     return vec4<f32>(image - extent, image + extent);
 }
 
-// Changes per pixel of the rows of the inverse of [s t], in doubled precision.
+// The changes per pixel of the rows of the inverse of [s t], in doubled precision.
 fn precise_rows(s_world: vec3<f32>, t_world: vec3<f32>, offset_x: Double, offset_y: Double) -> Rows {
     let s = rotate(widen(s_world));
     let t = rotate(widen(t_world));
@@ -64,10 +64,11 @@ fn homography(
     let image = vec2<f32>(x.high, y.high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
     let focal = held.intrinsics.xy;
-    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    // Edge-on, the rows vanish, and u is set to 2, which is outside the disk.
     let edge_on = h.away == 0.0;
     let scale = select(1.0 / (h.away * focal), vec2<f32>(0.0), edge_on);
-    // A centre farther out than this is no better an anchor for the pixels of the image, and whole numbers stay exact.
+    // A centre farther outside than this would be no better an anchor for the pixels of the image,
+    // and up to here whole numbers are exact.
     let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194303.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
     h.anchor = vec2<i32>(pixel);

@@ -1,5 +1,6 @@
-// The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
-// Twin: src/passes/homography.rs and src/passes/footprint.rs.
+// The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and its evaluation at a
+// pixel. Same interface as camera_orthographic.wgsl.
+// Twins: src/passes/homography.rs and src/passes/footprint.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x595e57151ede850c
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
@@ -8,21 +9,24 @@ fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     return sum(product(focal, quotient(position, depth)), principal);
 }
 
-// The extent of a disk wholly before the camera along one image axis, relative to its centre's X/Z.
-// Lines of constant x tangent to the disk: k^2 D + 2 k B - E = 0 with E >= 0 and D > 0 (conic of the disk's boundary).
+// The extent of a disk wholly in front of the camera along one image axis, relative to its centre's
+// X/Z. For the lines of constant X/Z tangent to the disk, k^2 D + 2 k B - E = 0 with E >= 0 and D >
+// 0 (the conic of the disk's boundary).
 fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32, slope: f32) -> vec2<f32> {
     let e = s * s + t * t;
     let b = s * s_z + t * t_z;
     let d = (p_z - slope) * (p_z + slope);
     let root = sqrt(b * b + d * e);
-    // Each root in the form that does not cancel; where both vanish the extent is zero.
+    // Each root in the form that does not cancel. If both forms vanish, the extent is zero.
     let far = abs(b) + root;
     let near = select(0.0, e / far, far > 0.0);
     return select(vec2<f32>(-near, far / d), vec2<f32>(-far / d, near), b >= 0.0);
 }
 
-// The extent along one axis, as X/Z, of the part of a disk at depths of `near` and more, for a disk that crosses that
-// depth: tangents of the conic that touch it there, and the two ends of the chord at `near`.
+// The extent along one axis, as X/Z, of the part of a disk at depths of at least `near`, for a disk
+// that crosses that depth. It is bounded by the tangents that touch the disk in that part, and by
+// the ends of its chord at `near`. Vectors are (x or y, z); `end_0` and `end_1` are (u, v) of the
+// ends.
 fn clipped_extent(
     s: vec2<f32>,
     t: vec2<f32>,
@@ -33,7 +37,7 @@ fn clipped_extent(
 ) -> vec2<f32> {
     let chord_0 = (p.x + end_0.x * s.x + end_0.y * t.x) / near;
     let chord_1 = (p.x + end_1.x * s.x + end_1.y * t.x) / near;
-    // The chord's ends are exact to the rounding of a sum of these magnitudes.
+    // The ends of the chord err by the rounding of a sum of these magnitudes.
     let blur = 1e-6 * (abs(p.x) + abs(s.x) + abs(t.x)) / near;
     var extent = vec2<f32>(min(chord_0, chord_1) - blur, max(chord_0, chord_1) + blur);
     let a = s.y * s.y + t.y * t.y - p.y * p.y;
@@ -47,7 +51,8 @@ fn clipped_extent(
             let k = roots[i];
             let line = vec3<f32>(s.x - k * s.y, t.x - k * t.y, p.x - k * p.y);
             let depth = p.y - (line.x * s.y + line.y * t.y) / line.z;
-            // Half of `near` leaves room for rounding; a tangent too many only widens the bounds. NaN fails.
+            // The factor 0.5 allows for rounding; a tangent too many only widens the bounds. NaN
+            // fails the test.
             if (depth >= 0.5 * near) {
                 extent = vec2<f32>(min(extent.x, k), max(extent.y, k));
             }
@@ -56,13 +61,15 @@ fn clipped_extent(
     return extent;
 }
 
-// The image of a half-axis at a centre, camera space: how far its end is seen from there, as if it were short.
+// The image of a half-axis from a centre in camera space, pixels, as if it were short (first
+// order).
 fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
     return (axis.xy - center.xy / center.z * axis.z) / center.z * held.intrinsics.xy;
 }
 
-// Whether a ball lies beside the image, by more than a margin of pixels: on the far side of a plane through the eye and an edge, so that this is told
-// of one that reaches the eye's plane too.
+// Whether a ball lies beside the image by more than a margin of pixels: on the far side of a plane
+// through the eye and an edge of the image. The test is also valid for a ball that reaches the
+// eye's plane.
 fn is_beside(center: vec3<f32>, radius: f32, margin: f32) -> bool {
     let before = held.intrinsics.zw + margin;
     let after = vec2<f32>(f32(held.width), f32(held.height)) + margin - held.intrinsics.zw;
@@ -73,14 +80,15 @@ fn is_beside(center: vec3<f32>, radius: f32, margin: f32) -> bool {
     return any(first) || any(last);
 }
 
-// The sine of half the angle that a ball at this distance is seen at.
+// The sine of half the angle that a ball subtends at this distance.
 fn ball_sine(radius: f32, distance: f32) -> f32 {
     return min(radius / distance, 1.0);
 }
 
-// The part of the image (low x, y; high x, y) that a ball before the camera covers; `nearest` is its least depth. An image of
-// one of its points lies within `turned` of the centre's; and so does that of a disk within it as its low-pass sees it, but
-// for the second order.
+// The part of the image that a ball in front of the camera covers: least x and y, greatest x and y,
+// pixels. `nearest` is its least depth. In units of X/Z, the image of each of its points lies
+// within `turned` of the centre's. So does the image of a disk in it, as the low-pass linearises
+// it, up to the second order, for which the square is added.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     let ratio = center.xy / center.z;
     let image = ratio * held.intrinsics.xy + held.intrinsics.zw;
@@ -89,7 +97,7 @@ fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     return vec4<f32>(image - extent, image + extent);
 }
 
-// Changes per pixel of the rows t x p and p x s over p . (s x t), in doubled precision.
+// The changes per pixel of the rows t x p and p x s, divided by p . (s x t), in doubled precision.
 fn precise_rows(
     p: array<Double, 3>,
     s_world: vec3<f32>,
@@ -123,8 +131,8 @@ fn homography(
     t_world: vec3<f32>,
     every: bool,
 ) -> Homography {
-    // In units of its own distance no product of a splat's lengths under- or overflows, however small a part of the scene
-    // it is. The unit is a power of two, so this is exact.
+    // In units of the splat's own distance no product of its lengths under- or overflows, however
+    // small a part of the scene it is. The unit is a power of two, so scaling is exact.
     let largest = max(max(abs(center[0].high), abs(center[1].high)), abs(center[2].high));
     let scale = bitcast<f32>(0x7f000000u - (bitcast<u32>(max(largest, 1e-30)) & 0x7f800000u));
     var scaled: array<Double, 3>;
@@ -132,7 +140,7 @@ fn homography(
         scaled[i] = Double(center[i].high * scale, center[i].low * scale);
     }
     var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, held.near * scale, every);
-    // The rows are inverse lengths.
+    // The rows have the unit of an inverse length.
     h.a *= scale;
     h.a_low *= scale;
     h.b *= scale;
@@ -164,7 +172,7 @@ fn scaled_homography(
         return h;
     }
     let focal = held.intrinsics.xy;
-    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    // Edge-on, the rows vanish, and u is set to 2, which is outside the disk.
     let edge_on = away == 0.0;
     let scale = select(vec3<f32>(1.0 / (away * focal), 1.0 / away), vec3<f32>(0.0), edge_on);
     let a = cross3(t, p) * scale;
@@ -174,11 +182,13 @@ fn scaled_homography(
         let x = image_of(center[0], center[2], 0u);
         let y = image_of(center[1], center[2], 1u);
         let image = vec2<f32>(x.high, y.high);
-        // Past this the anchor's arithmetic is no longer exact, and the image is far away.
+        // Beyond this the anchor's arithmetic is no longer exact, and the splat is far outside the
+        // image.
         let reach = abs(image) < vec2<f32>(4194304.0);
         if (all(reach)) {
             let pixel = floor(image);
-            // The centre of the splat relative to the centre of its pixel: the digits that make the image stable.
+            // The splat's centre relative to the centre of its pixel keeps the digits that make the
+            // image stable.
             let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
             h.anchor = vec2<i32>(pixel);
             h.a = vec3<f32>(a.xy, select(-dot2(a.xy, offset), 2.0 / p.z, edge_on));
@@ -217,8 +227,9 @@ fn scaled_homography(
         h.rare = true;
         return h;
     }
-    // The disk reaches the near depth, or its centre lies far outside the image: no useful centre pixel, so the
-    // homography is anchored in the image and the bounds are those of the part in front.
+    // The disk reaches the near depth, or its centre lies far outside the image. There is no useful
+    // centre pixel, so the homography is anchored at the middle of the image, and the bounds are
+    // those of the part of the disk beyond the near depth.
     h.anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
     let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - held.intrinsics.zw) / focal, 1.0);
     let unscaled = vec3<f32>(focal, 1.0);
@@ -242,18 +253,19 @@ fn scaled_homography(
 }
 
 struct Fragment {
-    // False outside the disk and nearer than `near`.
+    // False outside the disk and in front of the near depth.
     hit: bool,
     // Camera-space z, device units.
     depth: f32,
-    // Squared radius on the unit disk.
+    // The squared radius on the unit disk.
     rho2: f32,
-    // Factor on the kernel's weight.
+    // The factor on the kernel's weight.
     gain: f32,
     spot: Spot,
 }
 
-// The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
+// Intersects a pixel's ray with the splat's disk. `abc` is (u/z, v/z, 1/z) there: the products of
+// the splat's rows with the pixel relative to the anchor (layout.wgsl).
 fn intersect(abc: vec3<f32>) -> Fragment {
     let reached = dot2(abc.xy, abc.xy) <= abc.z * abc.z && abc.z > 0.0;
     let depth = 1.0 / abc.z;
@@ -264,99 +276,105 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0, spot);
 }
 
-// (u, v, 1) times a factor that is positive before the camera.
+// (u, v, 1) times a factor that is positive in front of the camera.
 fn homogeneous(abc: vec3<f32>) -> vec3<f32> {
     return abc;
 }
 
-// The longest (u/z, v/z) on the disk where 1/z is at most `most`.
+// The greatest length of (u/z, v/z) on the part of the disk where 1/z is at most `most`.
 fn rim(most: f32) -> f32 {
     return max(most, 0.0);
 }
 
-// The least depth of a fragment where row c has values between `low` and `high`.
+// The least depth of the fragments for which row c has values between `low` and `high`.
 fn nearest_between(low: f32, high: f32) -> f32 {
     return select(3e38, 1.0 / high, high > 0.0);
 }
 
-// The depth of the splat's plane, held within [low, high].
+// The depth of the splat's plane, clamped to [low, high].
 fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
     return 1.0 / clamp(abc.z, 1.0 / high, 1.0 / low);
 }
 
-// The world direction, of unit length, of the ray through the centre of the pixel.
+// The direction, in world space and of unit length, of the ray through the centre of the pixel.
 fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
     return unit3(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
 }
 
-// The direction in which the point `relative` to the eye is seen, unit; none at the eye.
+// The direction, of unit length, from the eye to the point `relative` to it; 0 at the eye itself.
 fn ray_to(relative: vec3<f32>) -> vec3<f32> {
     return relative * inverseSqrt(max(dot3(relative, relative), 1e-36));
 }
 
-// The point at a depth on that ray, relative to the eye, device units.
+// The point at a depth on the ray through the centre of a pixel, relative to the eye, device units.
 fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy * depth;
     return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
-// What a pixel has of a measure of the plane through `point`, relative to the eye: the measure's normal is as long as what a unit of area has
-// of it. Device units; at depth 0, where nothing is, 0.
+// The part of a measure on a plane that a pixel covers. The plane passes through `point`, relative
+// to the eye, and the length of `normal` is the measure per unit of its area. Device units; 0 at
+// depth 0, where nothing is.
 fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
     let facing = max(abs(dot3(normal, point / max(depth, held.near))), 1e-30);
     return dot3(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
 }
 
-// The third row of the matrix that takes an image point to (u, v, 1), up to a factor.
+// The third row of the matrix that maps an image point to (u, v, 1), up to a factor.
 fn homogeneous_row(splat: Splat) -> vec3<f32> {
     return vec3<f32>(splat.c[0], splat.c[1], splat.c[2]);
 }
 
-// For the rasteriser's depth test (raster_offset.wgsl): the depth from the value of row c; a measure of depth that is
-// linear over the image of a plane, in [0, 1] and largest in front; and the cosine between the ray through an image
-// point and the camera's axis.
+// For the rasteriser's depth test (raster_offset.wgsl): the depth for a value of row c.
 fn depth_of(c: f32) -> f32 {
     return 1.0 / max(c, 1.0 / held.farthest);
 }
 
+// For the same test: a measure of depth that is linear over the image of a plane, in [0, 1], and
+// largest in front.
 fn depth_order(z: f32) -> f32 {
     return min(held.near / z, 1.0);
 }
 
+// The cosine between the ray through an image point and the camera's axis.
 fn along_axis(image: vec2<f32>) -> f32 {
     let d = (image - held.intrinsics.zw) / held.intrinsics.xy;
     return inverseSqrt(1.0 + dot2(d, d));
 }
 
-// For caps (curved.wgsl): whether the anchor's pixel holds the splat's centre; how much wider than at a depth of 1 the image is at
-// `depth`; the way along the ray through p for each r of depth, where `spread_of` a length r is r / depth; X/Z at p; and the image of a
-// step across the axis at a depth.
+// For caps (curved.wgsl), like the functions that follow: whether the anchor's pixel contains the
+// splat's centre.
 fn holds_center(h: Homography) -> bool {
     return h.centered;
 }
 
+// The width of the view at `depth`, relative to that at depth 1.
 fn widening(depth: f32) -> f32 {
     return depth;
 }
 
+// The part of a ray's advance per unit of depth that all pixels share (D in src/passes/curved.rs).
 fn toward(p: vec3<f32>, depth: f32) -> vec3<f32> {
     return p / depth;
 }
 
+// A length r over the depth; 0 for an orthographic camera.
 fn spread_of(r: f32, depth: f32) -> f32 {
     return r / depth;
 }
 
+// X/Z and Y/Z at p; 0 in front of the near depth.
 fn shear(p: vec3<f32>) -> vec2<f32> {
     return select(vec2<f32>(0.0), p.xy / p.z, p.z > held.near);
 }
 
+// The image, pixels, of steps across the axis at the given depths.
 fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
     return x / depths * held.intrinsics.xy;
 }
 
-// The third of a homography's rows at a depth.
+// The value of a homography's third row at a depth.
 fn third_row(depth: f32) -> f32 {
     return 1.0 / depth;
 }

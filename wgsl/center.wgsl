@@ -1,7 +1,8 @@
-// A surfel's centre as a camera sees it. Its f32 centre is all there is of it. Same interface as center_doubled.wgsl.
+// A surfel's centre as a camera sees it, in scenes where an f32 holds it. Same interface as
+// center_doubled.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0xc26f8c1eed595583
 
-// Relative to the eye, device units.
+// The centre relative to the eye, device units.
 fn relative_center(index: u32, surfel: Surfel) -> array<Double, 3> {
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {

@@ -1,11 +1,14 @@
-// A surfel's centre as a camera sees it, in a scene so wide for its disks that an f32 has no room for a centre's last digits:
-// two distant clusters, say. These come with its attributes. Twin: Scene::center in src/scene/scene.rs.
+// A surfel's centre as a camera sees it, in scenes so wide for their disks that an f32 loses
+// visible digits of it: for example, two distant clusters. The attributes hold the low part of each
+// centre. Same interface as center.wgsl. Twin: Scene::center in src/scene/scene.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x97a1353c8cbc04b6
 
-// The first of three words of a surfel's attributes, world units.
+// The first of the three words of a surfel's attributes with the low part of its centre, world
+// units.
 override LOW_WORD: u32;
 
-// Relative to the eye, device units. Where leading parts cancel, what is left of them may be less than the trailing ones.
+// The centre relative to the eye, device units. Where the leading parts cancel, the rest of them
+// may be smaller than the trailing parts, so both are added in doubled precision.
 fn relative_center(index: u32, surfel: Surfel) -> array<Double, 3> {
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {

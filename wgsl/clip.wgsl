@@ -1,20 +1,21 @@
-// Disks that end at lines in their own planes: at a border, or where the surface has an edge. A point (u, v) of the unit disk
-// is kept where neither line has it on its far side. (Zwicker et al. 2004, Perspective Accurate Splatting, section 5.)
-// Polygons end at their sides too (outline.wgsl).
-// Same interface as clip_absent.wgsl. Twin: src/scene/clip.rs, src/passes/footprint.rs.
+// Disks that end at lines in their own planes: at a border, or where the surface has an edge. A
+// point (u, v) of the unit disk is kept unless it lies beyond one of two lines (Zwicker et al.
+// 2004, Perspective Accurate Splatting, section 5). Polygons also end at their sides
+// (outline.wgsl).
+// Same interface as clip_absent.wgsl. Twins: src/scene/clip.rs, src/passes/footprint.rs.
 
-// The first of six words of a surfel's attributes: two lines.
+// The first of the six words of a surfel's attributes that hold its two lines.
 override CLIP_WORD: u32;
 
 struct Clip {
-    // Kept: line . (u, v, 1) >= 0.
+    // Points with line . (u, v, 1) >= 0 are kept.
     first: vec3<f32>,
     second: vec3<f32>,
-    // By which the unit disk was turned in itself.
+    // Cosine and sine of the angle by which the unit disk was rotated in itself (rows.wgsl).
     turn: vec2<f32>,
 }
 
-// Of a splat whose unit disk was turned in itself (rows.wgsl).
+// The lines of a surfel, for a unit disk that `turn` has rotated in itself.
 fn clip_of(index: u32, turn: vec2<f32>) -> Clip {
     return Clip(turned_line(index, CLIP_WORD, turn), turned_line(index, CLIP_WORD + 3u, turn), turn);
 }
@@ -28,7 +29,7 @@ fn turned_line(index: u32, word: u32, turn: vec2<f32>) -> vec3<f32> {
     return vec3<f32>(line.x * turn.x + line.y * turn.y, line.y * turn.x - line.x * turn.y, line.z);
 }
 
-// Its rows in a splat's record, the last ones.
+// Rows of the lines in a splat's record (records.wgsl).
 const CLIP_ROWS: u32 = 2u;
 
 fn with_clip(record: SplatRecord, clip: Clip) -> SplatRecord {
@@ -45,7 +46,8 @@ fn clip_in(record: SplatRecord) -> Clip {
     return Clip(first.xyz, vec3<f32>(first.w, second.xy), second.zw);
 }
 
-// Whether a line, or a polygon's side, has the point, (u, v, 1) times a positive factor, on its far side.
+// Whether a point lies beyond a line, or beyond a side of the polygon. `p` is (u, v, 1) times a
+// factor that is positive in front of the camera.
 fn cuts(clip: Clip, p: vec3<f32>) -> bool {
     return p.z > 0.0 && (dot3(clip.first, p) < 0.0 || dot3(clip.second, p) < 0.0 || beyond_outline(clip.turn, p));
 }

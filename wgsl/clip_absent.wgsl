@@ -1,3 +1,5 @@
+// Disks end at their rims only. Same interface as clip.wgsl.
+
 struct Clip {
     nothing: u32,
 }

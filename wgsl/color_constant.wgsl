@@ -1,4 +1,5 @@
-// Every surfel has one colour: nothing is stored, nothing is summed, and it comes out exactly.
+// All surfels have the same colour: it is neither stored nor summed, and every pixel gets it
+// exactly.
 
 fn color_of(index: u32, splat: Splat) -> vec4<f32> {
     return vec4<f32>(0.0);

@@ -1,12 +1,14 @@
-// A surfel's colour from four f32 and spherical harmonics, by the direction that its centre is seen along: straight alpha. A term has
-// three words after the four: red, green and blue. Twin: src/scene/harmonics.rs.
+// A surfel's colour from four f32 (straight alpha) and spherical harmonics in the direction from
+// the eye to its centre. After the four, each term has three words: red, green and blue.
+// Twin: src/scene/harmonics.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x8f3393ef138ea48e
 
 override HARMONICS_DEGREE: u32;
 
 const MOST_TERMS: u32 = 15u;
 
-// The terms up to the degree; those beyond it are not read.
+// The basis functions in the unit direction d, up to HARMONICS_DEGREE. The others stay 0 and are
+// not read.
 fn harmonics(d: vec3<f32>) -> array<f32, MOST_TERMS> {
     let xx = d.x * d.x;
     let yy = d.y * d.y;

@@ -1,4 +1,4 @@
-// A surfel's colour from four f32: linear, straight alpha.
+// A surfel's colour from four f32: linear, straight alpha. Same interface as color_srgb8.wgsl.
 
 fn surfel_alpha(index: u32) -> f32 {
     return bitcast<f32>(attribute_word(index, 3u));

@@ -1,4 +1,4 @@
-// A surfel's colour from four bytes of sRGB and straight alpha.
+// A surfel's colour from four bytes: sRGB, straight alpha. Same interface as color_linear.wgsl.
 
 fn surfel_alpha(index: u32) -> f32 {
     return f32(attribute_word(index, 0u) >> 24u) / 255.0;

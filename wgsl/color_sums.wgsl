@@ -1,9 +1,10 @@
-// Premultiplied linear colour, each channel mapped from the scene's range to [0, 1] before it is summed. Channels: weight
-// and red, green and blue, alpha where it varies. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// Sums of premultiplied linear colour, each channel mapped from the scene's range to [0, 1] first.
+// Channels: weight, red, green and blue, and alpha if it varies.
+// Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x6f35f0f1d6ce788c
 
 const COLOR_CHANNEL: u32 = 1u;
-// 3, or 4 where alpha varies.
+// 3, or 4 if alpha varies.
 override COLOR_CHANNELS: u32;
 
 fn in_range(premultiplied: vec4<f32>) -> vec4<f32> {

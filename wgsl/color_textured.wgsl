@@ -1,5 +1,6 @@
-// A surfel's colour where its texture is not looked up: the texture's mean over its disk, as in color_linear.wgsl. The surfel's place
-// in the texture follows it, in three more (texture.wgsl), each of which has three numbers and a coordinate of what the surfel's centre leaves out.
+// A surfel's colour where its texture is not looked up: the texture's mean over its disk, in four
+// f32 as in color_linear.wgsl. Three more vectors hold its texture coordinates (texture.wgsl). Each
+// has three numbers for these and one coordinate of the low part of the surfel's centre.
 
 fn color_part(index: u32, part: u32) -> vec4<f32> {
     return attribute_vector(index, 4u * part);

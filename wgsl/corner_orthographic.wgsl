@@ -1,4 +1,5 @@
-// A corner of triangles as the orthographic camera sees it: it has an image wherever it lies. Same interface as corner_pinhole.wgsl.
+// A corner of triangles as the orthographic camera sees it: it has an image at any depth. Same
+// interface as corner_pinhole.wgsl.
 // Twin: src/passes/triangles.rs.
 
 fn corner_of(p: array<Double, 3>) -> Corner {
@@ -13,10 +14,10 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
-// A rasteriser's: 1 at the near depth, 0 beyond all there is.
+// The depth for the rasteriser: 1 at the near depth, 0 beyond everything in the scene.
 fn clip_depth(corner: Corner) -> f32 {
     let beyond = 2.0 * held.farthest - held.near;
-    // Where nothing lies beyond the near depth, all is clipped.
+    // If nothing lies beyond the near depth, everything is clipped.
     return (beyond - corner.depth.high) / max(beyond - held.near, 1e-30);
 }
 

@@ -1,7 +1,8 @@
-// A corner of triangles as the pinhole camera sees it. Same interface as corner_orthographic.wgsl. Twin: src/passes/triangles.rs.
+// A corner of triangles as the pinhole camera sees it. Same interface as corner_orthographic.wgsl.
+// Twin: src/passes/triangles.rs.
 
-// Before the near depth a corner is its image, and what it shares of a depth is one over its own; else it is its homogeneous image, which
-// has no quotient, and shares as it is.
+// Projects a corner. Beyond the near depth its position is its image, and its share is one over its
+// depth. Any other corner has its homogeneous image, which needs no division, and the share 1.
 fn corner_of(p: array<Double, 3>) -> Corner {
     if (p[2].high >= held.near) {
         return Corner(image_of(p[0], p[2], 0u), image_of(p[1], p[2], 1u), single(1.0), p[2], 1.0 / p[2].high);
@@ -20,7 +21,7 @@ fn is_before(corner: Corner) -> bool {
     return corner.depth.high >= held.near;
 }
 
-// What times the corner's place gives its homogeneous image: one over its share.
+// The factor from the corner's position to its homogeneous image: one over its share.
 fn homogeneous_depth(corner: Corner) -> Double {
     if (is_before(corner)) {
         return corner.depth;
@@ -28,13 +29,15 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
-// A rasteriser's: 1 at the near depth, 0 infinitely far away, where it is divided by the depth.
+// The depth for the rasteriser, which divides it by the corner's depth: 1 at the near depth, 0 at
+// infinity.
 fn clip_depth(corner: Corner) -> f32 {
     return held.near;
 }
 
-// How much of a triangle's parts a pixel has at `depth`, where the mean of the corners' shared depths by areas is `of_depth`: the determinant of
-// the parts by columns and rows.
+// The barycentric area of a pixel: the determinant of the change of the triangle's barycentric
+// coordinates per column and row. `depth` is the triangle's depth there, and `of_depth` the sum of
+// its corners' shared depths weighted by the areas of the opposite edges.
 fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
     let a = depth / homogeneous_depth(triangle.a).high;
     let b = depth / homogeneous_depth(triangle.b).high;
@@ -42,7 +45,7 @@ fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
     return a * b * c / of_depth;
 }
 
-// Its depth times its share.
+// The corner's depth times its share.
 fn shared_depth(corner: Corner) -> Double {
     if (is_before(corner)) {
         return single(1.0);

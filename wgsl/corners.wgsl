@@ -1,20 +1,22 @@
-// Triangles, their first stage: every vertex becomes a corner, once, whichever triangles it is of. One invocation a vertex.
+// Triangles, first stage: projects every vertex to a corner, once for all its triangles. One
+// invocation per vertex.
 // Twin: src/passes/triangles.rs.
 
-// World units relative to the scene's origin: three words a vertex (vertex.wgsl), or six
+// World units relative to the scene's origin: three words per vertex (vertex.wgsl), or six
 // (vertex_doubled.wgsl).
 @group(0) @binding(52) var<storage, read> vertices: array<f32>;
-// The numbers of a Corner, in their order.
+// The fields of Corner, in their order.
 @group(0) @binding(53) var<storage, read_write> corners_seen: array<array<f32, 9>>;
 
-// A vertex in the image. Relative to the point p of the image it is (x, y) - p w, and that is what its triangles' edges are made of.
+// A vertex in the image. Relative to the image point p it is (x, y) - p w, from which the edges of
+// its triangles are computed.
 struct Corner {
     x: Double,
     y: Double,
     w: Double,
     // Camera-space z, device units.
     depth: Double,
-    // What weighs its part of a triangle's pixel beside the part's area.
+    // The factor on its area in a pixel's barycentric coordinates.
     share: f32,
 }
 

@@ -1,4 +1,4 @@
-// Accepted fragments.
+// The number of accepted fragments of each pixel. Same interface as count_absent.wgsl.
 
 override COUNT_CHANNEL: u32;
 override COUNT_IMAGE: u32;

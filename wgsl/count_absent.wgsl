@@ -1,3 +1,5 @@
+// Fragments are not counted. Same interface as count.wgsl.
+
 fn accumulate_count(pixel: u32, weight: Term) {}
 
 fn count_of(pixel: u32) -> f32 {

@@ -1,33 +1,34 @@
-// Stage 4, its start: which tiles of the image have anything. The others stay as the image was cleared, and no invocation
-// looks at their pixels. Host side: src/passes/covered.rs.
+// Stage 4, its start: lists the tiles of the image that are not empty. The others stay as the image
+// was cleared, and no invocation visits their pixels. Host side: src/passes/covered.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xd09eb1f53779705e
 
-// Pixels of a tile, across and down.
+// The size of a tile, pixels.
 const TILE_WIDTH: u32 = 8u;
 override TILE_ROWS: u32;
 
-// 1 where the image differs from 0 even where nothing is, so that all tiles are listed.
+// 1 if all tiles are listed, because empty pixels of the image differ from 0 or layers are peeled.
 override LIST_EMPTY: u32;
-// 1 where inputs are kept apart: each lists the tiles that it covers itself, and what they leave is listed by individuals.wgsl.
+// 1 if inputs are kept separate. Each input then lists the tiles that it covers itself, and
+// individuals.wgsl lists those of the result.
 override LIST_APART: u32;
 
-// From covered_start() on: how many tiles are listed; a grid of workgroups with one for each; a grid with one for eight; and
-// from COVERED_LIST on the tiles.
+// The list, from covered_start() on: the number of listed tiles; a grid with one workgroup per
+// tile; a grid with one per eight tiles; and, from COVERED_LIST on, the tiles.
 const COVERED_GRID: u32 = 1u;
 const COVERED_GRID_OF_EIGHTS: u32 = 4u;
 const COVERED_LIST: u32 = 8u;
 
-// Tiles in a row of the image.
+// The number of tiles in a row of the image.
 fn tiles_across() -> u32 {
     return (held.width + TILE_WIDTH - 1u) / TILE_WIDTH;
 }
 
-// Tiles of the band.
+// The number of tiles in the band.
 fn tiles_in_band() -> u32 {
     return tiles_across() * ((held_band.rows + TILE_ROWS - 1u) / TILE_ROWS);
 }
 
-// One invocation a tile.
+// One invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn list_covered(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -38,7 +39,7 @@ fn list_covered(
     let tile = linear_index(workgroup, workgroups, local);
     let of_others = LIST_APART == 0u && (LIST_EMPTY != 0u || has_triangles(tile));
     if (tile < tiles_in_band() && (of_others || has_any(tile))) {
-        // Places depend on the schedule, but tiles share no pixel.
+        // The order of the list depends on the schedule, but tiles share no pixel.
         let place = atomicAdd(&nearest[covered_start()], 1u);
         atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
     }
@@ -56,7 +57,7 @@ fn arrange_covered() {
     }
 }
 
-// The tile at a place of the list; past its end a number that is no tile.
+// The tile at a place of the list; past its end, a number that is no tile.
 fn covered_tile(place: u32) -> u32 {
     return select(0xffffffffu, visible[covered_start() + COVERED_LIST + place], place < visible[covered_start()]);
 }

@@ -1,40 +1,45 @@
-// Stage 1, its start: which batches of surfels are projected at all. First those in view that lie nearer than the middle of
-// the scene; once these are drawn, those of the others that are not hidden behind them. A batch is left out only if none of
-// its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
-// stored one batch after the other, in slots: those that are left out take no room.
+// Stage 1, its start: chooses the batches of surfels that are projected. First those in view that
+// are nearer than the middle of the scene; once these are drawn, those of the others that are not
+// hidden behind them. A batch is left out only if none of its fragments could be nearest or within
+// epsilon of the nearest, so no image depends on it. The splats of the listed batches are stored in
+// slots, one batch after the other: batches that are left out take no memory.
 // Host side and twin: src/passes/cull.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x116791cebd55d876
 
-// A batch's bounding ball: centre and radius, world units relative to the scene's origin.
+// The bounding balls of batches: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
-// The grid of workgroups that draws all listed batches, of which word 1 counts them; from LIST_FAR on that of the far ones;
-// and from LIST_START on the numbers of the near ones and then of the far ones.
+// The grid of workgroups that draws all listed batches; its word 1 is their number. From LIST_FAR
+// on the grid of the far batches, and from LIST_START on the numbers of the batches, the near ones
+// first.
 @group(0) @binding(24) var<storage, read_write> surviving: array<atomic<u32>>;
 @group(0) @binding(25) var<storage, read> drawn: array<u32>;
-// Those in view that are not near: how many they are, and their numbers.
+// The batches in view that are not near: how many there are, and their numbers.
 @group(0) @binding(38) var<storage, read_write> rest: array<atomic<u32>>;
 
 const LIST_FAR: u32 = 3u;
 const LIST_START: u32 = 6u;
 
-// Past so many tiles a batch counts as seen: one invocation should not look at a whole image.
+// A batch that touches more tiles counts as visible: one invocation should not scan a whole image.
 const MOST_TILES: u32 = 4096u;
 
-// What the rounding of rows c may add to or take from a depth, relative (src/passes/cull.rs).
+// A relative margin on depths for the rounding of rows c (src/passes/cull.rs).
 const DEPTH_SLACK: f32 = 1e-3;
 
-// The slot of this invocation: a row of the grid is a batch, and its rows are the last that are listed so far.
+// The slot of this invocation. A row of the dispatch is a batch, and its rows are the last batches
+// that are listed so far.
 fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return (drawn[1] - workgroups.y + workgroup.y) * BATCH + workgroup.x * WORKGROUP + local;
 }
 
-// The place in its page of the surfel whose splat belongs there; past the last for some in the slots of the last batch.
+// The place in its page of the surfel whose splat has this slot. Some slots of the last batch have
+// places past the last surfel.
 fn place_for(slot: u32) -> u32 {
     return drawn[LIST_START + slot / BATCH] * BATCH + slot % BATCH;
 }
 
-// No coordinate of an anchor is past 2^22 (camera_pinhole.wgsl, camera_orthographic.wgsl), so the two leave 18 bits of their
-// words, and those have the number of the batch, of which a page has fewer than 2^16.
+// Coordinates of an anchor are at most 2^22 (camera_pinhole.wgsl, camera_orthographic.wgsl), so its
+// two words have 18 spare bits. They hold the number of the batch; a page has fewer than 2^16
+// batches.
 const SPARE: vec2<u32> = vec2<u32>(9u);
 
 fn anchor_words(splat: Splat, place: u32) -> vec2<u32> {
@@ -47,7 +52,7 @@ fn anchor_of(words: vec2<u32>) -> vec2<i32> {
     return bitcast<vec2<i32>>(words << SPARE) >> SPARE;
 }
 
-// The surfel of the splat that is stored in a slot.
+// The surfel whose splat is stored in a slot.
 fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
     let spare = each_word(record[0]).xy >> (32u - SPARE);
     return surfel_of((spare.x | spare.y << SPARE.x) * BATCH + slot % BATCH);
@@ -56,15 +61,15 @@ fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
 fn ball_of_batch(batch: u32) -> Ball {
     let sphere = balls[batch];
     let relative = sphere.xyz * held.unit - held.eye.xyz;
-    // Ten roundings of f32 in these lengths.
+    // The margin covers ten f32 roundings of these lengths.
     return ball_at(relative, sphere.w * held.unit + 1e-6 * (norm3(relative) + norm3(held.eye.xyz)));
 }
 
-// The batch's pixels, as far as they lie in the band; empty if a first lies past a last.
+// The pixels of the band that the ball may touch; empty if `first` is past `last`.
 fn pixels_of(ball: Ball) -> Rectangle {
     let top = f32(held_band.first_row);
     let extent = ball_extent(ball.center, ball.radius, ball.nearest);
-    // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
+    // One more pixel on each side for the margin of the splats' own bounds, and one for rounding.
     let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
     let first = max(extent.xy - margin, vec2<f32>(0.0, top));
     let last = min(extent.zw + margin, vec2<f32>(f32(held.width), top + f32(held_band.rows)) - 1.0);
@@ -82,7 +87,7 @@ fn leave_out(batch: u32) {
     atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
 }
 
-// One invocation a batch.
+// One invocation per batch.
 @compute @workgroup_size(WORKGROUP)
 fn cull_near(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -106,7 +111,8 @@ fn cull_near(
     }
 }
 
-// After the near ones are drawn: a pixel without any hides nothing. One invocation a tile.
+// Runs after the near batches are drawn. A tile with an empty pixel hides nothing. One invocation
+// per tile.
 @compute @workgroup_size(WORKGROUP)
 fn occlude_open(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -117,7 +123,7 @@ fn occlude_open(
     farthest_in(linear_index(workgroup, workgroups, local), NOTHING);
 }
 
-// Then, one invocation for each of the others (and more, which have none).
+// Runs after that, with an invocation for each of the other batches, and more that have none.
 @compute @workgroup_size(WORKGROUP)
 fn cull_far(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -154,7 +160,7 @@ fn behind(ball: Ball, pixels: Rectangle) -> bool {
     let start = band_pixels();
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            // Nothing, which is +inf, hides nothing.
+            // A tile with an empty pixel has +inf, which hides nothing.
             let front = bitcast<f32>(visible[start + y * tiles.x + x]);
             if (!(reached > deepest_accepted(front) * (1.0 + DEPTH_SLACK))) {
                 return false;

@@ -1,4 +1,5 @@
-// Every surfel is projected, and its splat has the slot of its own number. Same interface as cull.wgsl.
+// Every surfel is projected, and the slot of its splat is its place in the page. Same interface as
+// cull.wgsl.
 
 fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return linear_index(workgroup, workgroups, local);

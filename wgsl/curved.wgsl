@@ -1,36 +1,38 @@
-// Surfels that curve out of their planes: paraboloids over their disks, met exactly. How the numbers of a record are meant says the
-// twin, src/passes/curved.rs; rows a, b, c of the record are those of U, V and W, and the trailing part of a is D.
+// Surfels that curve out of their planes: paraboloids over their disks, intersected exactly. Rows
+// a, b and c of a splat's record are those of U, V and W, and a_low is D, as src/passes/curved.rs
+// defines them.
 // Same interface as flat.wgsl. Twins: src/scene/cap.rs, src/passes/curved.rs.
 
-// The first of three words of a surfel's attributes: heights, world units.
+// The first of the three words of a surfel's attributes that hold its heights, world units.
 override CAP_WORD: u32;
 
 struct Cap {
-    // uu, uv, vv, in units of the longer half-axis.
+    // The coefficients uu, uv and vv of the height, in units of the longer half-axis.
     heights: vec3<f32>,
     // The longer half-axis over the depth; 0 for an orthographic camera.
     spread: f32,
     // The longer half-axis, and the depth at which U, V and W are taken, device units.
     radius: f32,
     depth: f32,
-    // In front of all its fragments.
+    // A depth in front of all fragments of the cap.
     nearest: f32,
 }
 
-// Where on the surfel a fragment is.
+// The position of a fragment on its surfel.
 struct Spot {
     uv: vec2<f32>,
-    // Its back is seen.
+    // Whether its back is seen.
     away: bool,
 }
 
-// What the normal gains for a unit of u and of v, where that of the centre is 1 long.
+// The change of the normal per unit of u and of v, where the centre's normal has length 1.
 struct Bend {
     u: vec3<f32>,
     v: vec3<f32>,
 }
 
-// No hit lies farther from the depth of U, V and W than so many longer half-axes: a cap is no higher than one.
+// The greatest distance of a hit from the depth of U, V and W, in longer half-axes; a cap is no
+// higher than one of them.
 const FARTHEST_HIT: f32 = 8.0;
 
 fn world_heights(index: u32) -> vec3<f32> {
@@ -41,14 +43,14 @@ fn world_heights(index: u32) -> vec3<f32> {
     );
 }
 
-// The least and largest height over the unit disk.
+// The least and the greatest height over the unit disk; their interval includes 0.
 fn extremes(heights: vec3<f32>) -> vec2<f32> {
     let mean = 0.25 * (heights.x + heights.z);
     let spread = norm2(vec2<f32>(0.25 * (heights.x - heights.z), 0.5 * heights.y));
     return vec2<f32>(min(mean - spread, 0.0), max(mean + spread, 0.0));
 }
 
-// The inverse of [s t n] by rows, n the unit normal of s and t.
+// The rows of the inverse of [s t n], n the unit normal of s and t.
 fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
     let across = cross3(s, t);
     let size = norm3(across);
@@ -56,8 +58,8 @@ fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
     return array<vec3<f32>, 3>(cross3(t, n) / size, cross3(n, s) / size, n);
 }
 
-// How the surfel curves whose disk has the homography h, in which rows and extent become those of the cap; and whether all of it shows
-// its back.
+// Returns the cap of the surfel whose disk has the homography h, and replaces rows, extent and
+// depths in h by those of the cap.
 fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
     let r = max(norm3(s), norm3(t));
@@ -70,7 +72,8 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     let slope = norm2(vec2<f32>(s.z, t.z));
     let low_shift = m[2] * height.x;
     let high_shift = m[2] * height.y;
-    // The rounding of these sums is less than 4 * 2^-24 of the magnitudes: a quarter of this.
+    // The rounding of these sums is less than 4 * 2^-24 of the magnitudes, a quarter of this
+    // margin.
     let blur = 1e-6 * (abs(p.z) + slope + height.y - height.x);
     let depths = vec2<f32>(
         p.z - slope + min(low_shift.z, high_shift.z) - blur,
@@ -90,7 +93,8 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     if (!centered) {
         (*h).anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
     }
-    // A pixel's step on the plane at that depth, in r; and the point of the anchor's ray there, from the centre.
+    // The step per pixel on the plane at that depth, and the point of the anchor's ray there
+    // relative to the centre, both in units of r.
     let per_pixel = scale / held.intrinsics.xy;
     var start = -(*h).offset * per_pixel;
     var start_z = 0.0;
@@ -102,7 +106,7 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     (*h).a = vec3<f32>(m[0].xy * per_pixel, dot2(m[0].xy, start) + m[0].z * start_z);
     (*h).b = vec3<f32>(m[1].xy * per_pixel, dot2(m[1].xy, start) + m[1].z * start_z);
     (*h).c = vec3<f32>(m[2].xy * per_pixel, dot2(m[2].xy, start) + m[2].z * start_z);
-    // The vector times the matrix whose columns are the rows m.
+    // D, the part of the rays' advance that all pixels share.
     let forward = toward(p, depth);
     (*h).a_low = vec3<f32>(dot3(forward, m[0]), dot3(forward, m[1]), dot3(forward, m[2]));
     let extent = box_extent(*h, array<vec3<f32>, 5>(p, s, t, low_shift, high_shift), depths);
@@ -113,17 +117,17 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     return Cap(heights, spread_of(r, depth), r, depth, max(depths.x, held.near) * (1.0 - 1e-5));
 }
 
-// The first and last point of the image (xy, zw) that sheared boxes about a cap have in common, for
-// which see the twin: of the disk p, s, t whose centre moves between two heights along the normal,
-// at these depths.
+// The first and the last point of the image (xy, zw) that two sheared boxes around the cap have in
+// common (Seen::extent in the twin). `disk` is p, s, t and the displacements of the centre to the
+// cap's lowest and highest point; `depths` is the range of the cap's depths.
 fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
     let along_ray = sheared_extent(h, disk, depths, shear(disk[0]), h.centered);
     let straight = sheared_extent(h, disk, depths, vec2<f32>(0.0), false);
     return vec4<f32>(max(along_ray.xy, straight.xy), min(along_ray.zw, straight.zw));
 }
 
-// The extent of the box that is sheared along the ray (ratio, 1), which is the `centered` one's
-// through its centre.
+// The extent of the box that is sheared along the ray (ratio, 1). If `centered`, that ray passes
+// through the cap's centre.
 fn sheared_extent(
     h: Homography,
     disk: array<vec3<f32>, 5>,
@@ -154,7 +158,7 @@ fn sheared_extent(
     );
 }
 
-// Whether all of the cap shows its back, or nothing of it is known: see the twin.
+// Whether the whole cap surely shows its back (Curve::faces_away in the twin).
 fn is_back(h: Homography, cap: Cap) -> bool {
     let p = vec3<f32>(h.a_low[0], h.a_low[1], h.a_low[2]);
     let gradient = norm2(vec2<f32>(
@@ -164,9 +168,10 @@ fn is_back(h: Homography, cap: Cap) -> bool {
     return p.z - extremes(cap.heights).y * cap.spread - gradient > 1e-6 * (1.0 + norm2(p.xy));
 }
 
-// Its rows in a splat's record, the last ones.
+// Whether surfels are points that face the camera (facing.wgsl).
 const FACES: bool = false;
 
+// Rows of the cap in a splat's record (records.wgsl).
 const CAP_ROWS: u32 = 2u;
 
 fn with_cap(record: SplatRecord, cap: Cap) -> SplatRecord {
@@ -189,7 +194,8 @@ fn bent(heights: vec3<f32>, a: vec2<f32>, b: vec2<f32>) -> f32 {
     return heights.x * a.x * b.x + heights.y * (a.x * b.y + a.y * b.x) + heights.z * a.y * b.y;
 }
 
-// The point of a pixel's ray that lies sigma behind the depth of `start`, as a fragment.
+// The point of a pixel's ray at the depth cap.depth + sigma cap.radius, as a fragment. `away` says
+// whether it shows the cap's back.
 fn on_cap(splat: Splat, start: vec3<f32>, step: vec3<f32>, sigma: f32, away: bool) -> Fragment {
     let uv = start.xy + sigma * step.xy;
     let rho2 = dot2(uv, uv);
@@ -205,7 +211,7 @@ fn on_cap(splat: Splat, start: vec3<f32>, step: vec3<f32>, sigma: f32, away: boo
     );
 }
 
-// The fragment of the pixel at d from the anchor, the nearer one of the ray's two.
+// The fragment of the pixel at d from the anchor: the nearer hit among the ray's two intersections.
 fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let start = vec3<f32>(
         splat.a[0] * d.x + (splat.a[1] * d.y + splat.a[2]),
@@ -219,9 +225,9 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let c = 0.5 * bent(heights, start.xy, start.xy) - start.z;
     let discriminant = b * b - 4.0 * a * c;
     let root = sqrt(max(discriminant, 0.0));
-    // Neither root cancels: q is the sum of two numbers of one sign.
+    // Neither root cancels: q is the sum of two numbers of equal sign.
     let q = -0.5 * (b + select(-root, root, b >= 0.0));
-    // The slope at c / q is that of b, and at q / a the other one.
+    // The slope has the sign of b at c / q, and the opposite sign at q / a.
     let one = on_cap(splat, start, step, c / q, b < 0.0);
     let other = on_cap(splat, start, step, q / a, b >= 0.0);
     let nearer = other.hit && (!one.hit || other.depth < one.depth);
@@ -236,7 +242,7 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     return softened(fragment, splat, filter_, d, start, step);
 }
 
-// With the low-pass: its own fragments lie on the plane that touches the cap at its centre.
+// Applies the low-pass, whose own fragments lie on the plane that touches the cap at its centre.
 fn softened(
     fragment: Fragment,
     splat: Splat,
@@ -248,13 +254,14 @@ fn softened(
     if (!FILTERED) {
         return fragment;
     }
-    // Seen edge-on it is met at its centre's depth.
+    // Seen edge-on, the plane counts as met at the centre's depth.
     let sigma = select(-start.z / step.z, 0.0, step.z == 0.0);
     let row = third_row(splat.cap.depth + splat.cap.radius * sigma);
     var round = filtered(fragment, vec3<f32>(0.0, 0.0, row), filter_, d);
     if (round.rho2 < fragment.rho2) {
         let away = (splat.bounds_last & AWAY) != 0u;
-        // What a line cuts of the plane, and a back that is left out, the cap itself may show.
+        // Where a clip line cuts off this point of the plane, or the plane's back is culled, the
+        // cap itself may still show.
         if (cuts(splat.clip, vec3<f32>(start.xy + sigma * step.xy, 1.0)) || (CULL_BACK && away)) {
             return fragment;
         }
@@ -267,10 +274,10 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
     return fragment.spot.away;
 }
 
-// A depth in front of every fragment of the splat itself between the pixels `first` and `last`,
-// from the anchor. A ray meets the plane of a height h over the disk's plane at sigma = (h - W) /
-// (D_w + spread W), which grows or falls with W, and with h, wherever the divisor keeps its sign:
-// so one of the four ends is the nearest.
+// A depth in front of every fragment of the cap itself between the pixels `first` and `last`,
+// relative to the anchor. A ray meets the plane at height h over the disk's plane at sigma = (h -
+// W) / (D_w + spread W). This grows or falls with W, and with h, wherever the divisor keeps its
+// sign, so one of the four ends is the nearest.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let cap = splat.cap;
     let row = vec2<f32>(splat.c[0], splat.c[1]);
@@ -281,11 +288,11 @@ fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let w = vec2<f32>(low.x + low.y - slack, high.x + high.y + slack) + splat.c[2];
     let along = splat.a_low[2];
     let divisor = along + cap.spread * w;
-    // Where a divisor has lost its digits to cancellation, nothing is known.
+    // If a divisor has lost its digits to cancellation, only the bound of the whole cap is certain.
     if (min(abs(divisor.x), abs(divisor.y)) < 1e-4 * abs(along) || divisor.x * divisor.y <= 0.0) {
         return cap.nearest;
     }
-    // A thousandth is left for what a ray that touches the cap is off.
+    // The margin of a thousandth allows for the error of a ray that grazes the cap.
     let heights = 1.001 * extremes(cap.heights);
     let sigma = min((heights.x - w) / divisor, (heights.y - w) / divisor);
     let nearest_sigma = min(sigma.x, sigma.y);

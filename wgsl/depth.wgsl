@@ -1,6 +1,7 @@
-// Depth. Accepted fragments lie between the nearest depth and the tolerance behind it, so their place in that interval
-// is what is summed: its error is 2^-24 of epsilon, not of the scene. Those of other cuts, which may lie before it (fade.wgsl), count as nearest.
-// Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// Sums of depths. Accepted fragments lie between the nearest depth and the tolerance behind it, so
+// their position in that interval is summed: its error is 2^-24 of epsilon, not of the scene.
+// Fragments of other cuts, which may lie in front of it (fade.wgsl), count as nearest.
+// Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;
 
@@ -8,7 +9,7 @@ fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
     add(pixel, DEPTH_CHANNEL, term(weight, (depth - front) / (deepest_accepted(front) - front)));
 }
 
-// Device units.
+// The mean depth, device units.
 fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
     let mean = sum_at(pixel, DEPTH_CHANNEL) / weight;
     return front + mean * (deepest_accepted(front) - front);

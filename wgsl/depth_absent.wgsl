@@ -1,4 +1,5 @@
-// No depths are summed: that of a surface is its nearest fragment's. Same interface as depth.wgsl.
+// No depths are summed: the depth of a surface is that of its nearest fragment. Same interface as
+// depth.wgsl.
 
 fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {}
 

@@ -1,9 +1,10 @@
-// Depth where surfaces are told apart by it. A disk touches its surface in its middle and stands out from it by the square of the
-// distance from there, so a fragment counts by the square of its weight here: what is blended is less than two thirds as far out.
-// Same interface as depth.wgsl. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// Sums of depths where surfaces are compared by their depths. A disk touches its surface in the
+// middle and stands out from it by the square of the distance from there. So a fragment counts by
+// the square of its weight here: the blended depth is less than two thirds as far out.
+// Same interface as depth.wgsl. Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;
-// Of the weights of depths.
+// The channel of the weights of depths.
 override MIDDLES_CHANNEL: u32;
 
 // LEAST_MIDDLE in src/passes/accumulate.rs.
@@ -15,7 +16,8 @@ fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
     add(pixel, DEPTH_CHANNEL, term(squared, (depth - front) / (deepest_accepted(front) - front)));
 }
 
-// Device units. Accumulators of few bits may have nothing left of small weights.
+// The mean depth, device units. In an accumulator of few bits, small weights may have rounded to 0;
+// the depth is then the nearest one.
 fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
     let middles = sum_at(pixel, MIDDLES_CHANNEL);
     let mean = select(0.0, sum_at(pixel, DEPTH_CHANNEL) / middles, middles > 0.0);

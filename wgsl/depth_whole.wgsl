@@ -1,5 +1,7 @@
-// Depth where the nearest one is not known while summing: as a fraction of the farthest there is, so that its error is
-// that of the scene's depth, not of epsilon. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// Sums of depths where the nearest depth is not known yet: as fractions of the farthest depth in
+// the scene, so that their error is that of the scene's depth, not of epsilon. Same interface as
+// depth.wgsl.
+// Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;
 

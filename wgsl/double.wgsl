@@ -1,9 +1,12 @@
-// Arithmetic with twice the digits of f32: a number is an unevaluated sum high + low, |low| <= ulp(high) / 2.
-// Dekker 1971, "A floating-point technique for extending the available precision"; Knuth's two-sum.
+// Arithmetic with twice the digits of f32: a number is an unevaluated sum high + low, |low| <=
+// ulp(high) / 2. Dekker 1971, "A floating-point technique for extending the available precision";
+// Knuth's two-sum.
 //
-// WGSL lets an implementation reassociate where it believes the result no worse: Mesa's optimiser and NVIDIA's compiler rewrite
-// (a + b) - a to b, which is just the rounding error these functions are after, and the latter a / b + c / b to (a + c) / b. `keep` passes a value through an
-// exclusive or with a uniform that is always zero: exact, one integer instruction, and opaque to every compiler.
+// WGSL lets a compiler reassociate where it considers the result no worse. Mesa's optimiser and
+// NVIDIA's compiler rewrite (a + b) - a to b, which removes the very rounding error that these
+// functions compute; NVIDIA's also rewrites a / b + c / b to (a + c) / b. `keep` passes a value
+// through an exclusive or with a uniform that is always zero: exact, one integer instruction, and
+// opaque to every compiler.
 
 struct Double {
     high: f32,
@@ -27,12 +30,13 @@ fn two_sum(a: f32, b: f32) -> Double {
     return Double(sum, keep(keep(a - keep(sum - part)) + keep(b - part)));
 }
 
-// The leading 12 bits of the significand; x minus them has 12 bits too, so products of halves are exact.
+// The leading 12 bits of the significand. x minus them has 12 bits too, so products of halves are
+// exact.
 fn upper_half(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
 }
 
-// a * b exactly, barring underflow of the error.
+// a * b exactly, unless the error underflows.
 fn two_product(a: f32, b: f32) -> Double {
     let product = keep(a * b);
     let a1 = upper_half(a);

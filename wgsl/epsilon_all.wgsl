@@ -1,4 +1,4 @@
-// Every depth counts. Same interface as epsilon.wgsl.
+// Every depth is accepted. Same interface as epsilon.wgsl.
 
 fn radius_of(index: u32) -> f32 {
     return 0.0;

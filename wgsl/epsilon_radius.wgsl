@@ -1,6 +1,7 @@
-// Epsilon as a multiple of the fragment's own surfel's shorter half-axis. Twin: src/passes/accumulate.rs.
+// Epsilon as a multiple of the shorter half-axis of the fragment's own surfel. Same interface as
+// epsilon.wgsl. Twin: src/passes/accumulate.rs.
 
-// Device units.
+// The shorter half-axis, device units.
 fn radius_of(index: u32) -> f32 {
     let surfel = surfel_at(index);
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
@@ -8,7 +9,7 @@ fn radius_of(index: u32) -> f32 {
     return min(norm3(s), norm3(t));
 }
 
-// Of the largest surfel: what depths are measured by.
+// The farthest accepted depth for the largest surfel, to which depth sums are scaled (depth.wgsl).
 fn deepest_accepted(front: f32) -> f32 {
     let epsilon = min(held.epsilon_deepest, front * held.epsilon_most);
     return min(front + (front * held.epsilon_relative + epsilon), held.farthest);

@@ -1,11 +1,11 @@
-// Epsilon as a length along the pixel's view ray (paper 000, section 5.3): less of a depth toward the image's corners. Same interface as
-// epsilon.wgsl. Twin: src/passes/accumulate.rs.
+// Epsilon as a length along the pixel's view ray (paper 000, section 5.3), which spans less depth
+// toward the image's corners. Same interface as epsilon.wgsl. Twin: src/passes/accumulate.rs.
 
 fn radius_of(index: u32) -> f32 {
     return 0.0;
 }
 
-// Where the ray is the axis.
+// On the camera's axis, where the length spans the most depth.
 fn deepest_accepted(front: f32) -> f32 {
     return min(front + (front * held.epsilon_relative + held.epsilon_absolute), held.farthest);
 }

@@ -1,5 +1,5 @@
-// Points that face the camera: shapes in a plane parallel to the image, around an axis along the view (Schuetz and Wimmer 2015, section
-// III). Same interface as flat.wgsl.
+// Points that face the camera: shapes in a plane parallel to the image, around an axis along the
+// view (Schuetz and Wimmer 2015, section III). Same interface as flat.wgsl.
 // Twin: src/passes/facing.rs.
 
 struct Cap {
@@ -16,6 +16,7 @@ struct Bend {
 
 override SQUARE: bool;
 
+// Whether surfels are points that face the camera.
 const FACES: bool = true;
 
 fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
@@ -36,7 +37,8 @@ fn cap_in(record: SplatRecord) -> Cap {
     return Cap(0u);
 }
 
-// The radius, device units: of a disk parallel to the image, u changes by 1 / (r fx) a pixel, over its depth for a pinhole.
+// The radius, device units. In a disk parallel to the image, row a (u, or u/z for a pinhole)
+// changes by 1 / (r fx) per pixel.
 fn radius_across(splat: Splat) -> f32 {
     return 1.0 / (splat.a[0] * held.intrinsics.x);
 }
@@ -51,9 +53,10 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let abc = vec3<f32>(change * d + vec2<f32>(splat.a[2], splat.b[2]), splat.c[2]);
     let flat_ = intersect(abc);
     let uv = homogeneous(abc);
-    // Quotients are of numbers of the splat, so that none is left to a pixel, and squares are compared: no root either.
+    // All divisors are numbers of the splat, so a pixel needs no division, and no root, as squares
+    // are compared.
     let beside = abs(uv.xy) * (1.0 / uv.z);
-    // A point always shows at the pixel that it lies in, as if it were a square of that size.
+    // A point always shows at the pixel that it lies in, like a square of that pixel's size.
     let own = abs(uv.xy) * (2.0 / change);
     let rho2 = select(min(dot2(beside, beside), largest2(own)), largest2(beside), SQUARE);
     let depth = flat_.depth - rise(rho2) * radius_across(splat);

@@ -1,23 +1,24 @@
-// Splats of cuts that fade into each other, and in which of them they are (src/scene/fade.rs).
-// A fragment weighs as many parts as these are; depths have no weights, and each sample shows that of one cut.
+// Splats of cuts that fade into each other, and the range of cuts that contain each
+// (src/scene/fade.rs). A fragment's weight is multiplied by the fraction of the cuts in that range.
+// Depths have no weights, so each sample takes the nearest depth of one cut.
 // Same interface as fade_absent.wgsl.
 
-// How many cuts.
+// The number of cuts.
 const FADE_STEPS: f32 = 64.0;
 
 struct Fade {
-    // The first, and one more than the last.
+    // The first cut, and one past the last.
     first: u32,
     end: u32,
 }
 
-// That of a surfel at a place of its page.
+// The fade of the surfel `index`, which has this place in its page.
 fn fade_of(index: u32, place: u32) -> Fade {
     let word = fade_word(index, place);
     return Fade(word & 0xffu, word >> 8u);
 }
 
-// Its row in a splat's record, the last one.
+// Rows of the fade in a splat's record (records.wgsl).
 const FADE_ROWS: u32 = 1u;
 
 fn with_fade(record: SplatRecord, fade: Fade) -> SplatRecord {
@@ -37,9 +38,10 @@ fn faded(fragment: Fragment, fade: Fade) -> Fragment {
     return less;
 }
 
-// Whether the cut that the sample shows has the splat.
+// Whether the cut that the sample shows contains the splat.
 fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
-    // The lowest three digits of both, from the lowest on: those of the number of a cut from the highest on.
+    // Fade::threshold in src/scene/fade.rs: the three lowest bits of both numbers, from the lowest
+    // on, become the bits of the cut's number from the highest on.
     let differ = x ^ y;
     let cut = ((differ & 1u) << 5u) | ((y & 1u) << 4u)
         | ((differ & 2u) << 2u) | ((y & 2u) << 1u)
@@ -47,7 +49,8 @@ fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
     return cut >= fade.first && cut < fade.end;
 }
 
-// Whether what is nearest lies within epsilon behind a fragment, which may be of another cut; not where this cut has nothing, infinitely far or (tile.wgsl) at 0.
+// Whether the nearest depth, `front`, lies at most epsilon behind a fragment, which may be of
+// another cut. False if this cut has nothing at the pixel: `front` is then +inf, or 0 in tile.wgsl.
 fn meets_front(depth: f32, front: f32, radius: f32, image: vec2<f32>) -> bool {
     return front > 0.0 && farthest_shown(depth, radius, image) >= front;
 }

@@ -1,4 +1,4 @@
-// There is all of every splat. Same interface as fade.wgsl.
+// Every splat is in all cuts. Same interface as fade.wgsl.
 
 struct Fade {
     nothing: u32,

@@ -1,6 +1,7 @@
-// The fades of surfels that are given (src/scene/fade.rs): those of a cut come with it (select_fades.wgsl).
+// Fades that are given with the surfels (src/scene/fade.rs). Those of a cut come from
+// select_fades.wgsl.
 
-// Which word of a surfel's attributes.
+// The word of a surfel's attributes that holds its fade.
 override FADE_WORD: u32;
 
 fn fade_word(index: u32, place: u32) -> u32 {

@@ -1,5 +1,6 @@
-// What a low-pass needs of a splat beside its record. The filter is centred on the splat and elliptical: rho^2 = |R x|^2
-// for x pixels from the centre, R upper triangular. Layout mirrored in src/gpu/layout.rs.
+// The numbers that a low-pass needs of a splat beside its record. The filter is centred on the
+// splat and elliptical: rho^2 = |R x|^2 for x pixels from the centre, R upper triangular. Layout
+// mirrored in src/gpu/layout.rs.
 
 const FILTERED: bool = true;
 
@@ -7,17 +8,19 @@ struct Filter {
     // The splat's centre relative to the anchor's centre, pixels.
     center_x: f32,
     center_y: f32,
-    // The depths on the disk, device units: a filtered fragment stays among them.
+    // The range of depths on the disk, device units, to which the depths of filtered fragments are
+    // clamped.
     depth_low: f32,
     depth_high: f32,
     r_xx: f32,
     r_xy: f32,
     r_yy: f32,
-    // Factor on the kernel's weight; 0 where there is no filter: disks that reach the near depth are large anyway.
+    // The factor on the kernel's weight; 0 if there is no filter, as for disks that reach the near
+    // depth, which are large anyway.
     gain: f32,
 }
 
-// Its rows in a splat's record (records.wgsl).
+// Rows of the filter in a splat's record (records.wgsl).
 const FILTER_ROWS: u32 = 2u;
 
 fn with_filter(record: SplatRecord, filter_: Filter) -> SplatRecord {
@@ -39,7 +42,7 @@ fn least_filtered(filter_: Filter) -> f32 {
     return select(3e38, filter_.depth_low, filter_.gain > 0.0);
 }
 
-// Squared radius on the filter's ellipse.
+// The squared radius on the filter's ellipse.
 fn filter_rho2(filter_: Filter, d: vec2<f32>) -> f32 {
     let x = d - vec2<f32>(filter_.center_x, filter_.center_y);
     let r = vec2<f32>(filter_.r_xx * x.x + filter_.r_xy * x.y, filter_.r_yy * x.y);

@@ -1,4 +1,4 @@
-// Surfels that are flat: disks, met by their homographies. Same interface as curved.wgsl.
+// Flat surfels: disks, intersected by their homographies. Same interface as curved.wgsl.
 
 struct Cap {
     nothing: u32,
@@ -20,6 +20,7 @@ fn is_back(h: Homography, cap: Cap) -> bool {
     return h.away > 0.0;
 }
 
+// Whether surfels are points that face the camera (facing.wgsl).
 const FACES: bool = false;
 
 const CAP_ROWS: u32 = 0u;
@@ -34,7 +35,8 @@ fn cap_in(record: SplatRecord) -> Cap {
 
 fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let abc = vec3<f32>(
-        // The leading parts of a thin splat sum exactly, so the order of these two sums matters (rows.wgsl).
+        // The leading parts of a thin splat sum exactly, so the order of both sums matters
+        // (rows.wgsl).
         (splat.a[0] * d.x + (splat.a[1] * d.y + splat.a[2]))
             + (splat.a_low[0] * d.x + (splat.a_low[1] * d.y + splat.a_low[2])),
         splat.b[0] * d.x + (splat.b[1] * d.y + splat.b[2]),
@@ -47,12 +49,14 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
     return (splat.bounds_last & AWAY) != 0u;
 }
 
-// A depth in front of every fragment of the splat itself between the pixels `first` and `last`, from the anchor.
+// A depth in front of every fragment of the disk itself between the pixels `first` and `last`,
+// relative to the anchor.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let c = vec2<f32>(splat.c[0], splat.c[1]);
     let low = min(c * first, c * last);
     let high = max(c * first, c * last);
-    // The two products and two sums of `met` round by less than 4 * 2^-24 of these magnitudes: a sixteenth of this.
+    // The two products and two sums of `met` round by less than 4 * 2^-24 of these magnitudes, a
+    // sixteenth of this slack.
     let most = max(abs(low), abs(high));
     let slack = 4e-6 * (most.x + most.y + abs(splat.c[2]));
     return nearest_between(low.x + low.y + splat.c[2] - slack, high.x + high.y + splat.c[2] + slack);

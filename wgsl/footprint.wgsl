@@ -1,4 +1,5 @@
-// The splat's record evaluated at a pixel: the one place where coverage, depth and rho are decided, in every pass.
+// Evaluates a splat's record at a pixel. Every pass decides coverage, depth and rho by this file
+// alone.
 // Twin: src/passes/footprint.rs.
 
 struct Rectangle {
@@ -13,7 +14,7 @@ fn bounds(splat: Splat) -> Rectangle {
     );
 }
 
-// The pixels of the band that the splat can reach; empty if a first lies past a last.
+// The pixels of the band that the splat can reach; empty if `first` is past `last`.
 fn reach(splat: Splat) -> Rectangle {
     let extent = bounds(splat);
     return Rectangle(
@@ -22,9 +23,9 @@ fn reach(splat: Splat) -> Rectangle {
     );
 }
 
-// Splats whose bounds hold more pixels than LARGE get a workgroup each, the others an invocation: one invocation with a
-// hundred thousand pixels would hold up all others, and some drivers end its loop early (Mesa's llvmpipe after 65,535
-// rounds, without a word).
+// A splat whose bounds hold more than LARGE pixels gets a workgroup, any other an invocation. One
+// invocation with a hundred thousand pixels would hold up all others, and some drivers end its loop
+// early: Mesa's llvmpipe silently does so after 65,535 rounds.
 override LARGE: u32;
 
 fn is_large(splat: Splat) -> bool {
@@ -33,12 +34,12 @@ fn is_large(splat: Splat) -> bool {
     return all(extent.first <= extent.last) && size.x * size.y > LARGE;
 }
 
-// The queue of large splats, as project.wgsl wrote it.
+// The queue of large splats, which project.wgsl wrote.
 @group(0) @binding(13) var<storage, read> queued: array<u32>;
 const QUEUE_START: u32 = 8u;
 const TILE: u32 = 16u;
 
-// The slot of the large splat at a place in the queue, or none (a number that is no slot).
+// The slot of the large splat at a place in the queue; past its end, a number that is no slot.
 fn large_splat(place: u32) -> u32 {
     return select(0xffffffffu, queued[QUEUE_START + place], place < queued[0]);
 }
@@ -50,17 +51,17 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     return faded(fragment, splat.fade);
 }
 
-// Depths times this power of two lie in (0, 1).
+// A power of two that scales depths to (0, 1).
 fn depth_scale() -> f32 {
     return 0.5 * bitcast<f32>(0x7f000000u - (bitcast<u32>(held.farthest) & 0x7f800000u));
 }
 
-// Pixels of the band; its buffers may have room for more.
+// The number of pixels in the band; its buffers may be larger.
 fn band_pixels() -> u32 {
     return held_band.rows * held.width;
 }
 
-// The pixel's place in the band's buffers.
+// The index of the pixel in the band's buffers.
 fn pixel_index(x: u32, y: u32) -> u32 {
     return (y - held_band.first_row) * held.width + x;
 }

@@ -1,10 +1,11 @@
-// Stage 3 where surfaces show through each other: each pixel's fragments become a list. Their numbers, which the visibility pass left,
-// become where lists start, by a scan over rows and one over the pixels of each; then every fragment takes a place in its pixel's list.
+// Stage 3 where surfaces show through each other: makes a list of each pixel's fragments. The
+// visibility pass left their counts. A prefix sum over rows, and one over the pixels of each row,
+// turns the counts into starts of lists; then every fragment takes a place in its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
 // All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x099889a819ef66ae
 
-// How many fragments there are and how many at most at a pixel; where the lists of each row start and where the last one ends; then the
-// same of each pixel. Past what a word holds all three stay at its end.
+// The number of fragments, and the most at one pixel; then the start of each row's lists and the
+// end of the last; then the same per pixel. Numbers of fragments saturate at MOST_FRAGMENTS.
 @group(0) @binding(44) var<storage, read_write> list_starts: array<u32>;
 @group(0) @binding(45) var<storage, read> starts: array<u32>;
 
@@ -19,7 +20,7 @@ fn sum_or_most(a: u32, b: u32) -> u32 {
     return select(a + b, MOST_FRAGMENTS, a + b < a);
 }
 
-// Counts the fragments of a row. One invocation a row.
+// Counts the fragments of a row. One invocation per row.
 @compute @workgroup_size(WORKGROUP)
 fn fragments_of_rows(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -39,11 +40,11 @@ fn fragments_of_rows(
         most = max(most, count);
     }
     list_starts[STARTS_HEAD + row] = total;
-    // Until start_pixels writes it, the first word of a row's pixels has the row's most.
+    // Until start_pixels overwrites it, the first word of a row's pixels holds the row's maximum.
     list_starts[pixels_start() + row * held.width] = most;
 }
 
-// Counts of rows become starts.
+// Turns the counts of rows into starts.
 @compute @workgroup_size(1)
 fn start_rows() {
     hold();
@@ -80,35 +81,37 @@ fn start_pixels(
     }
 }
 
-// How many of a pixel's fragments have no place yet.
+// The number of a pixel's fragments that have no place yet.
 fn visible_count(pixel: u32) -> u32 {
     return atomicLoad(&nearest[pixel]);
 }
 
-// The depth of each fragment, and where its record is.
+// The depth of each fragment, and the index of its record.
 @group(0) @binding(46) var<storage, read_write> keys: array<vec2<u32>>;
 @group(0) @binding(47) var<storage, read_write> fragments: array<Words>;
 
-// A record has so many rows of four words: the weight, and where the others are (FragmentLayout in src/plan/fragment.rs).
+// A record has this many rows of four words. The weight comes first; the other constants are the
+// words of the other values (FragmentLayout in src/plan/fragment.rs).
 override FRAGMENT_ROWS: u32;
 override FRAGMENT_COLOR: u32;
 override FRAGMENT_COLORS: u32;
 override FRAGMENT_NORMAL: u32;
 override FRAGMENT_RADIUS: u32;
-// Whether it has them.
+// Whether a record has these values.
 override FRAGMENT_HAS_NORMAL: bool;
 override FRAGMENT_HAS_RADIUS: bool;
 
 const MOST_FRAGMENT_WORDS: u32 = 12u;
 alias Record = array<u32, MOST_FRAGMENT_WORDS>;
 
-// Gives a fragment a place in its pixel's list, unless it is too faint or too deep to be listed.
+// Stores a fragment in its pixel's list, unless it is too faint or too deep to be listed.
 fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attributes) {
     let weight = fragment_weight(fragment);
     if (!is_listed(pixel, fragment, weight * OPACITY * (held.color_low.a + held.color_span.a * attributes.color.a))) {
         return;
     }
-    // Counted down from as many as there are; if two kernels differ about a rim, what has no place is left out.
+    // The places are taken from the last to the first. If two kernels decide differently at a rim,
+    // a fragment without a place is left out.
     let left = atomicSub(&nearest[pixel], 1u);
     let at = starts[pixels_start() + pixel] + (left - 1u);
     if (left > starts[pixels_start() + pixel + 1u] - starts[pixels_start() + pixel] || left == 0u) {
@@ -137,8 +140,9 @@ fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attrib
     }
 }
 
-// The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. As in accumulate.wgsl each round of the outer
-// loop finds the next one and then lists it, so that the invocations of a subgroup do the costly part together.
+// Lists the splat's fragments at the pixels from `offset` on, in steps of `step`, with one
+// invocation. As in accumulate.wgsl, each round of the outer loop first finds the next fragment and
+// then lists it, so that the invocations of a subgroup do the expensive part together.
 fn list_splat(slot: u32, splat: Splat, record: SplatRecord, offset: vec2<u32>, step: u32) {
     let filter_ = filter_in(record);
     let surfel = surfel_in(record, slot);
@@ -196,10 +200,11 @@ fn list_fragments_large(
     }
 }
 
-// Where a pixel's list starts and ends.
+// The start and the end of a pixel's list.
 fn list_of(pixel: u32) -> vec2<u32> {
     let list = vec2<u32>(starts[pixels_start() + pixel], starts[pixels_start() + pixel + 1u]);
-    // Places for which no fragment was found are before the others; below none, one had no place.
+    // Places that no fragment took come before the others. If the count has wrapped below 0, a
+    // fragment found no place, and none is free.
     let left = visible[pixel];
     return vec2<u32>(list.x + select(left, 0u, left > list.y - list.x), list.y);
 }
@@ -227,7 +232,7 @@ fn listed_color(record: Record) -> vec4<f32> {
     return color;
 }
 
-// Mapped to [0, 1].
+// The normal, mapped to [0, 1]; 0 if records have none.
 fn listed_normal(record: Record) -> vec3<f32> {
     var normal = vec3<f32>(0.0);
     if (FRAGMENT_HAS_NORMAL) {

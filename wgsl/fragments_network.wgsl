@@ -1,8 +1,9 @@
-// Sorts up to sixteen keys in registers, by the network of sixty comparators of Green (1969; Knuth, The Art of Computer Programming 3,
-// 5.3.4): no branch, so that pixels with different lists sort together. Depths alone decide.
+// Sorts up to sixteen keys in registers by the network of sixty comparators of Green (1969; Knuth,
+// The Art of Computer Programming 3, 5.3.4). It has no branches, so pixels with different lists
+// sort together. Only depths are compared.
 // Host side: src/passes/fragments.rs, whose test proves the network.
 
-// Past the end of the list a key behind all others.
+// The key at a place; past the end of the list, one that sorts behind all others.
 fn key_or_last(first: u32, end: u32, place: u32) -> vec2<u32> {
     var key = vec2<u32>(0xffffffffu);
     if (first + place < end) {
@@ -21,12 +22,12 @@ fn ordered(a: vec2<u32>, b: vec2<u32>) -> vec4<u32> {
     return select(vec4<u32>(a, b), vec4<u32>(b, a), b.x < a.x);
 }
 
-// Whether two keys of the list have one depth.
+// Whether two keys of the list have the same depth.
 fn are_tied(a: vec2<u32>, b: vec2<u32>) -> bool {
     return a.x == b.x && b.y != 0xffffffffu;
 }
 
-// Whether some of one depth have yet to be put in order.
+// Sorts the keys by depth. Returns whether keys of the same depth have yet to be ordered.
 fn sort_sixteen(first: u32, end: u32) -> bool {
     var k0 = key_or_last(first, end, 0u);
     var k1 = key_or_last(first, end, 1u);

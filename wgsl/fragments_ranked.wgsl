@@ -1,14 +1,15 @@
-// Of fragments of one depth that comes first whose surfel does in the order in which they are stored, or in that of the tree, which depends on what they are and
-// not on where they stood in their files.
+// Fragments of the same depth are in the order of their surfels as stored, or as in the tree. That
+// order depends on the surfels' values, not on their positions in files. Same interface as
+// fragments_untied.wgsl.
 
 override FRAGMENT_RANK: u32;
 
 const TIES: bool = true;
 
-// Rules in src/passes/sorted.rs.
+// Rules::least_alpha in src/passes/sorted.rs.
 override LEAST_ALPHA: f32;
 
-// By the alpha of a fragment.
+// Whether a fragment is listed. `alpha` is the fragment's own.
 fn is_listed(pixel: u32, fragment: Fragment, alpha: f32) -> bool {
     return alpha >= LEAST_ALPHA && is_before_end(pixel, fragment.depth);
 }

@@ -1,13 +1,13 @@
-// Sorts each pixel's list from front to back, in place: positive depths order as their bits. Up to sixteen are sorted by a network
-// (fragments_network.wgsl), and by insertion where those of one depth have an order; more by a heap (Williams 1964), whose time does not
-// depend on how they lie.
+// Sorts each pixel's list from front to back, in place; positive depths order as their bits. Up to
+// sixteen fragments are sorted by a network (fragments_network.wgsl), and then by insertion if
+// those of the same depth have an order. Longer lists are sorted by a heap (Williams 1964), for
+// which no initial order is slow.
 // Host side: src/passes/fragments.rs.
 // All loops end, by 1, 5 of src/gpu/loops.rs: 0x52c7ff0d53d03c69
 
 const FEW: u32 = 16u;
 
-// What little is left to do after the network.
-
+// Insertion sort, for the little that is left to do after the network.
 fn sort_few(first: u32, end: u32) {
     for (var k = first + 1u; k < end; k++) {
         let own = keys[k];
@@ -20,7 +20,8 @@ fn sort_few(first: u32, end: u32) {
     }
 }
 
-// Lets the key at `top` of the heap of `count` keys from `first` on sink below those that follow it.
+// Restores the heap of `count` keys that starts at `first`: moves the key at `top` down, below the
+// keys that come after it in the order.
 fn sink(first: u32, count: u32, top: u32) {
     let own = keys[first + top];
     var at = top;
@@ -38,7 +39,8 @@ fn sink(first: u32, count: u32, top: u32) {
     keys[first + at] = own;
 }
 
-// The greatest of the `left + 1` keys of a heap changes places with the last and leaves it.
+// Swaps the greatest of the `left + 1` keys of a heap with the last one, and removes it from the
+// heap.
 fn pop(first: u32, left: u32) {
     let last = keys[first + left];
     keys[first + left] = keys[first];
@@ -46,7 +48,8 @@ fn pop(first: u32, left: u32) {
     sink(first, left, 0u);
 }
 
-// All build, then all pop: invocations of a subgroup that did either would wait for one another.
+// All invocations of a subgroup build their heaps, and then all pop. If some built while others
+// popped, they would wait for each other.
 fn sort_many(first: u32, end: u32) {
     let count = end - first;
     for (var k = count / 2u; k > 0u; k--) {
@@ -57,7 +60,7 @@ fn sort_many(first: u32, end: u32) {
     }
 }
 
-// One invocation a pixel.
+// One invocation per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn sort_fragments(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -1,4 +1,5 @@
-// Fragments of one depth may come in any order, as nothing that is made of them shows it. Same interface as fragments_ranked.wgsl.
+// Fragments of the same depth may come in any order, because no result depends on it. Same
+// interface as fragments_ranked.wgsl.
 
 const TIES: bool = false;
 

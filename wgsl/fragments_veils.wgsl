@@ -1,30 +1,34 @@
-// What the visibility pass keeps of a pixel that gets a list of fragments which are composited one by one: in steps of depth, how many there
-// are and how much they hold back, as optical depth, -ln(1 - alpha). The list ends with the step by which so little shows through that what
-// lies behind is never composited: sums of integers say so in any order. Same interface as fragments_count.wgsl.
+// Visibility pass for lists whose fragments are composited one by one. For each pixel and step of
+// depth it sums the number of fragments and their optical depth, -ln(1 - alpha). A list ends with
+// the step behind which so little shows that nothing there is ever composited; the sums are
+// integers, so this does not depend on the order of the fragments. Same interface as
+// fragments_count.wgsl.
 // Host side and proof: src/passes/veils.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x9b37ce054ecaded7
 
-// Of each pixel and step, from the nearest on: fragments, and what they hold back.
+// For each pixel and step, from the nearest on: the number of fragments and their optical depth.
 @group(0) @binding(50) var<storage, read_write> veils: array<atomic<u32>>;
 
 const VEILS: u32 = 16u;
-// Of an optical depth of 1.
+// Units per optical depth of 1.
 const VEIL_UNITS: f32 = 1024.0;
-// No fragment counts for more: nearer to an alpha of 1 its rounding would show.
+// The least 1 - alpha that counts: for an alpha nearer to 1 its rounding would matter.
 const LEAST_LEFT: f32 = 1e-3;
 
-// Fragments that are fainter are not listed, so they are not counted, and those that may not be hold nothing back.
+// A fragment with an alpha below LEAST_COUNTED is surely not listed, so it is not counted. One with
+// an alpha below LEAST_HELD may not be listed, so it adds no optical depth.
 override LEAST_COUNTED: f32;
 override LEAST_HELD: f32;
-// Of units, with which nothing more shows.
+// The optical depth behind which nothing more shows, in units.
 override ENOUGH_HELD: u32;
 
-// The alpha, with which cover() hands it on.
+// The surfel's alpha, which cover() passes to keep_nearest().
 fn mark_of(surfel: u32) -> u32 {
     return bitcast<u32>(surfel_alpha(surfel));
 }
 
-// Bits of positive depths are in their order, and as far apart as their logarithms, about.
+// The step of a depth. The bits of positive depths have their order, and are about as far apart as
+// their logarithms.
 fn veil_of(depth: f32) -> u32 {
     let first = bitcast<u32>(held.first);
     let width = (max(bitcast<u32>(held.farthest), first) - first) / VEILS + 1u;
@@ -44,22 +48,23 @@ fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
     }
 }
 
-// Of a pixel that has anything something that is not nothing, as there is no nearest depth.
+// Counts are stored, not depths: returns 1 if the pixel has a fragment, else NOTHING.
 fn nearest_at(pixel: u32) -> u32 {
     return select(NOTHING, 1u, atomicLoad(&nearest[pixel]) != 0u);
 }
 
-// After the lists' starts: the last step that each pixel lists.
+// The word after the starts of lists at which the last step that each pixel lists is stored.
 fn ends_start() -> u32 {
     return pixels_start() + band_pixels() + 1u;
 }
 
-// Whether a fragment of that depth is listed.
+// Whether a fragment at that depth is listed.
 fn is_before_end(pixel: u32, depth: f32) -> bool {
     return veil_of(depth) <= starts[ends_start() + pixel];
 }
 
-// How many fragments a pixel lists. One invocation a pixel.
+// Finds the last step that a pixel lists, and the number of its listed fragments. One invocation
+// per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn end_lists(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -1,4 +1,4 @@
-// The nearest depths, as the visibility pass left them.
+// The nearest depths that the visibility pass stored.
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 

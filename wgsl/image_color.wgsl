@@ -1,4 +1,5 @@
-// The image where it is the colour alone, which is written at once. Same interface as image_maps.wgsl.
+// The image without maps: each pixel is a colour, written at once. Same interface as
+// image_maps.wgsl.
 
 @group(0) @binding(10) var<storage, read_write> image: array<vec4<f32>>;
 

@@ -1,4 +1,4 @@
-// The image where maps follow each pixel's colour.
+// The image with maps, which follow the colour of each pixel. Same interface as image_color.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0x4cbf949e5aa50580
 
 @group(0) @binding(10) var<storage, read_write> image: array<f32>;

@@ -1,17 +1,19 @@
-// The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
-// weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
+// The index map, in words of the image: the greatest weight among the fragments within epsilon of a
+// pixel's nearest depth, and then the place of the surfel that has it. Twin: src/passes/index.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
 
-// The image, of which these words are no one else's.
+// The image. Only this pass writes the map's two words per pixel.
 @group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
 
 override INDEX_IMAGE: u32;
 
-// Weights so near the greatest, in units in the last place, are as great: two kernels may round one differently.
+// Weights this close to the greatest, in units in the last place, count as equal: two kernels may
+// round one differently.
 const AS_GREAT: u32 = 4u;
 
-// Positive weights order as their bits. Places are kept as what they lack to the last number, so that the first is the greatest, and
-// a cleared pixel has none.
+// Enters a fragment in the map: its weight, or with `names` the place of its surfel if the weight
+// is the greatest. Positive weights order as their bits. Places are stored as 2^32 - 1 - place, so
+// that the first is the greatest, and a cleared pixel has none.
 fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool) {
     let fragment = footprint(splat, filter_, x, y);
     let pixel = pixel_index(x, y);

@@ -1,9 +1,11 @@
-// Inputs that are kept apart, the individuals of Tien 2008: each is blended by itself, one after the other, and of what they show at a
-// pixel the nearest is kept, by the depth that each blends to (section 5.3). Twin: src/passes/individuals.rs.
+// Inputs that are kept separate, the individuals of Tien 2008. Each is blended by itself, one after
+// the other, and each pixel keeps the nearest of their surfaces, by the depth that each blends to
+// (section 5.3). Twin: src/passes/individuals.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x4f9b625f5cb1d36b
 
-// Of each pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, device units, 0 where nothing is. Then, for
-// joins and maps, the depth of the nearest fragment and the summed weight, and how many there are; then their place in a texture.
+// Per pixel: the straight colour, shaded; then the normal (world space, unit length) and the depth
+// (device units, 0 if empty). For joins and maps also the depth of the nearest fragment, the summed
+// weight and the number of fragments; then the texture coordinates.
 @group(0) @binding(68) var<storage, read_write> individuals: array<vec4<f32>>;
 
 override INDIVIDUAL_VECTORS: u32;
@@ -36,7 +38,7 @@ fn keep_surface(pixel: u32, surface: Surface) {
     }
 }
 
-// The order of two colours: the sign of the first difference, 0 of one and the same.
+// The order of two colours: the sign of their first difference, or 0 if they are equal.
 fn order_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     var order = 0.0;
     for (var k = 0u; k < 4u; k++) {
@@ -45,8 +47,8 @@ fn order_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     return order;
 }
 
-// Whether a shows instead of b: it is nearer, or at one depth has the greater of the first of its values that differs, so that the order of
-// inputs shows nowhere.
+// Whether a is shown in place of b: it is nearer, or at equal depth greater in the first value that
+// differs. So the order of the inputs is never visible.
 fn shows_before(a: Surface, b: Surface) -> bool {
     let by_color = order_of(a.color, b.color);
     let by_normal = order_of(vec4<f32>(a.normal, a.weight), vec4<f32>(b.normal, b.weight));
@@ -56,7 +58,8 @@ fn shows_before(a: Surface, b: Surface) -> bool {
     return a.exists && (!b.exists || is_before);
 }
 
-// What an individual shows at the pixel (x, y), the band's `pixel`th, where it is nearest of all so far.
+// Keeps an individual's surface at the pixel (x, y), the `pixel`th of the band, if it is the
+// nearest so far.
 fn keep_nearest_of(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let surface = surface_of(sums_of, front_at(pixel), x, y);
     if (shows_before(surface, kept_surface(pixel))) {
@@ -64,7 +67,7 @@ fn keep_nearest_of(sums_of: u32, pixel: u32, x: u32, y: u32) {
     }
 }
 
-// After an individual's sums: one workgroup a tile that it covers.
+// Runs after an individual is summed. One workgroup per tile that it covers.
 @compute @workgroup_size(WORKGROUP)
 fn keep_individual(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -83,7 +86,7 @@ fn keep_individual(
     }
 }
 
-// When all are kept: the tiles in which any shows. One invocation a tile.
+// Runs after all individuals: lists the tiles in which any shows. One invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn list_individuals(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -1,9 +1,10 @@
-// What shows of a pixel's splats and its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
+// Joins a pixel's splats with its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
 
-// As triangles_attributes.wgsl left them, in the tiles of triangles.
+// The triangles' surfaces from triangles_attributes.wgsl, valid in tiles where triangles show.
 @group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
-// The nearer of the two, or of one depth the triangle.
+// The surface that shows: that of the splats, that of the triangle, or their mean, by the share of
+// the splats (join_*.wgsl). `row` is the pixel's row in the band.
 fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
     if (!shows_triangles(x, row)) {
         return splats;
@@ -20,6 +21,7 @@ fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
     return mean_of(splats, of_triangle, share);
 }
 
+// The mean of both surfaces, in which the splats have the weight `share`.
 fn mean_of(splats: Surface, triangle: Surface, share: f32) -> Surface {
     let rest = 1.0 - share;
     let alpha = triangle.color.a * rest + splats.color.a * share;

@@ -1,5 +1,6 @@
-// Where splats and triangles lie within epsilon of each other they are blended, the nearer with the greater part (after Guennebaud, Barthe and
-// Paulin 2006, who smooth the seam so). Same interface as join_nearest.wgsl.
+// Splats and triangles that lie within epsilon of each other are blended, the nearer with the
+// greater share (after Guennebaud, Barthe and Paulin 2006, who smooth the seam so). Same interface
+// as join_nearest.wgsl.
 
 fn share_of_splats(splats: Surface, triangle: f32) -> f32 {
     let epsilon = deepest_accepted(splats.front) - splats.front;

@@ -1,6 +1,6 @@
-// Colours of splats are codes of sRGB, as those of Gaussians are, and become linear light when all
-// is drawn: so do those of triangles here, which are made codes first. Same interface as
-// join_linear.wgsl. Twin: src/passes/join.rs.
+// Colours of splats are sRGB codes, as in files of Gaussians, and become linear light once all is
+// drawn. Colours of triangles are therefore converted to codes before they are joined. Same
+// interface as join_linear.wgsl. Twin: src/passes/join.rs.
 
 fn color_beside(color: vec4<f32>) -> vec4<f32> {
     let linear = clamp(color.rgb, vec3<f32>(0.0), vec3<f32>(1.0));

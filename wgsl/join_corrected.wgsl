@@ -1,4 +1,5 @@
-// Splats and triangles are compared by the depth that the splats blend to, as their colours do. Same interface as join_nearest.wgsl.
+// Compares splats and triangles by the depth that the splats blend to. Same interface as
+// join_nearest.wgsl.
 
 fn share_of_splats(splats: Surface, triangle: f32) -> f32 {
     return select(0.0, 1.0, splats.exists && (triangle == 0.0 || splats.depth < triangle));

@@ -1,5 +1,5 @@
-// psi_E(rho) = exp(-a rho^n), paper 000, Eq. 12; KERNEL_STEP is 0, or exp(-a) to end at 0.
-// Twin: Kernel::weight in src/scene/kernel.rs.
+// The kernel psi_E(rho) = exp(-a rho^n) (paper 000, Eq. 12). KERNEL_STEP is 0, or exp(-a) for a
+// kernel that ends at 0. Twin: Kernel::weight in src/scene/kernel.rs.
 
 override KERNEL_A: f32;
 override KERNEL_N: f32;
@@ -7,7 +7,7 @@ override KERNEL_STEP: f32;
 
 fn kernel_weight(rho2: f32) -> f32 {
     var power: f32;
-    // Overrides are constants to the compiler: one branch stays.
+    // Overrides are constants to the compiler, so one branch remains.
     if (KERNEL_N == 2.0) {
         power = rho2;
     } else if (KERNEL_N == 3.0) {

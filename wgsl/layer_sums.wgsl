@@ -1,4 +1,5 @@
-// The sums of accumulator_fixed.wgsl, bit for bit, of one surface of a pixel, in registers.
+// The sums of one surface of a pixel, in registers. They equal those of accumulator_fixed.wgsl to
+// the bit.
 // All loops end, by 1 of src/gpu/loops.rs: 0x5ddb7c4b554145a0
 
 override CHANNELS: u32;

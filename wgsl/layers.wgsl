@@ -1,21 +1,23 @@
-// Stage 4: a pixel's fragments are parted into surfaces, each is blended as the nearest one always is, and they are composited.
+// Stage 4: splits a pixel's fragments into surfaces, blends each as the nearest one is always
+// blended, and composites them from front to back. Same interface as sorted.wgsl.
 // Twin: src/passes/layers.rs.
 // All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
 
 override MOST_LAYERS: u32;
-// What follows the last layer is one more.
+// Whether everything behind the last layer is drawn as one more, the tail.
 override TAIL: bool;
 
 fn depth_at(key: u32) -> f32 {
     return bitcast<f32>(keys[key].x);
 }
 
-// 1 for a back.
+// The side that a fragment shows: 1 for a back.
 fn side_at(key: u32) -> u32 {
     return select(0u, keys[key].x & SIDE_BIT, SIDES);
 }
 
-// Whether no layer has the fragment yet, of whose side all as deep as `told` are.
+// Whether no layer has consumed the fragment yet. `told` has the depths up to which the fragments
+// of either side are consumed.
 fn is_untold(key: u32, told: vec2<f32>) -> bool {
     return depth_at(key) > select(told.x, told.y, side_at(key) == 1u);
 }
@@ -30,7 +32,7 @@ fn no_bend() -> Bend {
     return none;
 }
 
-// Sums what is left of the surface that starts at `first`, as far as rounds last.
+// Sums the rest of the surface that starts at `first`, as far as the rounds of this dispatch last.
 fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
     var so_far = begun;
     let front = depth_at(so_far.first);
@@ -40,7 +42,7 @@ fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
         if (side_at(so_far.key) != side) {
             continue;
         }
-        // The first is at the front itself.
+        // The first fragment is the front itself.
         if (so_far.key != so_far.first && depth > so_far.farthest) {
             break;
         }
@@ -54,7 +56,8 @@ fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
     return so_far;
 }
 
-// Sums what is left of all that no layer has, as far as rounds last.
+// Sums the rest of all fragments that no layer has consumed, as far as the rounds of this dispatch
+// last.
 fn sum_rest(begun: Compositing, end: u32) -> Compositing {
     var so_far = begun;
     let front = depth_at(so_far.first);
@@ -66,7 +69,7 @@ fn sum_rest(begun: Compositing, end: u32) -> Compositing {
     return so_far;
 }
 
-// The list ends at `end`, and its maps are at `out`.
+// Continues to composite the list, which ends at `end`. The maps of its surfaces are at `out`.
 fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Compositing {
     let image = vec2<f32>(vec2<u32>(x, y)) + 0.5;
     var so_far = before;
@@ -103,7 +106,7 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
     return so_far;
 }
 
-// The surface that is summed comes behind what is shown.
+// Composites the summed surface behind what is shown.
 fn with_surface(summed: Compositing, is_last: bool, front: f32, out: u32, x: u32, y: u32) -> Compositing {
     var so_far = summed;
     let weight = sum_at(0u, WEIGHT_CHANNEL);

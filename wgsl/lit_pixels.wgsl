@@ -1,4 +1,5 @@
-// Pixels are lit: colours are blended as they are, and what is blended is lit at the blended normal. Same interface as lit_splats.wgsl.
+// Pixels are lit: colours are blended unlit, and the mean is lit at the blended normal. Same
+// interface as lit_splats.wgsl.
 
 fn lit(premultiplied: vec4<f32>, index: u32, splat: Splat) -> vec4<f32> {
     return premultiplied;

@@ -1,7 +1,9 @@
-// Splats are lit, each at its centre, and lit colours are blended ("complete per-vertex illumination", paper 000, section 5.3): no normal is
-// summed. Twin: src/passes/lit.rs.
+// Splats are lit, each at its centre, and the lit colours are blended ("complete per-vertex
+// illumination", paper 000, section 5.3). No normals are summed. Same interface as lit_pixels.wgsl.
+// Twin: src/passes/lit.rs.
 
-// A surfel without a side is lit as if it faced the viewer, one that has a side on the side that its normal is on.
+// Set if surfels have no side, and are lit as if they faced the viewer. Otherwise a surfel is lit
+// on the side of its normal.
 override TURNS_LIT: bool;
 
 fn lit(premultiplied: vec4<f32>, index: u32, splat: Splat) -> vec4<f32> {

@@ -1,15 +1,17 @@
-// Lists that are too long for the loops of one invocation: each is sorted and composited in rounds, dispatch after dispatch, of which
-// every one does a piece and keeps where it stopped.
+// Lists that are too long for the loops of one invocation. Each is sorted and composited over
+// several dispatches, each of which does a part and stores where it stopped. Same interface as
+// long_lists_absent.wgsl.
 // Host side and bounds: src/passes/long_lists.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x02e03c9a3f60526d
 
-// How many there are; then of each its pixel, the steps of its heap sort that are done, whether compositing is begun, and how far it is.
+// The number of long lists; then for each its pixel, the number of finished steps of its heap sort,
+// whether compositing has begun, and the state of compositing.
 @group(0) @binding(66) var<storage, read_write> found_lists: array<atomic<u32>>;
 @group(0) @binding(67) var<storage, read_write> long_lists: array<u32>;
 
-// A list of more fragments is long.
+// The most fragments of a list that one invocation sorts and composites at once.
 override LONG: u32;
-// What a round does at most: steps of a heap sort, fragments that are looked at.
+// The most that one dispatch does for a list: steps of the heap sort, and fragments visited.
 override HEAP_STEPS: u32;
 override LOOKS: u32;
 
@@ -22,21 +24,22 @@ fn is_long(list: vec2<u32>) -> bool {
     return list.y > list.x + LONG;
 }
 
-// Of a list that is not long there are enough.
+// The rounds left to this invocation in this dispatch; one round visits a fragment. A list that is
+// not long never uses them up.
 var<private> rounds_left: u32 = 0xffffffffu;
 
 fn has_rounds() -> bool {
     return rounds_left > 0u;
 }
 
-// Whether there is one, which is then gone.
+// Takes a round if one is left, and returns whether there was one.
 fn next_round() -> bool {
     let has = rounds_left > 0u;
     rounds_left -= u32(has);
     return has;
 }
 
-// Which list has which number shows nowhere. One invocation a pixel.
+// Collects the long lists. The order of their numbers is never visible. One invocation per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn find_long_lists(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -56,13 +59,15 @@ fn find_long_lists(
     }
 }
 
-// Where what is kept of the list of a number is; behind all where there is none.
+// The word at which the state of the list of this number starts; the buffer's length if there is
+// none.
 fn kept_of(number: u32) -> u32 {
     let room = (arrayLength(&long_lists) - LONG_HEAD) / LONG_WORDS;
     return select(arrayLength(&long_lists), LONG_HEAD + number * LONG_WORDS, number < min(long_lists[0], room));
 }
 
-// The steps of sort_many(): one for each key that has others below it, then one for each that leaves the heap.
+// The number of steps of sort_many(): one for each key that has others below it, then one for each
+// that leaves the heap.
 fn heap_steps(count: u32) -> u32 {
     return count / 2u + count - 1u;
 }
@@ -76,7 +81,7 @@ fn heap_step(first: u32, count: u32, step: u32) {
     }
 }
 
-// One invocation a long list.
+// One invocation per long list.
 @compute @workgroup_size(WORKGROUP)
 fn sort_long_lists(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -101,7 +106,7 @@ fn kept_float(at: u32) -> f32 {
     return bitcast<f32>(long_lists[at]);
 }
 
-// How far compositing is of a list that it has begun, whose sums become the open surface's.
+// Loads the state of a list whose compositing has begun, and the sums of its unfinished surface.
 fn compositing_at(kept: u32) -> Compositing {
     let at = kept + SO_FAR;
     for (var channel = 0u; channel < CHANNELS; channel++) {
@@ -133,7 +138,8 @@ fn keep_compositing(kept: u32, so_far: Compositing) {
     long_lists[at + 11u] = bitcast<u32>(so_far.farthest);
 }
 
-// One invocation a long list, whose surfaces it writes; the pixel itself is resolved with all others.
+// One invocation per long list, which writes the maps of its surfaces. The pixel itself is resolved
+// with all others.
 @compute @workgroup_size(WORKGROUP)
 fn composite_long_lists(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -163,7 +169,8 @@ fn composite_long_lists(
     }
 }
 
-// What a list shows takes the place of its first fragments, which are composited.
+// Stores the result in place of the keys of the list's first fragments, which are composited by
+// then.
 fn keep_composited(list: vec2<u32>, shown: Shown) {
     let color = bitcast<vec4<u32>>(shown.color);
     keys[list.x] = color.xy;

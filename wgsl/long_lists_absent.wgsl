@@ -1,4 +1,5 @@
-// No list is too long for one invocation to sort and composite. Same interface as long_lists.wgsl.
+// Every list is short enough for one invocation to sort and composite. Same interface as
+// long_lists.wgsl.
 
 fn is_long(list: vec2<u32>) -> bool {
     return false;

@@ -1,5 +1,6 @@
-// What the f32 centre of a surfel or node of a tree leaves out, world units: it comes with its attributes (center_doubled.wgsl), which are bound as what
-// `chosen` is behind, as no buffer can be bound twice where it is written.
+// The part of the centre of a surfel or tree node beyond f32, world units. It is stored with its
+// attributes (center_doubled.wgsl), which lie in `chosen` in front of the list of chosen surfels: a
+// buffer that a kernel writes cannot be bound twice.
 
 fn low_part(index: u32) -> vec3<f32> {
     let at = index * ATTRIBUTE_WORDS + LOW_WORD;

@@ -1,6 +1,8 @@
-// The kernel convolved with the pixel's Gaussian in the image (Heckbert 1989; Zwicker et al. 2001): with J the half-axes'
-// images, the ellipse of J J^T becomes that of Q = J J^T + BLUR I, and the weight sinks by sqrt(|J J^T| / |Q|). Exact for
-// a Gaussian kernel under the affine image of the disk at its centre. Twin: src/passes/lowpass.rs.
+// The EWA low-pass: the kernel convolved with the pixel's Gaussian in the image (Heckbert 1989;
+// Zwicker et al. 2001). With J the images of the half-axes, the ellipse of J J^T becomes that of Q
+// = J J^T + BLUR I, and the weight sinks by sqrt(|J J^T| / |Q|). Exact for a Gaussian kernel under
+// the affine image of the disk at its centre. Same interface as lowpass_max.wgsl.
+// Twin: src/passes/lowpass.rs.
 
 // (pixel's sigma / kernel's sigma)^2, pixels^2.
 override FILTER_BLUR: f32;
@@ -14,7 +16,7 @@ fn low_pass(h: ptr<function, Homography>) -> Filter {
     let xx = s.x * s.x + t.x * t.x + FILTER_BLUR;
     let xy = s.x * s.y + t.x * t.y;
     let yy = s.y * s.y + t.y * t.y + FILTER_BLUR;
-    // |Q| = |J|^2 + BLUR trace(J J^T) + BLUR^2, of which no term cancels.
+    // |Q| = |J|^2 + BLUR trace(J J^T) + BLUR^2, in which nothing cancels.
     let area = s.x * t.y - s.y * t.x;
     let determinant = area * area + FILTER_BLUR * (dot2(s, s) + dot2(t, t)) + FILTER_BLUR * FILTER_BLUR;
     // x^T Q^-1 x = (sqrt(yy / |Q|) (x - y xy / yy))^2 + y^2 / yy.
@@ -32,7 +34,7 @@ fn low_pass(h: ptr<function, Homography>) -> Filter {
         r_xx,
         -r_xx * xy / yy,
         1.0 / sqrt(yy),
-        // Positive even edge-on: 0 says that there is no filter.
+        // Positive even edge-on, because 0 means that there is no filter.
         max(abs(area) / sqrt(determinant), 1e-9),
     );
 }

@@ -1,4 +1,5 @@
-// The larger of the object-space kernel and a round screen-space one (Botsch et al. 2005, section 4.2): the smaller rho.
+// The larger of the object-space kernel and a round screen-space one, which is the one of smaller
+// rho (Botsch et al. 2005, section 4.2). Same interface as lowpass_ewa.wgsl.
 // Twin: src/passes/lowpass.rs.
 
 // Design::radius in the twin, pixels.

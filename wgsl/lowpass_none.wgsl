@@ -1,4 +1,5 @@
-// No low-pass: a pixel's centre is in the disk or not. Same interface as filter.wgsl with lowpass_*.wgsl.
+// No low-pass: a pixel's centre is in the disk or not. Same interface as filter.wgsl with
+// lowpass_max.wgsl or lowpass_ewa.wgsl.
 
 const FILTERED: bool = false;
 

@@ -1,24 +1,24 @@
-//! The room that a fragment takes in its pixel's list.
+//! The record of a fragment in its pixel's list.
 
 use super::{EpsilonForm, Lists, SceneNeeds, color_channels};
 
-/// Where a fragment's values lie in its record, by word, beside its depth, by which lists are sorted. The weight comes first; what is
-/// not needed takes no room.
+/// Word offsets of a fragment's values in its record. The weight is word 0. The depth, by which
+/// lists are sorted, is stored elsewhere ([`KEY_WORDS`]). Values that are not needed take no space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FragmentLayout {
-    /// Words of a record: whole rows of four.
+    /// u32 words of a record: a multiple of four.
     pub words: u32,
-    /// The place of its surfel, where those of one depth are told apart by it.
+    /// The rank of its surfel, if it decides between fragments at one depth.
     pub rank: u32,
-    /// The first of its colour's.
+    /// The first word of its colour.
     pub color: u32,
-    /// How many these are.
+    /// Number of words of its colour.
     pub colors: u32,
-    /// The first of its normal's three.
+    /// The first of the three words of its normal.
     pub normal: u32,
-    /// Its surfel's radius, by which surfaces are parted.
+    /// Its surfel's radius, by which layers are separated.
     pub radius: u32,
-    /// Whether it has that.
+    /// Whether the radius is stored.
     pub has_radius: bool,
 }
 
@@ -35,5 +35,5 @@ impl FragmentLayout {
     }
 }
 
-/// Words by which a fragment is sorted: its depth, and where its record is.
+/// u32 words of a fragment's sort key: its depth and the index of its record.
 pub const KEY_WORDS: u64 = 2;

@@ -1,70 +1,74 @@
-//! What earlier tries and frames have shown of a scene on an adapter: a plan goes by it, and a frame that turns out to need more is
-//! rendered again with what it taught.
+//! Sizes measured in earlier tries and frames of a scene on an adapter. Plans use them, and a frame
+//! that needs more is rendered again with what its last try measured.
 
 use super::Band;
 
-/// Times that a frame is rendered at most. A try fails for one of five reasons: cuts, slots, lists of large splats, lists of all, sums that
-/// wrap; and each teaches what ends it, or, of a list whose length a view changes, what ends it in this view.
+/// The most tries of a frame, besides those counted in [`Known::times_cut`]. A try fails for one of
+/// five reasons: the size of the cut, the splat slots, the lists of large splats, the lists of all
+/// splats, or sums that wrap. Each failed try records the size that was missing, so the next one
+/// succeeds; where a list's length changes with the view, this holds for the present view.
 pub const MOST_TRIES: usize = 7;
 
-/// Lists of the splats that may touch each cell of the image (`wgsl/bin.wgsl`).
+/// The lists of splats that may touch each cell of the image (`wgsl/bin.wgsl`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listed {
-    /// The large ones, by blocks of tiles.
+    /// Large splats, by blocks of tiles.
     Large,
-    /// The small ones that are not hidden, by tiles.
+    /// Small splats that are not hidden, by tiles.
     Small,
 }
 
-/// What is known; at first nothing.
+/// The measured sizes; initially none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
-    /// Tiles that a splat touches on average in this view, by a sample.
+    /// Mean number of tiles that a splat touches in this view, estimated from a sample of surfels.
     pub touched_tiles: f64,
-    /// Surfels of a cut that there is room for, branch by branch, of a scene with levels of detail.
+    /// Surfel slots for the cut, by branch, in a scene with levels of detail.
     pub cut: Option<Vec<u64>>,
-    /// The cut of this view is chosen.
+    /// Whether the cut of this view is already on the device.
     pub chosen: bool,
-    /// The slots of splats were counted for an earlier view, which has left some spare.
+    /// Whether the splat slots were measured in an earlier view; they include a reserve.
     pub slots: bool,
     /// Whether the last frame had large splats.
     pub large: Option<bool>,
-    /// Entries of the lists of large and of small splats that there is room for, and how many of them.
+    /// Capacity of the lists of large and of small splats, in entries, once measured.
     pub entries: [Option<u64>; 2],
-    /// There are more splats than tiles can list, so that their sums are stored.
+    /// Whether tiles cannot list all splats, so gathering is off and sums are stored.
     pub crowded: bool,
-    /// Bands whose fragments fit, in this view, as far as bands were looked at.
+    /// Bands of this view whose fragments fit, as far down the image as fragments were counted.
     pub cuts: Option<Vec<Band>>,
-    /// How often a band of this view was cut, or its lists were longer than was known: each time the next try comes farther down the image.
+    /// Number of retries of this view because a band was cut, its lists ended early, or a list was
+    /// longer than known. Each such try reaches farther down the image.
     pub times_cut: usize,
-    /// A pixel has more fragments than are sorted, or a row more than a buffer holds: lists end where nothing more shows
-    /// ([`veils`](crate::passes::veils)).
+    /// Whether lists end where nothing behind shows ([`veils`](crate::passes::veils)): some pixel
+    /// has more fragments than can be sorted, or some row more than a buffer holds.
     pub veiled: bool,
-    /// Fragments of the longest list, if one invocation cannot go through it ([`long_lists`](crate::passes::long_lists)); else 0.
+    /// Bound on the fragments of a list, if one invocation cannot process the longest
+    /// ([`long_lists`](crate::passes::long_lists)); else 0.
     pub longest_list: u32,
-    /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
+    /// Number of fragments of this view that made a sum of the chosen accumulator wrap.
     pub overflows: u64,
 }
 
 impl Known {
-    /// Entries of these lists that there is room for.
+    /// Capacity of these lists in entries, once measured.
     pub fn entries_of(&self, of: Listed) -> Option<u64> {
         self.entries[of as usize]
     }
 
-    /// Forgets what holds for one view.
+    /// Forgets what depends on the view.
     pub fn forget_view(&mut self) {
         (self.overflows, self.chosen) = (0, false);
         (self.cuts, self.times_cut) = (None, 0);
     }
 
-    /// Forgets what buffers have room for.
+    /// Forgets the sizes of buffers that no longer exist.
     pub fn forget_buffers(&mut self) {
         self.forget_image();
         (self.slots, self.chosen, self.cut) = (false, false, None);
     }
 
-    /// Forgets what holds for one size of image.
+    /// Forgets what depends on the size of the image.
     pub fn forget_image(&mut self) {
         (self.entries, self.large, self.veiled, self.longest_list) = ([None; 2], None, false, 0);
     }

@@ -1,5 +1,5 @@
-//! What a frame is made of, before a device is asked for anything: a pure function of what is known of the scene, the adapter, the
-//! view and the options.
+//! Plans a frame before any device is used. A plan is a pure function of the scene's facts, the
+//! sizes measured so far, the adapter, the view and the options.
 
 mod accumulator;
 pub mod check;
@@ -50,60 +50,65 @@ use crate::scene::Camera;
 use known::Listed;
 use steps::Part;
 
-/// How a frame is rendered.
+/// A frame's buffers, bands and pages, and the needs that select its kernels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What exists: the key of the kernels.
+    /// What scene and options need; the key of the compiled kernels.
     pub needs: SceneNeeds,
-    /// The room that a pixel takes.
+    /// The layout of a pixel's sums and of its image record.
     pub pixel: PixelLayout,
-    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.
+    /// u32 words of a pixel's sums in storage; 0 if the rasteriser's textures or the registers of
+    /// gathering tiles hold them.
     pub sum_words: u32,
-    /// Units of a weight of 1 in the sums of `fixed`.
+    /// The weight 1 in units of the sums of `fixed`.
     pub one: u64,
-    /// Columns of samples.
+    /// Width of the image in samples.
     pub width: u32,
-    /// The rows of samples that buffers hold at a time.
+    /// The bands of sample rows; buffers hold one band at a time.
     pub bands: Vec<Band>,
-    /// The scene's triangles.
+    /// The facts of the scene's triangles.
     pub mesh: MeshFacts,
-    /// Pages that the surfels fill, where each is drawn by itself.
+    /// Number of pages of surfels; with separate inputs each input has its own pages.
     pub pages: usize,
-    /// Surfels of a cut that pages have room for, branch by branch, once that is known; of a scene of which one is drawn.
+    /// Surfel slots for the cut, by branch; `None` if no cut is drawn or its size is not known yet.
     pub cut: Option<Vec<u64>>,
-    /// Those of each individual, where they are kept apart.
+    /// The pages of each individual; empty unless inputs are kept separate.
     pub individuals: Vec<Range<usize>>,
-    /// No list is longer than this, if some are gone through in rounds.
+    /// Upper bound on the length of fragment lists if some are processed in rounds; else 0.
     pub longest_list: u32,
-    /// Pixels that nothing covers differ from 0.
+    /// Whether pixels that nothing covers differ from 0 in the image, so that their tiles are
+    /// resolved too.
     pub lists_empty: bool,
-    /// Each band has splats of its own: what is drawn first in it hides what is drawn later, and hidden splats are struck out.
+    /// Whether splats are projected again in each band: what is drawn first in a band hides what is
+    /// drawn later, and hidden splats are removed from the band's list.
     pub projects_each_band: bool,
-    /// The slots of splats are counted on the way.
+    /// Whether the frame reads back how many splat slots it needs before it projects.
     pub looks_for_slots: bool,
-    /// Large splats are drawn by tiles, not by a workgroup each.
+    /// Whether large splats are drawn by tiles instead of one workgroup each.
     pub large_by_tiles: bool,
-    /// The entries of lists are counted on the way: of the large splats, of the small ones.
+    /// Whether the frame reads back how many list entries it needs: of large and of small splats.
     pub looks_for_lists: [bool; 2],
 }
 
-/// The words that a pixel takes at most in a buffer that some renders alone have.
+/// The most u32 words per pixel in any buffer that only some renders have.
 fn most_words(needs: &SceneNeeds) -> u32 {
     let of = |has: bool, words: u32| if has { words } else { 0 };
     let peeled = of(needs.peels.is_some(), PEELED_WORDS);
     let moments = of(needs.oit == Some(Oit::Moments), MOMENT_WORDS);
-    // Four words a tile of 64 pixels, or of fewer at the image's edges, are less than one more a pixel, but for images of a few pixels.
+    // Four words per tile of 64 pixels (fewer at the image's edges) are at most one more per pixel,
+    // unless the image has only a few pixels.
     let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS + 1);
     peeled.max(moments).max(triangles).max(individuals::words(needs)).max(of(needs.veils, VEIL_WORDS))
 }
 
-/// Surfels that blend with each other, at most: of one page tiles gather them.
+/// The largest number of surfels that blend with each other. Tiles gather them only if they fit one
+/// page.
 fn most_together((facts, drawn): (&Facts, u64), needs: &SceneNeeds) -> u64 {
     let largest = facts.individuals.iter().copied().max();
     largest.filter(|_| needs.separate).unwrap_or(drawn)
 }
 
-/// The pages that so many surfels each fill, which are kept apart.
+/// The range of pages of each group of surfels in `apart`, at `most` surfels per page.
 fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
     let mut end = 0;
     let pages = apart.iter().map(|surfels| {
@@ -114,7 +119,7 @@ fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
     pages.collect()
 }
 
-/// Whether tiles sum the splats of a page, if all that blend are in one.
+/// Whether tiles sum all splats of a page, if those that blend with each other share one.
 fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
     let pays = match options.organisation {
         Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
@@ -124,8 +129,9 @@ fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
     needs.may_gather() && pays && !known.crowded && options.has(Optimisation::Gathering)
 }
 
-/// Whether batches that are hidden or out of view are left out. Of cuts none is: what is out of view is in none, and to bound their batches
-/// anew for each frame takes longer than drawing what is hidden, except where most is.
+/// Whether batches that are hidden or out of view are culled. Batches of cuts are not: nodes out of
+/// view are not in the cut, and recomputing the bounds of their batches in each frame takes longer
+/// than drawing what is hidden, unless most of it is.
 fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
@@ -139,10 +145,12 @@ fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &RenderOption
 }
 
 impl Plan {
-    /// The plan for a view by `camera`, whose pixels are the samples ([`Camera::sampled`]), of the scene that `facts` are of.
+    /// Plans the frame for a view of the scene that `facts` describe. The pixels of `camera` are
+    /// the samples ([`Camera::sampled`]).
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for what does not go together, and a limit of the adapter.
+    /// [`Error::Limit`](crate::Error::Limit) if one row of the image needs more than a buffer, and
+    /// an error of the adapter if it lacks what the options need.
     pub fn of(
         facts: &Facts,
         adapter: &AdapterDescription,
@@ -157,7 +165,7 @@ impl Plan {
         let pixel = PixelLayout::of(&needs);
         let page = page_surfels(adapter, &needs);
         let cut = known.cut.clone().filter(|_| needs.levels);
-        // Branches have pages of their own.
+        // Each branch has its own pages.
         let apart = if needs.levels { cut.clone().unwrap_or_default() } else { vec![facts.surfels] };
         let (drawn, pages) = (apart.iter().sum(), pages_of(&apart, page).last().map_or(0, |last| last.end));
         let in_one = (pages == 1 || needs.separate) && (1..=page).contains(&most_together((facts, drawn), &needs));
@@ -167,7 +175,7 @@ impl Plan {
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
         let long_lists = needs.lists.is_some() && known.longest_list > 0;
         let needs = SceneNeeds { gather, cull, veils, long_lists, ..needs };
-        // Tiles that gather store no sums.
+        // Gathering tiles keep sums in registers.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
         let words = sum_words.max(pixel.image_words).max(most_words(&needs));
@@ -206,18 +214,18 @@ impl Plan {
         })
     }
 
-    /// The plan of the f64 reference, which draws strips of rows of samples: no device is asked for anything, and nothing is left out.
+    /// Plans the frame of the f64 reference, in strips of sample rows; nothing is culled.
     pub fn of_reference(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let needs = SceneNeeds::of_picture(facts, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
-            // What a device draws in another way, the twins draw as all else.
+            // The twins have one path for what a device draws in several ways.
             needs: SceneNeeds {
                 raster: None,
                 tiles: false,
                 lists: Lists::of(facts, options),
                 peels: None,
-                // It is given the cut alone.
+                // The reference gets a scene that holds only the cut.
                 levels: false,
                 ..needs
             },
@@ -239,27 +247,28 @@ impl Plan {
         }
     }
 
-    /// How large a cut is is not known yet.
+    /// Whether the size of the cut is not known yet.
     pub fn looks_for_cut(&self) -> bool {
         self.needs.levels && self.cut.is_none()
     }
 
-    /// Pages whose surfels blend with each other: all, or those of each individual.
+    /// The groups of pages whose surfels blend with each other: all pages, or those of each
+    /// individual.
     pub fn together(&self) -> Vec<Range<usize>> {
         if self.needs.separate { self.individuals.clone() } else { std::iter::once(0..self.pages).collect() }
     }
 
-    /// Whether splats are projected in `band`, and what is unknown of them is looked at.
+    /// Whether splats are projected, and their unknown counts read back, in `band`.
     pub fn projects_in(&self, band: usize) -> bool {
         band == 0 || self.projects_each_band
     }
 
-    /// Pixels of the image in a band, whose own are samples.
+    /// Number of image pixels in a band; `Band::pixels` counts samples.
     pub fn image_pixels(&self, band: usize) -> u64 {
         self.bands[band].pixels / u64::from(self.needs.samples.count())
     }
 
-    /// The parts that are drawn one after the other.
+    /// The parts of the batches, in drawing order.
     pub fn parts(&self) -> &'static [Part] {
         if self.needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] }
     }

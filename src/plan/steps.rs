@@ -1,122 +1,125 @@
-//! What a frame does, as data: stages of kernels, each over something, and what is looked at in between. A list of steps is made
-//! without a device, and one executor runs it.
+//! Describes a frame as data: stages of kernels with the extent of each dispatch, and the counts
+//! that are read back in between. A list of steps is made without a device, and one executor runs
+//! it.
 
 use super::known::Listed;
 use crate::gpu::layout::WORKGROUP;
 use crate::scene::Map;
 
-/// A kernel: an entry point of WGSL, and the invocations of its workgroup.
+/// A kernel: an entry point in WGSL with its workgroup size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kernel {
-    /// Its name in WGSL.
+    /// Name of the entry point.
     pub name: &'static str,
-    /// Invocations of a workgroup.
+    /// Workgroup size in x, y and z.
     pub workgroup: [u32; 3],
-    /// The lists that it sees as `lists`.
+    /// The lists that its variable `lists` is bound to.
     pub lists: Option<Listed>,
 }
 
 impl Kernel {
-    /// One of [`WORKGROUP`] invocations.
+    /// Creates a kernel with workgroups of [`WORKGROUP`] invocations in x.
     pub const fn new(name: &'static str) -> Self {
         Self::of(name, [WORKGROUP, 1, 1])
     }
 
-    /// One of another workgroup.
+    /// Creates a kernel with another workgroup size.
     pub const fn of(name: &'static str, workgroup: [u32; 3]) -> Self {
         Self { name, workgroup, lists: None }
     }
 
-    /// One that makes lists.
+    /// Creates a kernel that binds the lists of a kind.
     pub const fn listing(name: &'static str, workgroup: [u32; 3], lists: Listed) -> Self {
         Self { name, workgroup, lists: Some(lists) }
     }
 }
 
-/// Which batches a stage draws.
+/// The batches of surfels that a stage draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Every one that is projected: of all there are, or where some are left out, the near and the far ones.
+    /// All projected batches: all there are or, with culling, the near and the far ones.
     All,
-    /// In view and nearer than the middle of the scene.
+    /// Batches in view and nearer than the middle of the scene.
     Near,
-    /// In view, farther, and not hidden by the near ones.
+    /// Batches in view, farther away, and not hidden by the near ones.
     Far,
 }
 
-/// What a kernel is dispatched over. A kernel that binds a page's buffer is dispatched for each page.
+/// The extent of a dispatch. A kernel that binds a buffer of a page is dispatched once per page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Over {
-    /// An invocation for each slot of a page's splats.
+    /// One invocation per splat slot of a page.
     Slots(Part),
-    /// An invocation for each batch of a page.
+    /// One invocation per batch of a page.
     Batches,
-    /// An invocation for [`JUDGED`](crate::gpu::layout::JUDGED) nodes each of a level of a branch that is come to, as the device counted them.
+    /// One invocation per [`JUDGED`](crate::gpu::layout::JUDGED) reached nodes of a level of a
+    /// branch, as the device counted them.
     Judged,
-    /// The same, after the next level's are known.
+    /// Like `Judged`, once the nodes of the next level are known.
     Spread,
-    /// Workgroups for the splats that take long to project, as the device counted them.
+    /// Workgroups for the splats that are slow to project, as the device counted them.
     Rare,
-    /// A workgroup for each large splat.
+    /// One workgroup per large splat.
     Large,
-    /// An invocation for each vertex of the triangles.
+    /// One invocation per vertex of the triangles.
     Vertices,
-    /// An invocation for each triangle.
+    /// One invocation per triangle.
     Triangles,
-    /// A workgroup for each large triangle, as the device counted them.
+    /// One workgroup per large triangle, as the device counted them.
     LargeTriangles,
-    /// A workgroup for each tile in which triangles show.
+    /// One workgroup per tile in which triangles show.
     TriangleTiles,
-    /// A workgroup for each triangle that f32 does not tell.
+    /// One workgroup per triangle whose intersections f32 cannot resolve.
     RareTriangles,
-    /// An invocation for each large splat, to list it.
+    /// One invocation per large splat, to list it.
     Listing,
-    /// An invocation for each row of the band.
+    /// One invocation per row of the band.
     Rows,
-    /// An invocation for each pixel of the band.
+    /// One invocation per pixel of the band.
     Pixels,
-    /// An invocation for each tile of pixels by which hidden splats are told.
+    /// One invocation per tile of the occlusion test.
     Occlusion,
-    /// Eight invocations, a row of pixels, for each tile that large splats are drawn by.
+    /// Eight invocations (one row of pixels) per tile of the large splats.
     Tiles,
-    /// An invocation for each list that is gone through in rounds, of which there may be fewer.
+    /// One invocation per list that is processed in rounds; the lists may be fewer.
     LongLists,
-    /// A workgroup for each tile that anything covers.
+    /// One workgroup per covered tile.
     Covered,
-    /// A workgroup for eight such tiles.
+    /// One workgroup per eight covered tiles.
     CoveredEights,
     /// One workgroup.
     Once,
 }
 
-/// A dispatch.
+/// One kernel and its extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// The kernel.
+    /// The kernel to dispatch.
     pub kernel: Kernel,
-    /// And over what.
+    /// The extent of the dispatch.
     pub over: Over,
 }
 
-/// Words of a buffer, by its name in WGSL, that become 0: of each page, if pages have it.
+/// A range of a buffer, by its name in WGSL, that is set to 0; if pages have the buffer, in each
+/// page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clear {
-    /// The buffer.
+    /// Name of the buffer in WGSL.
     pub buffer: &'static str,
-    /// The first word.
+    /// The first u32 word.
     pub first: u64,
-    /// How many; None for all that follow.
+    /// Number of words; `None` to the end.
     pub count: Option<u64>,
 }
 
 impl Clear {
-    /// The words of `buffer` from `first` on, `count` of them.
+    /// Clears `count` words of `buffer` from `first` on.
     pub fn of(buffer: &'static str, first: u64, count: u64) -> Self {
         Self { buffer, first, count: Some(count) }
     }
 }
 
-/// What the f64 reference does in one go.
+/// A function of the f64 reference that does the work of one or more stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Twin {
     /// [`project`](crate::passes::project): splats.
@@ -127,22 +130,23 @@ pub enum Twin {
     Accumulate,
     /// [`oit`](crate::passes::oit): sums.
     Oit,
-    /// [`individuals`](crate::passes::individuals): what one of them shows, where it is nearest.
+    /// [`individuals`](crate::passes::individuals): the surface of one individual, where it is the
+    /// nearest.
     Individual(usize),
-    /// [`triangles`](crate::passes::triangles): what they show.
+    /// [`triangles`](crate::passes::triangles): the surfaces of triangles.
     Triangles,
     /// [`resolve`](crate::passes::resolve): the image.
     Resolve,
-    /// [`layers`](crate::passes::layers): the image, of lists.
+    /// [`layers`](crate::passes::layers): the image from lists, blended by surface.
     Layers,
-    /// [`sorted`](crate::passes::sorted): the image, of lists.
+    /// [`sorted`](crate::passes::sorted): the image from lists, composited fragment by fragment.
     Sorted,
-    /// A map that has a pass of its own.
+    /// A map with a pass of its own.
     Map(Map),
 }
 
 impl Twin {
-    /// The pass whose it is.
+    /// Name of the pass that its time is added to.
     pub fn pass(self) -> &'static str {
         match self {
             Self::Project => "project",
@@ -158,80 +162,82 @@ impl Twin {
 /// Dispatches that are timed together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stage {
-    /// The pass that they count for.
+    /// Name of the pass that their time is added to.
     pub pass: &'static str,
-    /// The band of the image.
+    /// Index of the band of the image.
     pub band: usize,
-    /// One page, or all.
+    /// The only page to dispatch, or `None` for all pages.
     pub page: Option<usize>,
-    /// What is cleared before.
+    /// Ranges of buffers that are cleared first.
     pub clears: Vec<Clear>,
-    /// The dispatches.
+    /// The dispatches, in order.
     pub runs: Vec<Run>,
-    /// What the reference does here; nothing in a stage that does a part of another's work, or none that shows.
+    /// The reference's counterpart; `None` if the twin of another stage includes this work, or if
+    /// the work does not affect the image.
     pub twin: Option<Twin>,
 }
 
 impl Stage {
-    /// One of `pass` over all pages in `band`, without clears.
+    /// Creates a stage of `pass` over all pages in `band`, without clears.
     pub fn new(pass: &'static str, band: usize, runs: Vec<Run>) -> Self {
         Self { pass, band, page: None, clears: Vec::new(), runs, twin: None }
     }
 
-    /// This stage, before which `clears` are done.
+    /// This stage, preceded by `clears`.
     pub fn after(self, clears: Vec<Clear>) -> Self {
         Self { clears, ..self }
     }
 
-    /// This stage on one page.
+    /// This stage, on one page only.
     pub fn of_page(self, page: usize) -> Self {
         Self { page: Some(page), ..self }
     }
 
-    /// This stage, which the reference does in another's place.
+    /// This stage without a twin: the reference does its work elsewhere.
     pub fn without_twin(self) -> Self {
         Self { twin: None, ..self }
     }
 
-    /// This stage, in whose place the reference has `twin`.
+    /// This stage with the counterpart `twin`.
     pub fn as_twin(self, twin: Twin) -> Self {
         Self { twin: Some(twin), ..self }
     }
 }
 
-/// Something that is looked at on the device in the middle of a frame, because buffers are sized by it.
+/// A count that is read back in the middle of a frame, because it determines the sizes of buffers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Look {
-    /// The surfels of a cut.
+    /// Number of surfels and nodes in the cut.
     Cut,
-    /// The slots that the listed batches of a part take.
+    /// Splat slots that the listed batches of a part need.
     Slots(Part),
-    /// What lists hold that these stages count.
+    /// Entries of the lists that these stages count.
     Lists(Listed, Vec<Stage>),
-    /// The fragments of a band.
+    /// Number of fragments in a band.
     Fragments(usize),
 }
 
-/// A step of a frame.
+/// One step of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The cut of a tree, branch by branch, if an earlier try has not chosen it.
+    /// Chooses the cut of the octree, branch by branch, unless an earlier try has.
     Select,
-    /// Kernels.
+    /// Dispatches kernels.
     Stage(Stage),
-    /// Makes room by what is there.
+    /// Reads a count and resizes buffers by it.
     Look(Look),
-    /// Large splats, after a look at them: by tiles if there are any and lists hold them, else by a workgroup each.
+    /// Draws the large splats after their lists were measured: by tiles if there are any large
+    /// splats and the lists hold them, else by one workgroup each.
     Large {
-        /// With lists.
+        /// Stages that use tile lists.
         by_tiles: Vec<Stage>,
-        /// Without.
+        /// Stages with one workgroup per large splat.
         by_workgroups: Vec<Stage>,
     },
-    /// The rasteriser's visibility and attribute pass.
+    /// Draws the rasteriser's visibility and attribute passes.
     Draw,
-    /// The rasteriser's visibility pass of triangles.
+    /// Draws the rasteriser's visibility pass of triangles.
     DrawTriangles,
-    /// Rows of the image go to the host.
+    /// Copies the image rows of a band to the host.
     ReadBack(usize),
 }

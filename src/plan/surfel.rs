@@ -1,28 +1,30 @@
-//! The room that a surfel and its splat take, beside the surfel's shape.
+//! The records of a surfel's attributes and of its splat.
 
 use super::{ColorNeed, SceneNeeds};
 use crate::gpu::layout::{Filter, Splat};
 use crate::scene::LowPass;
 use crate::scene::harmonics::terms_of;
 
-/// Where a surfel's attributes lie in its record, by word. What is not needed takes no room.
+/// Word offsets of a surfel's attributes in its record. Attributes that are not needed take no
+/// space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SurfelLayout {
-    /// Words of a record; the colour comes first, a place in a texture after it.
+    /// u32 words of a record. The colour is at word 0, followed by the place in a texture, if any.
     pub words: u32,
-    /// How many surfels it stands for.
+    /// Number of identical surfels that it stands for.
     pub copies: u32,
-    /// The first of the three trailing parts of its centre.
+    /// The first of the three low parts of its centre, the digits beyond f32.
     pub low: u32,
-    /// The first of the six words of the lines at which it ends.
+    /// The first of the six words of its clip lines.
     pub clip: u32,
-    /// The first of the three words of its cap.
+    /// The first of the three words of its curvature (cap).
     pub cap: u32,
     /// The first of the three words of its own normal.
     pub normal: u32,
-    /// Its place in a tree.
+    /// Its place in the octree.
     pub number: u32,
-    /// How much of it there is: the last word, which surfels of a tree do without.
+    /// Its opacity factor between cuts that fade into each other. It is the last word; surfels of
+    /// an octree do without it.
     pub fade: u32,
 }
 
@@ -34,7 +36,7 @@ impl SurfelLayout {
             ColorNeed::Srgb8 => 1,
             ColorNeed::Linear => 4,
             ColorNeed::Harmonics(degree) => 4 + 3 * terms_of(degree) as u32,
-            // A colour, a place and two slopes.
+            // A colour, a place in the texture, and the two slopes of that place.
             ColorNeed::Textured => 16,
         };
         let low = copies + u32::from(needs.copies);
@@ -47,7 +49,7 @@ impl SurfelLayout {
     }
 }
 
-/// Words of a splat's record, of which those of its low-pass, its lines, its cap and its fade come last.
+/// u32 words of a splat's record. The optional parts come last: low-pass, clip lines, cap and fade.
 pub fn splat_words(needs: &SceneNeeds) -> u64 {
     let filter = if needs.low_pass == LowPass::None { 0 } else { size_of::<Filter>() };
     let clip = if needs.clips { CLIP_WORDS } else { 0 };
@@ -56,11 +58,11 @@ pub fn splat_words(needs: &SceneNeeds) -> u64 {
     (size_of::<Splat>() + filter) as u64 / 4 + clip + cap + fade
 }
 
-/// Words of a splat's lines: whole rows of four, as all of its record.
+/// u32 words of a splat's clip lines: a multiple of four, like every part of the record.
 const CLIP_WORDS: u64 = 8;
 
-/// Words of a splat's cap.
+/// u32 words of a splat's cap.
 const CAP_WORDS: u64 = 8;
 
-/// Words of a splat's fade: a row, of which two are used.
+/// u32 words of a splat's fade: a row of four, of which two are used.
 const FADE_WORDS: u64 = 4;

@@ -1,15 +1,15 @@
-//! The cut of a scene with levels of detail, on a device: branch by branch.
+//! Chooses the cut of a scene with levels of detail on the device, branch by branch.
 
 use super::run::{Run, over};
 use crate::error::Result;
 use crate::gpu::buffers::counts_at;
 use crate::passes::select;
 
-/// Room that may be left unused before it is given back: what a view asks for changes from one to the next.
+/// Unused surfel slots that a page may keep: the size of the cut changes from view to view.
 const SPARE: u64 = 1 << 16;
 
 impl Run<'_> {
-    /// Chooses what is drawn of each branch.
+    /// Chooses the surfels and nodes to draw in each branch, unless an earlier try already has.
     pub(super) fn select(&mut self) -> Result<()> {
         if self.known.chosen {
             return Ok(());
@@ -34,7 +34,7 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Learns how large the cut is.
+    /// Reads the sizes of the cuts and records the slots that the next try needs.
     pub(super) fn look_for_cut(&mut self) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let chosen: Vec<_> = self.store.chosen().collect();
@@ -43,13 +43,14 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Whether pages with `rooms` for so many surfels of each branch have room for its cut; if not, or if it is far too much, the next try has as much as
-    /// it takes.
+    /// Returns whether the slots `rooms` of each branch suffice for its cut in `cuts`. If not, or
+    /// if they are far too many, the next try gets as many as it needs.
     pub(super) fn fits_cut(&mut self, rooms: &[u64], cuts: &[u64]) -> bool {
         let enough: Vec<u64> = cuts.iter().copied().map(with_room).collect();
         let fits = rooms.iter().zip(cuts).all(|(room, cut)| cut <= room);
         if !fits {
-            // What has room keeps it, so that views of many branches do not make room again and again.
+            // Branches that fit keep their slots, so that views of many branches do not reallocate
+            // again and again.
             let larger = rooms.iter().zip(cuts).zip(enough);
             self.make_room(larger.map(|((room, cut), enough)| if cut > room { enough } else { *room }).collect());
         } else if rooms.iter().sum::<u64>() > 4 * enough.iter().sum::<u64>() + SPARE {
@@ -58,9 +59,9 @@ impl Run<'_> {
         fits
     }
 
-    /// From the next try on; its pages are new ones.
+    /// Sets the slots of each branch; the next try allocates new pages for them.
     fn make_room(&mut self, mut rooms: Vec<u64>) {
-        // Where nothing is drawn, a page.
+        // If nothing is drawn, one page must still exist.
         if let (true, Some(first)) = (rooms.iter().all(|room| *room == 0), rooms.first_mut()) {
             *first = 1;
         }
@@ -68,7 +69,7 @@ impl Run<'_> {
     }
 }
 
-/// An eighth more than this view takes, for the next one.
+/// Adds an eighth to the size of a cut as a reserve for the next view.
 fn with_room(cut: u64) -> u64 {
     cut + cut / 8
 }

@@ -1,5 +1,6 @@
-//! Scenes whose colours are codes of sRGB, as those of Gaussians are ([`gaussian`](crate::scene::gaussian)): they are composited as they are, over
-//! the code of the background, and the picture becomes linear light, as all frames are.
+//! Renders scenes whose colours are sRGB codes, as those of Gaussians are
+//! ([`gaussian`](crate::scene::gaussian)). The codes are composited over the code of the
+//! background, and the finished frame is decoded to linear light, as all frames are.
 
 use rayon::prelude::*;
 
@@ -7,7 +8,7 @@ use crate::frame::Frame;
 use crate::plan::{Facts, RenderOptions};
 use crate::scene::color::{linear_to_srgb, srgb_to_linear};
 
-/// The options by which the scene that `facts` are of is drawn.
+/// Returns `options` with the background as an sRGB code if the scene's colours are codes.
 pub(super) fn of(facts: &Facts, options: &RenderOptions) -> RenderOptions {
     let mut options = options.clone();
     if facts.encoded {
@@ -18,7 +19,7 @@ pub(super) fn of(facts: &Facts, options: &RenderOptions) -> RenderOptions {
     options
 }
 
-/// Makes linear light of a frame's codes.
+/// Decodes the colours of a frame from sRGB codes to linear light; alpha stays.
 pub(super) fn decode(frame: &mut Frame) {
     frame.color.par_iter_mut().with_min_len(1 << 12).for_each(|color| {
         let [r, g, b, a] = *color;

@@ -1,5 +1,6 @@
-//! What a researcher reads back between the stages: the device's own splats, depths and sums, and a way to run one
-//! function of a kernel over an array. Both are for study and for tests; a render keeps all of it on the device.
+//! Reads back what lies between the stages: the device's own splats, depths and sums. [`evaluate`]
+//! runs one function of a kernel over an array. Both are for study and for tests; a render keeps
+//! all of it on the device.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -24,41 +25,43 @@ use crate::plan::{
 };
 use crate::scene::{Camera, Composite, Scene};
 
-/// What the first three stages leave on the device.
+/// The results of project, visibility and accumulate.
 #[derive(Clone, Debug)]
 pub struct Stages {
-    /// The record of each surfel, in the order of the scene.
+    /// The splat record of each surfel, in scene order.
     pub splats: Vec<Splat>,
-    /// Nearest depths, see [`nearest_depth`](Self::nearest_depth), and sums.
+    /// Nearest depths (see [`nearest_depth`](Self::nearest_depth)) and sums.
     pub sums: Sums,
-    /// The uniform that the kernels saw.
+    /// The view uniform of the kernels.
     pub view: View,
 }
 
 impl Stages {
-    /// The nearest depth of `pixel`, world units, +inf where nothing is. `None` past the image.
+    /// The nearest depth of `pixel` in world units: +inf if no splat covers it, `None` past the
+    /// image.
     pub fn nearest_depth(&self, pixel: usize) -> Option<f64> {
         let bits = f32::INFINITY.to_bits().wrapping_sub(*self.sums.nearest.get(pixel)?);
         Some(f64::from(f32::from_bits(bits)) * f64::from(self.view.world))
     }
 }
 
-/// Runs project, visibility and accumulate on `gpu` and reads back what each made.
+/// Runs project, visibility and accumulate on `gpu` and reads back their results.
 ///
 /// # Errors
-/// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
+/// [`Error::Usage`] for options whose stages cannot be read back, or if the image's sums need more
+/// than one buffer; and any error of a render.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     if options.accumulator != Accumulator::Fixed {
-        return Err(Error::Usage("sums are read back in the form of the accumulator fixed: take it".into()));
+        return Err(Error::Usage("sums can be read back only with the accumulator fixed: use it".into()));
     }
     super::parts::one_alone(options)?;
     if options.composite != Composite::Opaque {
-        return Err(Error::Usage("stages are read back of opaque pictures: leave composite out".into()));
+        return Err(Error::Usage("stages can be read back only of opaque pictures: leave composite out".into()));
     }
     if options.separate {
-        return Err(Error::Usage("stages are read back of surfels that all blend: leave separate out".into()));
+        return Err(Error::Usage("stages can be read back only if all inputs blend: leave separate out".into()));
     }
-    // A slot for each surfel, and sums in storage.
+    // Each surfel needs a slot, and sums must be in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);
     let options = &RenderOptions { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
@@ -68,7 +71,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
     if plan.bands.len() > 1 {
         return Err(Error::Usage(format!(
-            "an image of {}x{} pixels needs {} bands on {}, and stages are read back from images of one: choose a \
+            "an image of {}x{} pixels needs {} bands on {}, and stages can be read back only from one: choose a \
              smaller image",
             camera.width,
             camera.height,
@@ -93,7 +96,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     Ok(Stages { splats: splats(gpu, &plan.needs, &order, &store)?, sums, view })
 }
 
-/// The record of each surfel, in the order of the scene.
+/// Reads the splat record of each surfel, in scene order.
 fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
     let mut splats = vec![Splat::zeroed(); order.len()];
     let mut order = order.iter();
@@ -102,20 +105,21 @@ fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result
         let Some(stored) = page.buffer("splats") else { continue };
         let stored = stored.read(gpu, page.slots * words)?;
         for (record, index) in stored.chunks_exact(words as usize).zip(&mut order) {
-            // The words of its low-pass, if there are any, come last.
+            // The words of the low-pass and of other extensions come last; they are left out.
             splats[*index as usize] = bytemuck::pod_read_unaligned(&bytemuck::cast_slice(record)[..size_of::<Splat>()]);
         }
     }
     Ok(splats)
 }
 
-/// Runs the entry point `evaluate` of the module `text` over `inputs`, an invocation each.
+/// Runs the entry point `evaluate` of the module `text`, one invocation per element of `inputs`.
 ///
-/// The module may bind `view` (uniform), `inputs` (read-only storage) and `outputs` (`output_len` elements, at first
-/// zero). Its workgroups have [`WORKGROUP`](crate::gpu::layout::WORKGROUP) invocations, in a 2-D grid.
+/// The module may bind `view` (uniform), `inputs` (read-only storage) and `outputs` (`output_len`
+/// elements, initially zero). Its workgroups have [`WORKGROUP`](crate::gpu::layout::WORKGROUP)
+/// invocations, in a 2-D grid.
 ///
 /// # Errors
-/// A module that is not valid, binds anything else, or fails on the device.
+/// [`Error::Usage`] if the module is not valid or binds anything else; and any error of the device.
 pub fn evaluate<I: Pod + Send + Sync, O: Pod>(
     gpu: &Gpu,
     text: &str,

@@ -1,4 +1,5 @@
-//! What stays of a scene from frame to frame on a device, and how a frame is tried until enough is known of it.
+//! Keeps the device state of a scene from frame to frame, and retries a frame until its buffers
+//! fit.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -21,30 +22,30 @@ use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions,
 use crate::progress::Progress;
 use crate::scene::Camera;
 
-/// The facts of a scene, what is known of its frames, and what is on the device.
+/// The facts of a scene, the sizes measured in its frames so far, and its kernels and buffers.
 pub(super) struct Kept {
     pub(super) facts: Facts,
     pub(super) options: RenderOptions,
     known: Known,
-    /// Width and height of the last frame.
+    /// Width and height of the last frame, in samples.
     size: Option<(u32, u32)>,
     kernels: Option<Kernels>,
     pub(super) store: Option<Store>,
 }
 
 impl Kept {
-    /// Nothing is on the device yet.
+    /// Creates the state of a scene with nothing on the device yet.
     pub(super) fn new(facts: Facts, options: RenderOptions) -> Self {
         Self { facts, options, known: Known::default(), size: None, kernels: None, store: None }
     }
 
-    /// Device memory that the last frame was rendered with.
+    /// Device memory of the last frame.
     pub(super) fn device_bytes(&self) -> DeviceBytes {
         let (splats, pixels) = self.store.as_ref().map_or((0, 0), Store::bytes);
         DeviceBytes { splats, pixels }
     }
 
-    /// Tries until what is known of the view is enough.
+    /// Renders a frame, with retries until all buffers are large enough.
     pub(super) fn frame(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
@@ -60,7 +61,7 @@ impl Kept {
             let first = number == 0;
             number += 1;
             let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
-            // A second try adds nothing to the bar.
+            // Retries do not advance the progress bar.
             let progress = if first { bar } else { &() };
             self.prepare((gpu, sources), source, (&plan, camera), progress)?;
             let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
@@ -91,7 +92,8 @@ impl Kept {
         Err(Run::never_fits(gpu))
     }
 
-    /// Forgets what held for another size of image, and looks at how large splats are.
+    /// Forgets what earlier views and other image sizes required, and samples how many tiles a
+    /// splat touches.
     fn look_at(&mut self, gpu: &Gpu, camera: &Camera) {
         self.known.forget_view();
         let size = Some((camera.width, camera.height));
@@ -106,8 +108,9 @@ impl Kept {
         }
     }
 
-    /// Compiles the kernels and makes the buffers of `plan`, as far as they are not there: kernels while the scene is uploaded. Of two errors that of the
-    /// kernels is told.
+    /// Compiles the kernels and creates the buffers of `plan` that do not exist yet; the kernels
+    /// are compiled while the scene is uploaded. If both fail, the error of the kernels is
+    /// returned.
     fn prepare(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
@@ -119,7 +122,7 @@ impl Kept {
         let kernels = self.kernels.take().filter(|kernels| kernels.serve(plan, &self.options, surfels));
         let kernels = kernels.unwrap_or_else(|| Kernels::new(sources, plan, &self.options, surfels));
         if self.store.as_ref().is_some_and(|store| !store.serves(&plan.needs)) {
-            // The old ones make room first.
+            // Frees the old buffers before new ones are allocated.
             self.store = None;
             self.known.forget_buffers();
         }
@@ -134,7 +137,7 @@ impl Kept {
                 let compile = || {
                     kernels.compile(gpu, plan)?;
                     if let Some(next) = &next {
-                        // What is wrong with kernels that a guess takes is told if they are needed.
+                        // Warm-up only: errors are reported by the compilation that is used.
                         let _ = Kernels::new(sources, next, &self.options, surfels).first(gpu);
                     }
                     Ok(())
@@ -152,7 +155,8 @@ impl Kept {
         store.fit(gpu, plan, &self.known)
     }
 
-    /// A guess at the plan that follows `plan`, if that one looks for a cut: that of a cut that a page has room for.
+    /// Guesses the plan that follows `plan` if that one only measures a cut: a plan for a cut that
+    /// fits one page.
     fn plan_of_cut(&self, gpu: &Gpu, plan: &Plan, camera: &Camera) -> Option<Plan> {
         let known = Known { cut: Some(vec![1]), ..self.known.clone() };
         let next = || Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &known).ok();

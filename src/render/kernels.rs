@@ -1,5 +1,5 @@
-//! The compiled kernels of a frame: a module for all passes, one for the tiles, which is compiled when something is drawn by them, and one that
-//! chooses a cut.
+//! Compiles the kernels of a frame: a module for all passes, one for the tiles, compiled when they
+//! first draw something, and one that chooses a cut.
 
 use std::sync::{Arc, OnceLock};
 
@@ -12,9 +12,9 @@ use crate::plan::pass::{Making, Module};
 use crate::plan::steps::Kernel;
 use crate::plan::{Plan, RenderOptions, SceneNeeds};
 
-/// The kernels of one plan.
+/// The kernels of one plan, compiled on first use.
 pub struct Kernels {
-    /// What they are compiled for.
+    /// The needs and constants that the kernels are compiled for.
     made: (SceneNeeds, Vec<(&'static str, u64)>),
     sources: Sources,
     constants: Vec<(&'static str, f64)>,
@@ -22,7 +22,7 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Those of `plan`, of which none is compiled yet.
+    /// Creates the kernels of `plan` without compiling any.
     pub fn new(sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Self {
         let constants = constants(&Making { needs: &plan.needs, options, surfels });
         let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceLock::new())).collect();
@@ -30,7 +30,8 @@ impl Kernels {
         Self { made, sources: sources.clone(), constants, modules }
     }
 
-    /// Compiles those that `plan` is known to dispatch: as long as a cut is looked for, no others than choose it.
+    /// Compiles the kernels that `plan` is certain to dispatch: until the cut is known, only those
+    /// that choose it.
     pub fn compile(&self, gpu: &Gpu, plan: &Plan) -> Result<()> {
         if plan.needs.levels {
             self.of(gpu, &CHOOSING[0])?;
@@ -41,18 +42,18 @@ impl Kernels {
         Ok(())
     }
 
-    /// Whether they serve `plan` too.
+    /// Returns whether these kernels serve `plan` too.
     pub fn serve(&self, plan: &Plan, options: &RenderOptions, surfels: u64) -> bool {
         let making = Making { needs: &plan.needs, options, surfels };
         self.made.0 == plan.needs && self.made.1 == bits(&constants(&making))
     }
 
-    /// The module of all passes.
+    /// Compiles and returns the module of all passes.
     pub fn first(&self, gpu: &Gpu) -> Result<&Program> {
         self.compiled(gpu, 0)
     }
 
-    /// The module that has `kernel`.
+    /// Compiles and returns the module that has `kernel`.
     pub fn of(&self, gpu: &Gpu, kernel: &Kernel) -> Result<&Program> {
         let module = self.modules.iter().position(|(module, _)| module.kernels.contains(kernel));
         self.compiled(gpu, module.ok_or_else(|| gpu.error(format!("there is no kernel {}", kernel.name)))?)

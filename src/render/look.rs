@@ -1,4 +1,5 @@
-//! What is looked at on the device in the middle of a frame, because buffers are sized by it.
+//! Reads counts from the device in the middle of a frame, where they determine the sizes of
+//! buffers.
 
 use super::run::Run;
 use crate::error::{Error, Result};
@@ -11,7 +12,7 @@ use crate::plan::steps::{Part, Stage};
 use crate::plan::{FragmentLayout, KEY_WORDS, Lists, tuning};
 
 impl Run<'_> {
-    /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
+    /// Makes the pages hold the splats of the listed batches, and an eighth more for the next view.
     pub(super) fn look_for_slots(&mut self, part: Part) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
@@ -19,7 +20,8 @@ impl Run<'_> {
         for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
             let slots = u64::from(batches) * u64::from(BATCH);
             if slots > page.slots {
-                // Whole batches: the last one may be listed anywhere.
+                // Slots come in whole batches, because the partly filled last batch may be listed
+                // anywhere.
                 let [slots, all] = [slots + slots / 8, page.surfels].map(|n| n.next_multiple_of(BATCH.into()));
                 page.grow(self.gpu, slots.min(all))?;
             }
@@ -28,15 +30,18 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view. Where there are more than
-    /// a binding or a list holds, large splats are drawn without; false if tiles were to gather all.
+    /// Makes the lists of a kind hold the entries that `stages` count, and a quarter more for the
+    /// next view. If a binding or a list cannot hold them, large splats are drawn without lists.
+    /// Returns false if tiles were to gather all splats, which needs the lists: the frame is then
+    /// retried.
     pub(super) fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
         self.timing.flush(self.gpu)?;
         let gathers = self.plan.needs.gather;
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
             let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
-            // What no list holds of one individual is drawn without, and then that of all is: bands that follow look no more.
+            // If lists cannot hold the large splats of one individual, those of all are drawn
+            // without lists, and later bands skip this look.
             let large = large && !(self.plan.needs.separate && self.unlisted);
             self.by_tiles = large;
             if !large {
@@ -55,7 +60,7 @@ impl Run<'_> {
             self.known.crowded |= gathers;
             return Ok(!gathers);
         }
-        // What earlier bands listed is drawn by now.
+        // The entries of earlier bands have been drawn, so the lists may be replaced.
         if entries > self.store.entries(of) {
             self.store.make_lists(self.gpu, self.plan, of, entries)?;
         }
@@ -64,8 +69,9 @@ impl Run<'_> {
         Ok(true)
     }
 
-    /// Makes room for the fragments of a band, which were counted; false if there is not enough for all of them at once, and the view is
-    /// cut into other bands, or if lists are longer than was known.
+    /// Makes the buffers hold the counted fragments of a band. Returns false if the view must be
+    /// retried: with other bands, because they do not all fit at once, or because lists are longer
+    /// than known.
     pub(super) fn look_for_fragments(&mut self, band: usize) -> Result<bool> {
         self.timing.flush(self.gpu)?;
         let Some(starts) = self.store.buffer("starts") else { return Ok(true) };
@@ -78,10 +84,11 @@ impl Run<'_> {
         }
         let record = u64::from(FragmentLayout::of(&self.plan.needs).words).max(KEY_WORDS);
         let most = self.gpu.buffer_limit().min(tuning::MOST_FRAGMENT_BYTES) / (4 * record);
-        // Of more than a word holds the starts of rows no longer tell how many there are in each.
+        // The row starts wrap if the total exceeds a u32, and then no longer give the counts of
+        // rows.
         if u64::from(total) <= most && total < u32::MAX {
             if ends_loops && longest > self.plan.longest_list {
-                // And a quarter more for the next view.
+                // Adds a quarter for the next view.
                 self.known.longest_list = longest.saturating_add(longest / 4);
                 self.known.times_cut += 1;
                 return Ok(false);
@@ -107,11 +114,12 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
-    /// Has lists end where nothing more shows, from the next try on; false if that changes nothing.
+    /// Makes lists end where nothing behind shows, from the next try on. Returns false if that
+    /// changes nothing.
     fn veil(&mut self) -> bool {
         let veils = self.plan.needs.lists == Some(Lists::Sorted) && !self.plan.needs.veils;
         if veils {
-            // Bands are cut anew, by what is listed then.
+            // Bands are cut anew by the shorter lists.
             (self.known.veiled, self.known.cuts) = (true, None);
             self.known.times_cut += 1;
         }

@@ -1,4 +1,4 @@
-//! What of the buffers there is for each page of surfels, and for each branch of a tree.
+//! The buffers of each page of surfels and of each branch of an octree.
 
 use bytemuck::Zeroable;
 
@@ -11,19 +11,21 @@ use crate::passes::order;
 use crate::passes::upload::{self, BranchBuffers};
 use crate::plan::{SceneNeeds, splat_words};
 
-/// One page: its surfels, and slots for splats of all of them, in their order, or, where batches are left out, of as many batches as
-/// there are to be drawn, one after the other ([`cull`](crate::passes::cull)).
+/// One page of surfels, with slots for their splats. Without culling there is a slot for each
+/// surfel, in the surfels' order. With culling there are slots for the batches that are drawn, one
+/// after the other ([`cull`](crate::passes::cull)).
 pub struct Page {
     pub(super) buffers: Named,
-    /// The number of the branch that has the surfels and their attributes, if they are those of a cut.
+    /// The index of the branch that stores the surfels and their attributes, if the page is of a
+    /// cut.
     pub(super) branch: Option<usize>,
-    /// Surfels in it.
+    /// Number of surfels in the page; in a page of a cut, the surfels that it has slots for.
     pub surfels: u64,
-    /// Surfels that they stand for together.
+    /// Number of scene surfels that those of the page stand for; copies are stored once.
     pub stand_for: u64,
-    /// Words of a splat's record.
+    /// u32 words of a splat's record.
     splat_words: u64,
-    /// Splats that there is room for.
+    /// Number of splats that the buffers can hold.
     pub slots: u64,
 }
 
@@ -34,7 +36,8 @@ impl Page {
         Self::with(gpu, Named::from_iter(buffers), (None, stand_for), (own, needs))
     }
 
-    /// One with room for so many surfels of the cut of a branch, from the one with the number `first` on: how many of them there are, that cut tells.
+    /// Creates a page for up to `surfels` surfels of the cut of a branch, starting at number
+    /// `first` of the cut. The cut on the device holds how many there are.
     pub(super) fn of_cut(
         gpu: &Gpu,
         surfels: u64,
@@ -44,7 +47,7 @@ impl Page {
         Self::with(gpu, Named::new(), (Some(number), 0), (order::dealt(surfels, (branch.chosen, first as u32)), needs))
     }
 
-    /// One with these buffers, and room for nothing yet of what is made of them.
+    /// Creates a page with `buffers`; its splat buffers are minimal until [`Self::grow`].
     fn with(
         gpu: &Gpu,
         mut buffers: Named,
@@ -53,14 +56,14 @@ impl Page {
     ) -> Result<Self> {
         let surfels = u64::from(own.surfels);
         buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
-        // Those of cuts are drawn one and all.
+        // Batches of a cut are not culled.
         let batches = if branch.is_some() { 0 } else { surfels.div_ceil(BATCH.into()) };
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
-        // A row of a grid is a batch.
+        // One row of the dispatch grid is one batch.
         gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
         buffers.insert("drawn", drawn);
         buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
-        // A binding holds one record at least.
+        // A binding must hold at least one record.
         buffers.insert("splats", Buffer::storage(gpu, "splats", splat_words(needs))?);
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
@@ -68,17 +71,17 @@ impl Page {
         Ok(Self { buffers, branch, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
     }
 
-    /// Batches of surfels.
+    /// Number of batches, the last one perhaps partly filled.
     pub fn batches(&self) -> u64 {
         self.surfels.div_ceil(BATCH.into())
     }
 
-    /// The buffer of a name.
+    /// The buffer of this name in WGSL.
     pub fn buffer(&self, name: &str) -> Option<&Buffer<u32>> {
         self.buffers.get(kept(name))
     }
 
-    /// Makes room for at least `slots` splats, and keeps all that is stored.
+    /// Grows the buffers to at least `slots` splats and keeps their contents.
     pub fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
         if self.slots >= slots {
             return Ok(());
@@ -98,22 +101,22 @@ impl Page {
     }
 }
 
-/// A branch of a tree ([`branches`](crate::passes::branches)).
+/// A branch of an octree ([`branches`](crate::passes::branches)).
 pub struct Branch {
     pub(super) buffers: Named,
-    /// How many levels it has that one workgroup cannot judge.
+    /// Number of levels that are too large for one workgroup.
     pub large_levels: u32,
-    /// Where in its attributes what is chosen starts, words.
+    /// Word offset in `attributes` at which the list of chosen surfels and nodes starts.
     pub(super) chosen: u32,
 }
 
-/// What all branches share while a cut is made, one after the other.
+/// Creates the buffers that all branches share while their cuts are made one after the other.
 pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers], needs: &SceneNeeds) -> Result<Named> {
     let nodes = branches.iter().map(|branch| branch.nodes).max().unwrap_or(0);
     let roots = branches.iter().map(|branch| branch.roots).sum();
     let runs = nodes.div_ceil(JUDGED.into());
     let groups = runs.div_ceil(WORKGROUP.into());
-    // In the second one, by how many cuts what is in the first is come to.
+    // With fades, the second half stores how many cuts reach each node.
     let halves = if needs.fades { 2 } else { 1 };
     Ok(Named::from([
         ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(SPREAD_GRID) + 3)?),

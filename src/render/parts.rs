@@ -1,6 +1,9 @@
-//! A picture whose maps are made in another way than its colour takes a render for each way. Of several samples a pixel the colour is the
-//! mean, and maps are of the centre, however many there are: a mean of depths, or of normals, of two surfaces would be of neither. And
-//! where surfaces show through each other depth, normal and the like are still those of the nearest one, as of an opaque picture.
+//! Splits a frame into renders when its maps are not made in the same way as its colour.
+//!
+//! With several samples per pixel, the colour is the mean of the samples, but maps are taken at the
+//! pixel centre: the mean of the depths or normals of two surfaces belongs to neither surface.
+//! Where surfaces show through each other, depth, normal and similar maps are those of the nearest
+//! surface, as in an opaque picture.
 
 use super::report::Report;
 use crate::error::{Error, Result};
@@ -8,9 +11,11 @@ use crate::frame::Frame;
 use crate::plan::{Facts, RenderOptions, composited};
 use crate::scene::{Composite, Map, Maps, Samples};
 
-/// The options of the renders that one with `options` takes: first that of its colour, then those of maps that it does not make too.
+/// Returns the options of each render of a frame: the colour's first, then those of the maps that
+/// the first render does not make.
 pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions> {
-    // A map of the surfaces of what is opaque is made apart, as backs are drawn for it that the colour leaves out.
+    // In an opaque picture the map of surfaces needs a render of its own, because it also draws the
+    // back faces that the colour leaves out.
     let surfaces = options.maps.among(Maps::of(&[Map::Surfaces]));
     let without = RenderOptions { maps: options.maps.beside(surfaces), ..options.clone() };
     let opaque = composited(facts, &without) == Composite::Opaque;
@@ -20,7 +25,7 @@ pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions
         return all;
     }
     let decision = options.maps.among(Maps::of(&[Map::Decision]));
-    // What a render for maps makes.
+    // The options of a render for maps, at one sample per pixel.
     let with = |maps: Maps| RenderOptions { maps: maps.and_all(decision), samples: Samples::ONE, ..options.clone() };
     let (whole, nearest) = match opaque {
         true => (options.maps, Maps::NONE),
@@ -37,21 +42,21 @@ pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions
     parts
 }
 
-/// Fails for several samples, and for levels of detail, where what a pixel sums of all surfels is read back.
+/// Checks that the sums of a render can be read back: one sample per pixel, no levels of detail.
 ///
 /// # Errors
-/// [`Error::Usage`].
+/// [`Error::Usage`] otherwise.
 pub(super) fn one_alone(options: &RenderOptions) -> Result<()> {
     if !options.detail.is_finest() {
-        return Err(Error::Usage("sums are read back of all surfels: leave levels of detail out".into()));
+        return Err(Error::Usage("sums can be read back only without levels of detail: leave them out".into()));
     }
     if options.samples == Samples::ONE {
         return Ok(());
     }
-    Err(Error::Usage("sums are read back of pixels with one sample: take a camera whose pixels are the samples".into()))
+    Err(Error::Usage("sums can be read back only at one sample per pixel: use a camera with one pixel per sample".into()))
 }
 
-/// The colours of one render with the maps of others, and what all of them took.
+/// Joins the colours of one render with the maps of others, and adds up their times.
 pub(super) fn joined(of_colors: (Frame, Report), others: Vec<(Frame, Report)>) -> (Frame, Report) {
     let (mut frame, mut report) = of_colors;
     for (maps, of_maps) in others {
@@ -65,7 +70,8 @@ pub(super) fn joined(of_colors: (Frame, Report), others: Vec<(Frame, Report)>) -
         for map in maps.maps().iter() {
             let Some(values) = maps.map(map) else { continue };
             match frame.map_mut(map) {
-                // A pixel is as near to a decision as the nearest of what it is made of.
+                // The distance to a decision is the least over all renders that contribute to the
+                // pixel.
                 Some(decisions) => {
                     decisions.iter_mut().zip(values).for_each(|(least, other)| *least = least.min(*other))
                 }

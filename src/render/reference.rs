@@ -1,5 +1,5 @@
-//! The sequence in f64 on the processor's threads: what the twins make of a scene, strip by strip of the image, by the steps of a plan
-//! that no device makes.
+//! Renders in f64 on the processor: the twins of the kernels draw the image in strips of rows, by
+//! the steps of a plan without a device.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -24,7 +24,7 @@ use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Blend, Camera, Cull, Samples, Scene};
 
-/// Renders `scene` by `camera`, whose pixels are the samples.
+/// Renders `scene`. The pixels of `camera` are the samples ([`Camera::sampled`]).
 pub(super) fn frame(
     scene: &Scene,
     facts: &Facts,
@@ -57,7 +57,7 @@ pub(super) fn frame(
         progress.advance(rows.into());
         frame
     };
-    // A few strips at a time: all of them beside the frame would double its memory.
+    // Renders a few strips at a time: all of them at once would double the memory of the frame.
     let Samples { across, down } = options.samples;
     let image = Camera { width: camera.width / across, height: camera.height / down, ..camera.clone() };
     let mut frame = Frame::empty(&image, options.maps);
@@ -80,7 +80,9 @@ pub(super) fn frame(
     )
 }
 
-/// The cut of `scene` that is drawn by the image's `camera`, and how, if one is: whether its backs are left out the whole scene says.
+/// Returns the cut of `scene` that `camera` draws, and its options; `None` if no cut is drawn.
+/// `camera` has the pixels of the image, not the samples. The whole scene decides whether back
+/// faces are culled.
 pub(super) fn cut(
     scene: &Scene,
     facts: &Facts,
@@ -95,7 +97,7 @@ pub(super) fn cut(
     Some((cut.scene(scene, tree, options.draws_node_caps()), RenderOptions { cull, ..options.clone() }))
 }
 
-/// What the steps of `plan` have twins for: before there are bands, and in each of them.
+/// Lists the twins of the steps of `plan`: those that run once, and those of each band.
 fn twins(plan: &Plan) -> (Vec<Twin>, Vec<Vec<Twin>>) {
     let (mut before, mut of_bands) = (Vec::new(), vec![Vec::new(); plan.bands.len()]);
     for step in sequence::steps(plan) {
@@ -109,13 +111,13 @@ fn twins(plan: &Plan) -> (Vec<Twin>, Vec<Vec<Twin>>) {
     (before, of_bands)
 }
 
-/// The rows of a strip by its `twins`.
+/// Renders the rows of a strip by its `twins`.
 fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let splats = || strip.splats.iter().copied();
     let (mut nearest, mut sums, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let pixels = camera.width as usize * rows as usize;
-    // What individuals show.
+    // The nearest surface at each pixel among the individuals drawn so far.
     let mut kept = None;
     let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
     for twin in twins {
@@ -151,10 +153,10 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     frame
 }
 
-/// The place of each surfel in the order in which a device stores them.
+/// The rank of each surfel in the order in which a device stores them.
 fn ranks(scene: &Scene, facts: &Facts, options: &RenderOptions) -> Vec<u32> {
     if facts.nodes_of(options).is_some() {
-        // A cut has the order of the tree.
+        // A cut is stored in tree order.
         return (0..scene.surfels.len() as u32).collect();
     }
     let mut ranks = vec![0; scene.surfels.len()];
@@ -164,17 +166,17 @@ fn ranks(scene: &Scene, facts: &Facts, options: &RenderOptions) -> Vec<u32> {
     ranks
 }
 
-/// Milliseconds by pass: what all threads took, over their number.
+/// Milliseconds by pass: thread time divided by the number of threads.
 #[derive(Default)]
 struct Spent(Mutex<BTreeMap<String, f64>>);
 
 impl Spent {
-    /// What `work` makes, by one of `threads` that do as much.
+    /// Runs `work`, one of `threads` equal shares of a pass, and adds its time to the pass.
     fn timed<T>(&self, pass: &str, threads: usize, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let made = work();
         let ms = start.elapsed().as_secs_f64() * 1e3 / threads as f64;
-        // Whoever panicked held nothing but a sum.
+        // A panic cannot leave a sum half written, so a poisoned lock is still valid.
         let mut passes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *passes.entry(format!("{pass}_ms")).or_default() += ms;
         made
@@ -211,7 +213,8 @@ fn report(
     }
 }
 
-/// The splats of each band of `plan`, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.
+/// Sorts splats into the bands of `plan` by count, scan and place: band b has
+/// `members[starts[b]..starts[b + 1]]`, in order.
 fn bin(splats: &[Splat], plan: &Plan) -> (Vec<usize>, Vec<u32>) {
     let bands = plan.bands.len();
     let band_of = |row: u32| plan.bands.partition_point(|band| band.first <= row) - 1;

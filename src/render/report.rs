@@ -1,4 +1,4 @@
-//! What a render did, and what it took.
+//! The report of a render: what was drawn, how, and how long each pass took.
 
 use std::collections::BTreeMap;
 
@@ -7,42 +7,44 @@ use serde::Serialize;
 use crate::frame::Frame;
 use crate::scene::Map;
 
-/// What a render did.
+/// Describes one render: what was drawn, how, and how long it took.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// `gpu` (compute kernels), `raster` (the rasteriser) or `reference`.
     pub backend: &'static str,
-    /// The adapter's name; of the reference, the processor threads.
+    /// The adapter's name; for the reference, the number of processor threads.
     pub adapter: String,
-    /// How sums were kept: an accumulator, the rasteriser's format, or the reference's `f64`.
+    /// The format of the sums: an accumulator, the rasteriser's format, or the reference's `f64`.
     pub accumulator: &'static str,
-    /// Fragments that made a sum of the accumulator that was asked for wrap. If any, the frame was rendered again with `fixed`,
-    /// and `total_ms` holds both.
+    /// Number of fragments that made a sum of the chosen accumulator wrap. If there are any, the
+    /// frame was rendered again with `fixed`, and `total_ms` includes both renders.
     pub overflows: u64,
     /// Surfels in the scene.
     pub surfels: u64,
-    /// Splats that may touch a pixel; of an image that is drawn in bands a splat counts in each that it touches, up to as many as there
-    /// are surfels. Those that were left out because they are hidden are not counted.
+    /// Number of splats that may touch a pixel, without those that were skipped as hidden. In an
+    /// image drawn in bands, a splat counts in each band that it touches; the total is at most the
+    /// number of surfels.
     pub splats_drawn: u64,
-    /// Surfels and nodes that are drawn in place of all surfels, of a scene with levels of detail.
+    /// Number of surfels and nodes in the cut, if a cut is drawn instead of all surfels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cut: Option<u64>,
-    /// Triangles in the scene.
+    /// Number of triangles in the scene.
     #[serde(skip_serializing_if = "is_none")]
     pub triangles: u64,
-    /// Image width.
+    /// Width of the image, pixels.
     pub width: u32,
-    /// Image height.
+    /// Height of the image, pixels.
     pub height: u32,
-    /// Milliseconds by pass, `NAME_ms`, of all tries together.
+    /// Milliseconds by pass, as `NAME_ms`, summed over all tries.
     pub passes: BTreeMap<String, f64>,
-    /// Where the passes' times come from: `timestamps` or `wall`.
+    /// Source of the times of passes: `timestamps` (of the device) or `wall`.
     pub clock: &'static str,
     /// Milliseconds from the uploaded scene to the frame in host memory.
     pub total_ms: f64,
-    /// What the scene needed.
+    /// Names of the needs of scene and options
+    /// ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
     pub needs: Vec<&'static str>,
-    /// Of the map [`Map::Tail`](crate::scene::Map::Tail), if it is made.
+    /// Statistics of the map [`Map::Tail`](crate::scene::Map::Tail), if it is written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tail: Option<Tail>,
 }
@@ -51,12 +53,12 @@ fn is_none(count: &u64) -> bool {
     *count == 0
 }
 
-/// How much of a picture is what lies behind the last layer.
+/// The weight in the picture of all that lies behind the last layer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tail {
-    /// The mean of its weights over all pixels: 1 would be a picture of nothing else.
+    /// The mean weight over all pixels; at 1 the picture would show nothing else.
     pub mean: f64,
-    /// The largest weight at a pixel.
+    /// The largest weight of a pixel.
     pub largest: f64,
 }
 
@@ -68,11 +70,12 @@ impl Tail {
     }
 }
 
-/// Device memory of a render, bytes: its buffers and textures, and what the host reads frames through.
+/// Device memory of a render in bytes: buffers, textures, and the staging buffers through which
+/// frames are read back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceBytes {
-    /// Of the surfels and their splats.
+    /// Bytes of the surfels and their splats.
     pub splats: u64,
-    /// Of the pixels: nearest depths, sums, image.
+    /// Bytes of the pixels: nearest depths, sums, image.
     pub pixels: u64,
 }

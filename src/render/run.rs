@@ -1,4 +1,5 @@
-//! The executor of a frame's steps: it binds buffers by their names, dispatches, and looks at what the device counted.
+//! Executes the steps of a frame: binds buffers by name, dispatches kernels, and reads what the
+//! device counted.
 
 use super::kernels::Kernels;
 use super::store::Store;
@@ -19,46 +20,47 @@ use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
 use crate::plan::{Plan, RasterDepth};
 use crate::progress::Progress;
 
-/// How many splats a frame has.
+/// How many splats a frame has, and whether it is complete.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
-    /// Those that may touch a pixel of the image, and are not known to be hidden; where bands have splats of their own, each counts in
-    /// every band that it is drawn in.
+    /// Number of splats that may touch a pixel of the image and are not known to be hidden. If each
+    /// band has its own splats, a splat counts in every band that draws it.
     pub drawn: u64,
-    /// Surfels and nodes of the cut that is drawn, if one is.
+    /// Number of surfels and nodes in the cut, if a cut is drawn.
     pub cut: Option<u64>,
-    /// The image is right. If it is not, what is known now makes the next one right.
+    /// Whether the image is valid. If not, the next try succeeds with what this one recorded in
+    /// `known`.
     pub complete: bool,
 }
 
-/// A try at a frame.
+/// One try at a frame.
 pub struct Run<'a> {
     /// The device.
     pub gpu: &'a Gpu,
-    /// What is rendered.
+    /// The plan of the frame.
     pub plan: &'a Plan,
-    /// Its kernels.
+    /// The kernels of the plan.
     pub kernels: &'a Kernels,
-    /// Its buffers.
+    /// The buffers of scene and frame.
     pub store: &'a mut Store,
-    /// What it learns.
+    /// Sizes measured so far; this try adds to them.
     pub known: &'a mut Known,
-    /// Time by pass.
+    /// Times by pass.
     pub timing: Timing,
-    /// Large splats are drawn by tiles.
+    /// Whether large splats are drawn by tiles.
     pub(super) by_tiles: bool,
-    /// What the device counted so far.
+    /// Counts read from the device so far.
     tally: Tally,
-    /// What lists of large and of small splats were seen to need, in the band that needs most.
+    /// Entries that the lists of large and of small splats need, in the band that needs most.
     pub(super) needed: [Option<u64>; 2],
-    /// In some band lists had too little room.
+    /// Whether the lists overflowed in some band.
     wanting: bool,
-    /// In some band no list holds the large splats.
+    /// Whether lists cannot hold the large splats of some band.
     pub(super) unlisted: bool,
 }
 
 impl<'a> Run<'a> {
-    /// A try that has not begun.
+    /// Creates a try that has not begun.
     pub fn new(gpu: &'a Gpu, plan: &'a Plan, kernels: &'a Kernels, store: &'a mut Store, known: &'a mut Known) -> Self {
         Self {
             gpu,
@@ -75,7 +77,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Runs `steps` into `frame`; false if there is too little room for the rest, of which `known` now tells.
+    /// Runs `steps` and appends rows to `frame`. Returns false if buffers are too small for the
+    /// rest; `known` then holds the sizes for the next try.
     pub fn steps(&mut self, steps: &[Step], frame: &mut Frame, progress: &dyn Progress) -> Result<bool> {
         for step in steps {
             match step {
@@ -112,20 +115,22 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// What the device counted.
+    /// Reads the last counts, records them in `known`, and returns the totals of the frame.
     pub fn tally(&mut self) -> Result<Tally> {
         self.count(self.plan.bands.len() - 1)?;
         self.learn();
         Ok(self.tally)
     }
 
-    /// Counts what `band` leaves, where the next one counts anew; of the last one [`tally`](Self::tally) does.
+    /// Reads the counts of `band` before the next band resets them; [`tally`](Self::tally) reads
+    /// those of the last band.
     pub fn end_band(&mut self, band: usize) -> Result<()> {
         let last = band + 1 == self.plan.bands.len();
         if self.plan.projects_each_band && !last { self.count(band) } else { Ok(()) }
     }
 
-    /// Keeps what all bands showed of lists: the next try has room for the one that needs most, or looks at all of them again.
+    /// Records the list entries of the band that needs most, so that the next try has room for
+    /// them. After an overflow it records none, and the next try measures all bands again.
     fn learn(&mut self) {
         for of in [Listed::Large, Listed::Small] {
             let entries = &mut self.known.entries[of as usize];
@@ -138,7 +143,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Adds what the device counted up to the end of `band`.
+    /// Adds the device's counts at the end of `band` to the tally.
     fn count(&mut self, band: usize) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let wanted = |name: &'static str| self.store.buffer(name);
@@ -174,12 +179,12 @@ impl<'a> Run<'a> {
             self.tally.cut = Some(cut);
             fits = self.fits_cut(rooms, &cuts);
         }
-        // Of a view all bands are asked.
+        // A view has large splats if any of its bands has.
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
         self.known.large = Some(before || most_large > 0);
         self.known.slots &= slots;
         self.wanting |= !lists;
-        // Where splats are missing, sums are those of others.
+        // If splats are missing, this overflow count is not valid.
         if slots && lists && fits {
             self.known.overflows = self.known.overflows.max(overflows.into());
         }
@@ -209,7 +214,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// The rasteriser's passes over the whole image.
+    /// Draws the rasteriser's visibility and attribute passes over the whole image.
     fn draw(&mut self) -> Result<()> {
         let (gpu, plan, store) = (self.gpu, self.plan, &*self.store);
         let (Some(raster), Some(targets)) = (plan.needs.raster, &store.targets) else { return Ok(()) };
@@ -226,7 +231,7 @@ impl<'a> Run<'a> {
         };
         let attachment =
             |depth_ops| wgpu::RenderPassDepthStencilAttachment { view: &targets.depth, depth_ops, stencil_ops: None };
-        // Where nothing is: the farthest there can be.
+        // Empty pixels get the farthest depth.
         let exact = raster.depth == RasterDepth::Exact;
         let nothing = if exact { 1.0 } else { 0.0 };
         let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(nothing), store: wgpu::StoreOp::Store };
@@ -239,12 +244,14 @@ impl<'a> Run<'a> {
             return self.timing.draw(gpu, "visibility", &sums, cleared, |pass| draw(pass, "nearest"));
         }
         self.timing.draw(gpu, "visibility", &[], cleared, |pass| draw(pass, "visibility"))?;
-        // Without operations the depth buffer is read only, and the shader may not see it either way.
+        // Without operations the depth buffer is read-only; in exact mode the shader reads it, so
+        // it is not attached.
         let depth = (!exact).then(|| attachment(None));
         self.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate"))
     }
 
-    /// The rasteriser's visibility pass of triangles over the whole image. The depth buffer is cleared once more before splats.
+    /// Draws the rasteriser's visibility pass of triangles over the whole image. The depth buffer
+    /// is cleared again before the splats.
     fn draw_triangles(&mut self) -> Result<()> {
         let (gpu, plan, store) = (self.gpu, self.plan, &*self.store);
         let Some(targets) = &store.targets else { return Ok(()) };
@@ -272,9 +279,9 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// That it goes on trying makes no sense.
+    /// The error after too many tries.
     pub fn never_fits(gpu: &Gpu) -> Error {
-        gpu.error("the room that a frame needs was measured again and again, and was never enough")
+        gpu.error("the buffers were still too small after every retry of the frame: choose a smaller image or fewer surfels")
     }
 }
 
@@ -289,7 +296,7 @@ fn clear(store: &Store, encoder: &mut wgpu::CommandEncoder, clear: &Clear) {
     }
 }
 
-/// What a variable of `kernel` is bound to.
+/// The binding of a variable of `kernel`.
 fn binding<'a>(
     store: &'a Store,
     kernel: &Kernel,
@@ -303,7 +310,7 @@ fn binding<'a>(
     store.binding(name, page, band)
 }
 
-/// The workgroups of a dispatch.
+/// Returns the workgroups of a dispatch, from the plan or from a buffer that the device fills.
 pub(super) fn over<'a>(
     gpu: &Gpu,
     plan: &Plan,
@@ -312,7 +319,7 @@ pub(super) fn over<'a>(
     over: Over,
 ) -> Result<Grid<'a>> {
     let of_page = store.pages.get(page);
-    let missing = || gpu.error("a stage goes over what does not exist");
+    let missing = || gpu.error("a stage needs a buffer that does not exist");
     let counted = |buffer: Option<&'a Buffer<u32>>, word: u64| {
         buffer.map(|buffer| Grid::In(&buffer.raw, word * 4)).ok_or_else(missing)
     };

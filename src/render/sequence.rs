@@ -1,4 +1,4 @@
-//! A frame as a list of steps: the papers' passes in their order.
+//! Makes the list of steps of a frame: the passes of the papers in their order.
 
 use std::ops::Range;
 
@@ -10,14 +10,14 @@ use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step, Twin};
 use crate::plan::{Oit, Plan, Winner};
 
-/// The steps of a frame by `plan`.
+/// Returns the steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::new();
     if plan.needs.levels {
         steps.push(Step::Select);
     }
     if plan.looks_for_cut() {
-        // Nothing else has room yet.
+        // Buffers for the rest are sized once the cut is known.
         steps.push(Step::Look(Look::Cut));
         return steps;
     }
@@ -54,14 +54,15 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// Splats, which bands share or have each, but for those that are drawn after others.
+/// Projects the splats, once for all bands or for each band. With culling, [`nearest`] projects
+/// them part by part.
 fn project_in(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if !plan.needs.cull && plan.projects_in(band) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
 }
 
-/// The nearest depth of each pixel of a band.
+/// Appends the steps that find the nearest depth of each pixel of a band.
 fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     for &part in plan.parts() {
         if plan.needs.cull && plan.projects_in(band) {
@@ -82,7 +83,8 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
 }
 
-/// A stage over all pages, or where inputs are kept apart over those of one, by the reference in one go with others.
+/// Returns the stage over all pages or, if inputs are kept apart, one copy per page of `pages`. The
+/// reference does the work of these copies in one go elsewhere; clears stay with the first copy.
 fn on(plan: &Plan, pages: &Range<usize>, stage: Stage) -> impl Iterator<Item = Stage> {
     let each = if plan.needs.separate { pages.clone() } else { 0..0 };
     let whole = (!plan.needs.separate).then(|| stage.clone());
@@ -94,7 +96,7 @@ fn on(plan: &Plan, pages: &Range<usize>, stage: Stage) -> impl Iterator<Item = S
     whole.into_iter().chain(each.map(of_page))
 }
 
-/// A list of each pixel's fragments, from front to back.
+/// Appends the steps that list the fragments of each pixel of a band, sorted from front to back.
 fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.projects_in(band) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
@@ -105,7 +107,7 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     steps.extend(fragments::steps(band).into_iter().chain(long_lists::sorts(plan, band)).map(Step::Stage));
 }
 
-/// The sums of all fragments of each pixel of a band.
+/// Appends the steps that sum all fragments of each pixel of a band, in any order.
 fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.projects_in(band) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
@@ -118,9 +120,10 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
 }
 
-/// The sums of each pixel of a band, and what an individual shows; by tiles that gather, its image too.
+/// Appends the steps that sum the fragments of each pixel of a band; with separate inputs they also
+/// keep what each individual shows. Tiles that gather make the image too.
 fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
-    // The visibility pass has told all.
+    // The visibility pass has already found the colours.
     if matches!(plan.needs.winner, Some(Winner::Depth | Winner::Once)) {
         return;
     }
@@ -142,9 +145,10 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     }
 }
 
-/// The large splats, in the way that the plan knows or that a look will show.
+/// Appends the stages of the large splats, by tiles or by workgroups; if the plan does not know
+/// which, the executor decides after a look at the device.
 fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Vec<Stage>), steps: &mut Vec<Step>) {
-    // Tiles that gather have lists, or the frame is tried again without them.
+    // Tiles that gather either have lists, or the frame is retried without gathering.
     let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.gather;
     match plan.large_by_tiles {
         true if looks => steps.push(Step::Large { by_tiles, by_workgroups }),

@@ -1,4 +1,5 @@
-//! The buffers of a scene and its frames, by their names in WGSL: nothing else allocates on the device.
+//! Owns the buffers of a scene and its frames, by their names in WGSL: no other module allocates on
+//! the device.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,8 @@ use crate::plan::{
 };
 use crate::scene::Samples;
 
-/// Names in WGSL of buffers that have another one where kernels write them.
+/// Aliases of buffers: the WGSL name where kernels access a buffer in another mode (read or write),
+/// and the name under which it is stored.
 const ALIASES: [(&str, &str); 19] = [
     ("selected", "selection"),
     ("chosen", "attributes"),
@@ -44,10 +46,10 @@ const ALIASES: [(&str, &str); 19] = [
     ("tiles_of_triangles", "triangle_tiles"),
 ];
 
-/// Names of buffers that each page has, or its branch.
+/// Names of the buffers that each page, or its branch, has of its own.
 const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
-/// The name under which a buffer is kept.
+/// Returns the name under which a buffer is stored.
 pub(super) fn kept(name: &str) -> &str {
     ALIASES.iter().find(|(alias, _)| *alias == name).map_or(name, |(_, kept)| kept)
 }
@@ -59,7 +61,7 @@ fn bytes(named: &Named) -> u64 {
     named.values().map(Buffer::bytes).sum()
 }
 
-/// What the buffers of a frame's pixels are made for.
+/// Properties of a plan that determine the buffers of a frame's pixels.
 #[derive(Clone, PartialEq)]
 struct Made {
     width: u32,
@@ -76,20 +78,20 @@ struct Made {
     raster: Option<(Raster, u32)>,
 }
 
-/// What of a render's needs the buffers of surfels and splats depend on.
+/// Properties of a render's needs that determine the buffers of surfels and splats.
 #[derive(Clone, Copy, PartialEq)]
 struct Uploading {
-    /// Surfels that are the same are one.
+    /// Identical surfels are stored once.
     copies: bool,
     /// Each input has pages of its own.
     separate: bool,
-    /// There is a tree.
+    /// Levels of detail: the octree is uploaded.
     levels: bool,
     surfel: SurfelLayout,
     splat_words: u64,
-    /// The numbers of the surfels are kept.
+    /// The numbers of the surfels in their source are kept on the host.
     order: bool,
-    /// There are triangles.
+    /// Triangles are uploaded.
     mesh: bool,
 }
 
@@ -102,32 +104,32 @@ impl Uploading {
     }
 }
 
-/// All buffers.
+/// All buffers of a scene and its frames.
 pub struct Store {
-    /// The scene's pages.
+    /// The pages of surfels.
     pub pages: Vec<Page>,
-    /// The branches of its levels of detail, if a cut is drawn.
+    /// The branches of the octree, if a cut is drawn.
     pub branches: Vec<Branch>,
-    /// Surfels of a cut that pages are made for, branch by branch.
+    /// Surfel slots of the pages, by branch, if a cut is drawn.
     rooms: Vec<u64>,
-    /// What it was uploaded for.
+    /// The properties for which the scene was uploaded.
     uploaded: Uploading,
     shared: Named,
     made: Option<Made>,
-    /// Of the pixels of a band.
+    /// Buffers of the pixels of one band.
     frame: Named,
     bands: Vec<Buffer<BandUniform>>,
-    /// Entries of the lists of large and of small splats that there is room for.
+    /// Capacity of the lists of large and of small splats, in entries.
     entries: [u64; 2],
     readback: Option<Readback>,
     /// The rasteriser's textures.
     pub targets: Option<Targets>,
-    /// The numbers of the surfels of all pages in their source; where a map asks for them.
+    /// The numbers of the surfels of all pages in their source; empty unless a map asks for them.
     pub order: Vec<u32>,
 }
 
 impl Store {
-    /// The scene's buffers, which were `uploaded` for a render with `needs`; none for pixels yet.
+    /// Creates the store for a scene `uploaded` for `needs`, without buffers for pixels.
     pub fn new(gpu: &Gpu, uploaded: Uploaded, needs: &SceneNeeds) -> Result<Self> {
         let (mut first, mut order) = (0, Vec::new());
         let pages = uploaded.pages.into_iter().map(|page| {
@@ -165,15 +167,16 @@ impl Store {
         })
     }
 
-    /// Whether the scene was uploaded for a render with such needs: whether copies are drawn once depends on the accumulator, and maps
-    /// may need more of a surfel than colours do; triangles that no view showed yet are not there.
+    /// Returns whether the uploaded buffers serve a render with `needs`. They may not: whether
+    /// copies are drawn once depends on the accumulator, maps may need more attributes than
+    /// colours, and triangles are uploaded only once a view may show them.
     pub fn serves(&self, needs: &SceneNeeds) -> bool {
         let wanted = Uploading::of(needs);
         let Uploading { order, mesh, .. } = self.uploaded;
         (order || !wanted.order) && (mesh || !wanted.mesh) && self.uploaded == Uploading { order, mesh, ..wanted }
     }
 
-    /// Makes the buffers that `plan` asks for.
+    /// Creates the buffers of `plan` that do not exist yet or have another size.
     pub fn fit(&mut self, gpu: &Gpu, plan: &Plan, known: &Known) -> Result<()> {
         let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
@@ -199,12 +202,12 @@ impl Store {
         };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
-            // The old ones make room first.
+            // Frees the old buffers before new ones are allocated.
             (self.made, self.targets, self.readback) = (None, None, None);
             self.frame.clear();
         }
         if let Some(rooms) = plan.cut.as_ref().filter(|rooms| **rooms != self.rooms) {
-            // The old ones make room first.
+            // Frees the old pages before new ones are allocated.
             (self.pages, self.rooms) = (Vec::new(), Vec::new());
             let most = page_surfels(&gpu.adapter, &plan.needs);
             for (number, (branch, room)) in self.branches.iter().zip(rooms).enumerate() {
@@ -266,7 +269,7 @@ impl Store {
             self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
         }
         if plan.needs.mesh.is_some() {
-            // The rasteriser has a texture.
+            // The rasteriser stores them in a texture, so one word serves the binding.
             let words = if plan.needs.raster.is_some() { 1 } else { pixels * u64::from(NEAREST_TRIANGLE_WORDS) };
             self.frame.insert("nearest_triangles", Buffer::storage(gpu, "nearest triangles", words)?);
             let words = most(&triangles::pixel_words);
@@ -292,7 +295,7 @@ impl Store {
         Ok(())
     }
 
-    /// Makes lists of a kind with room for `entries` in place of those there are.
+    /// Replaces the lists of a kind by lists with a capacity of `entries`.
     pub fn make_lists(&mut self, gpu: &Gpu, plan: &Plan, of: Listed, entries: u64) -> Result<()> {
         self.frame.remove(list_name(of));
         let lists = Buffer::storage(gpu, "lists of splats", self.list_words(plan, of) + entries)?;
@@ -301,7 +304,8 @@ impl Store {
         Ok(())
     }
 
-    /// Makes room for `count` fragments in lists, and an eighth more for the next band or view, up to `most`.
+    /// Makes the buffers of fragments hold `count` fragments. New buffers get an eighth more, up to
+    /// `most`, for the next band or view.
     pub fn make_fragments(&mut self, gpu: &Gpu, plan: &Plan, count: u64, most: u64) -> Result<()> {
         let record = u64::from(FragmentLayout::of(&plan.needs).words);
         let buffers = [("keys", "depths of fragments", KEY_WORDS), ("fragments", "fragments", record)];
@@ -309,7 +313,7 @@ impl Store {
             self.frame.get(name).is_some_and(|buffer| buffer.len >= count * words)
         };
         if !buffers.iter().all(holds) {
-            // The old ones make room first.
+            // Frees the old buffers before new ones are allocated.
             buffers.iter().for_each(|(name, ..)| drop(self.frame.remove(name)));
             for (name, what, words) in buffers {
                 let room = (count + count / 8).min(most).max(1);
@@ -325,46 +329,47 @@ impl Store {
         Ok(())
     }
 
-    /// Words of the lists of a kind before their entries.
+    /// u32 words of the lists of a kind before their entries, for the band that needs most.
     pub fn list_words(&self, plan: &Plan, of: Listed) -> u64 {
         plan.bands.iter().map(|band| list_words(plan, of, band)).max().unwrap_or(0)
     }
 
-    /// Entries of lists that there is room for.
+    /// Capacity of the lists of a kind, in entries.
     pub fn entries(&self, of: Listed) -> u64 {
         self.entries[of as usize]
     }
 
-    /// Sets the view.
+    /// Writes the view uniform.
     pub fn set_view(&self, gpu: &Gpu, view: &View) {
         if let Some(buffer) = self.frame.get("view") {
             gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::bytes_of(view));
         }
     }
 
-    /// A buffer that pages share.
+    /// The buffer of this name that all pages share.
     pub fn buffer(&self, name: &str) -> Option<&Buffer<u32>> {
         let name = kept(name);
         self.frame.get(name).or_else(|| self.shared.get(name))
     }
 
-    /// Whether each page has a buffer of its own of this name, or its branch has.
+    /// Returns whether each page, or its branch, has its own buffer of this name.
     pub fn is_paged(name: &str) -> bool {
         PAGED.contains(&kept(name))
     }
 
-    /// Where of each branch the number of what is chosen lies, if a cut is drawn.
+    /// For each branch the buffer and the word at which the size of its cut is stored; none unless
+    /// a cut is drawn.
     pub fn chosen(&self) -> impl Iterator<Item = (&Buffer<u32>, u64)> {
         self.branches.iter().filter_map(|branch| Some((branch.buffers.get("attributes")?, branch.chosen.into())))
     }
 
-    /// What a variable of a kernel that makes a cut is bound to, for a branch.
+    /// The binding of a variable of a kernel that makes the cut of `branch`.
     pub fn binding_of_branch(&self, name: &str, branch: usize) -> Option<wgpu::BindingResource<'_>> {
         let own = self.branches.get(branch)?.buffers.get(kept(name));
         own.or_else(|| self.buffer(name)).map(Buffer::bound)
     }
 
-    /// What a variable of a kernel is bound to, for a page and a band.
+    /// The binding of a kernel's variable for a page and a band.
     pub fn binding(&self, name: &str, page: usize, band: usize) -> Option<wgpu::BindingResource<'_>> {
         if name == "band" {
             return self.bands.get(band).map(Buffer::bound);
@@ -375,12 +380,12 @@ impl Store {
         buffer.or_else(|| self.targets.as_ref()?.binding(name))
     }
 
-    /// The image and what it is read through.
+    /// The image and its staging buffers.
     pub fn image(&self) -> Option<(&Buffer<u32>, &Readback)> {
         self.buffer("image").zip(self.readback.as_ref())
     }
 
-    /// Device memory of surfels and splats, and of pixels, bytes.
+    /// Device memory in bytes: of surfels and splats, and of pixels.
     pub fn bytes(&self) -> (u64, u64) {
         let pages = self.pages.iter().map(|page| &page.buffers);
         let branches = self.branches.iter().map(|branch| &branch.buffers);

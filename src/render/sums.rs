@@ -1,5 +1,6 @@
-//! The sums of an image, off the device: what machines that share a scene would exchange, in one form, whatever form a device keeps
-//! them in. Read back, they make the same picture to the bit.
+//! Reads the sums of an image back from the device and resolves them again. Machines that share a
+//! scene exchange sums in this form, whatever the layout on the device. Sums that were read back
+//! resolve to the same picture, bit for bit.
 
 use super::kernels::Kernels;
 use super::run::Run;
@@ -17,25 +18,26 @@ use crate::plan::steps::{Part, Stage, Step, Twin};
 use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
 use crate::scene::{Blend, Camera, Composite};
 
-/// What the attribute pass leaves of an image, by the accumulator `fixed`.
+/// The result of the attribute pass over an image, with the accumulator `fixed`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     /// Columns and rows of the image.
     pub size: [u32; 2],
-    /// The nearest depth of each pixel, device units, as what its bits lack to those of +inf.
+    /// The nearest depth of each pixel, in device units, stored as bits(+inf) - bits(depth).
     pub nearest: Vec<u32>,
-    /// [`PixelLayout::channels`] a pixel, in units of `1 / one`: sums of integers, which add to those of other splats of the pixel.
+    /// [`PixelLayout::channels`] integer sums per pixel, in units of `1 / one`. The sums of other
+    /// splats at the pixel can be added to them.
     pub sums: Vec<u64>,
-    /// Where each sum lies.
+    /// The channel of each sum.
     pub pixel: PixelLayout,
-    /// Units of a weight of 1.
+    /// The weight 1 in units of the sums.
     pub one: u64,
-    /// What the kernels saw of scene, camera and options; lights and background, which sums do not depend on, are left out.
+    /// The view uniform. Lights and background are zeroed, because sums do not depend on them.
     pub view: View,
 }
 
 impl Sums {
-    /// Room for an image by `plan`.
+    /// Creates empty sums for an image of `plan`.
     pub(super) fn new(camera: &Camera, plan: &Plan, view: &View) -> Self {
         let view = View { lights: Default::default(), background: [0.0; 4], ..*view };
         Self {
@@ -48,23 +50,23 @@ impl Sums {
         }
     }
 
-    /// The sum of `channel` at `pixel`, in units of `1 / one`. `None` past the end.
+    /// The sum of `channel` at `pixel`, in units of `1 / one`; `None` past the end.
     pub fn sum(&self, pixel: usize, channel: u32) -> Option<u64> {
         let at = pixel.checked_mul(self.pixel.channels as usize)?.checked_add(channel as usize)?;
         self.sums.get(at).copied()
     }
 
-    /// The sum of `channel` at `pixel` in units in which a weight of 1 is 1. `None` past the end.
+    /// The sum of `channel` at `pixel`, scaled so that a weight of 1 is 1; `None` past the end.
     pub fn value(&self, pixel: usize, channel: u32) -> Option<f64> {
         Some(self.sum(pixel, channel)? as f64 / self.one as f64)
     }
 
-    /// The fragments accepted at `pixel`. `None` if they were not counted.
+    /// The number of fragments accepted at `pixel`; `None` if they were not counted.
     pub fn count(&self, pixel: usize) -> Option<u64> {
         (self.pixel.count_channel < self.pixel.channels).then(|| self.sum(pixel, self.pixel.count_channel))?
     }
 
-    /// Appends those of a band, which are on the device.
+    /// Reads the depths and sums of `band` from the device and appends them.
     pub(super) fn take(&mut self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) -> Result<()> {
         let pixels = plan.bands[band].pixels;
         let words = |name: &str, len: u64| match store.buffer(name) {
@@ -77,7 +79,7 @@ impl Sums {
         Ok(())
     }
 
-    /// Puts those of a band on the device.
+    /// Writes the depths and sums of `band` to the device.
     fn put(&self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) -> Result<()> {
         let first = plan.bands[band].first as usize * self.size[0] as usize;
         let pixels = first..first + plan.bands[band].pixels as usize;
@@ -93,7 +95,7 @@ impl Sums {
     }
 }
 
-/// Fails for triangles, of which no sums are kept.
+/// Checks that the scene has no triangles, which keep no sums.
 pub(super) fn of_surfels_alone(facts: &Facts) -> Result<()> {
     match facts.mesh.triangles {
         0 => Ok(()),
@@ -101,12 +103,12 @@ pub(super) fn of_surfels_alone(facts: &Facts) -> Result<()> {
     }
 }
 
-/// How sums are made that leave the device.
+/// Checks that `options` allow sums to be read back, and returns them with gathering off.
 fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     super::parts::one_alone(options)?;
     check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
-        return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));
+        return Err(Error::Usage("sums can be read back only with the accumulator fixed: use it".into()));
     }
     if options.composite != Composite::Opaque {
         return Err(Error::Usage(
@@ -121,18 +123,19 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     }
     if let Some(own) = MAP_PASSES.iter().find(|own| options.maps.has(own.map)) {
         let map = own.map.row().name;
-        return Err(Error::Usage(format!("sums do not say what the map {map} shows: leave it out, or render")));
+        return Err(Error::Usage(format!("the map {map} cannot be made from sums: leave it out, or render")));
     }
-    // Tiles that gather store none.
+    // Tiles that gather keep sums in registers and store none.
     let mut without = options.without.clone();
     without.push(Optimisation::Gathering);
     Ok(RenderOptions { without, ..options.clone() })
 }
 
-/// The sums of a render of what `source` has.
+/// Renders what `source` holds and returns its sums.
 ///
 /// # Errors
-/// [`Error::Usage`] for another accumulator than `fixed`, and whatever a render can fail with.
+/// [`Error::Usage`] for an accumulator other than `fixed` or options that leave no sums, and any
+/// error of a render.
 pub fn sums(
     source: &dyn Source,
     camera: &Camera,
@@ -172,10 +175,10 @@ pub fn sums(
     Err(Run::never_fits(gpu))
 }
 
-/// The image that `sums` of a render of what `source` has make, whoever made them.
+/// Resolves `sums` of a render of `source` to an image, wherever they were made.
 ///
 /// # Errors
-/// [`Error::Usage`] for sums of another render, and whatever a render can fail with.
+/// [`Error::Usage`] if the sums belong to another render, and any error of a render.
 pub fn resolve(
     sums: &Sums,
     source: &dyn Source,
@@ -195,7 +198,7 @@ pub fn resolve(
     let whole = sums.nearest.len() == pixels && sums.sums.len() == pixels * plan.pixel.channels as usize;
     let of = |sums: &Sums| (sums.size, sums.pixel, sums.one, sums.view);
     if !whole || of(sums) != of(&expected) {
-        return Err(Error::Usage("the sums are of another scene, view or choice of options".into()));
+        return Err(Error::Usage("the sums belong to another scene, view or choice of options: use those with which they were made".into()));
     }
     let kernels = Kernels::new(sources, &plan, options, facts.surfels);
     let scene_wide = Uploaded { pages: Vec::new(), branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
@@ -206,7 +209,7 @@ pub fn resolve(
     let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
     for band in 0..plan.bands.len() {
         sums.put(gpu, &plan, run.store, band)?;
-        // Which tiles are covered follows from the nearest depths.
+        // The nearest depths tell which tiles are covered.
         let stages = [visibility::occlude(band, Part::All), resolve_pass::steps(&plan, band)];
         let steps = stages.into_iter().map(Step::Stage).chain([Step::ReadBack(band)]);
         run.steps(&steps.collect::<Vec<_>>(), &mut frame, &())?;

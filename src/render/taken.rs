@@ -1,4 +1,4 @@
-//! What a picture takes of a file with levels of detail.
+//! Reads the part of a file with levels of detail that given views need.
 
 use super::encoded;
 use super::parts::parts;
@@ -9,11 +9,13 @@ use crate::scene::{Camera, Detail, Hierarchy, Scene};
 use crate::surfels::part::{self, Taken};
 use crate::{Progress, Result};
 
-/// The part of a file that the pictures of `views`, cameras with options, are made of, to the bit as of all of it. It depends on the views and the file alone.
+/// Reads the part of a file from which the pictures of `views` (cameras with options) are made;
+/// they are bit-identical to pictures of the whole file. The part depends only on the views and the
+/// file.
 ///
 /// # Errors
-///
-/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
+/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) for the
+/// file, and any error that `fits` returns for the part read so far.
 pub fn taken(
     levels: &Levels,
     views: &[(&Camera, &RenderOptions)],
@@ -23,10 +25,11 @@ pub fn taken(
     let (facts, origin) = (Facts::of(&part::nothing(levels)), levels.whole.origin);
     let mut all: Vec<(&Camera, Wanted)> = Vec::new();
     for &(camera, options) in views {
-        // The size for a number of splats follows from all nodes in view.
+        // The node size for a number of splats depends on all nodes in view, so all are read.
         let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
         let wanted = |part: &RenderOptions| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
-        // Renders for colour and maps may leave out other backs, and look as far as their own samples.
+        // Renders for colour and maps may cull different back faces and filter at different sample
+        // sizes.
         all.extend(parts(&facts, &encoded::of(&facts, options)).iter().map(|part| (camera, wanted(part))));
     }
     let any = |tree: &Hierarchy, index: u32| {

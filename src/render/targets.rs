@@ -1,4 +1,5 @@
-//! The rasteriser's textures: a depth buffer and blended sums, of the whole image.
+//! The rasteriser's textures for the whole image: a depth buffer, blended sums and triangle
+//! numbers.
 
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -6,20 +7,23 @@ use crate::passes::raster::{DEPTH_FORMAT, SUM_NAMES, texture_format};
 use crate::passes::triangles::NUMBERS;
 use crate::plan::{Plan, Raster};
 
-/// The textures.
+/// The render targets of the rasteriser.
 pub struct Targets {
-    /// Nearest depths.
+    /// The depth buffer.
     pub depth: wgpu::TextureView,
-    /// Four channels each.
+    /// The blended sums, four channels in each texture.
     pub sums: Vec<wgpu::TextureView>,
-    /// The numbers of the nearest triangles, if there are any.
+    /// The number of the nearest triangle per pixel, if there are triangles.
     pub triangles: Option<wgpu::TextureView>,
-    /// Device memory, bytes.
+    /// Device memory of all textures, bytes.
     pub bytes: u64,
 }
 
 impl Targets {
-    /// For the image of `plan`.
+    /// Creates the textures for the image of `plan`.
+    ///
+    /// # Errors
+    /// If the device is out of memory or reports an error.
     pub fn new(gpu: &Gpu, raster: Raster, plan: &Plan) -> Result<Self> {
         let height = plan.bands.iter().map(|band| band.rows).sum();
         let mut bytes = 0;
@@ -50,7 +54,7 @@ impl Targets {
         Ok(Self { depth, sums, triangles, bytes })
     }
 
-    /// The texture that a variable of WGSL is bound to.
+    /// The texture that a WGSL variable of this name is bound to.
     pub fn binding(&self, name: &str) -> Option<wgpu::BindingResource<'_>> {
         let sums = SUM_NAMES.iter().zip(&self.sums).find(|(sums, _)| **sums == name).map(|(_, view)| view);
         let view = match name {

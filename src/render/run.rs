@@ -281,7 +281,9 @@ impl<'a> Run<'a> {
 
     /// The error after too many tries.
     pub fn never_fits(gpu: &Gpu) -> Error {
-        gpu.error("the buffers were still too small after every retry of the frame: choose a smaller image or fewer surfels")
+        gpu.error(
+            "the buffers were still too small after every retry of the frame: choose a smaller image or fewer surfels",
+        )
     }
 }
 

@@ -70,8 +70,9 @@ pub fn render(
 /// buffers, the compiled kernels and the sizes measured so far. A second frame costs only its
 /// passes.
 ///
-/// The scene (or another [`Source`]) and the backend are borrowed or owned: `Renderer::new(&scene,
-/// &options, &backend)`, or an [`Arc`](std::sync::Arc) of each for a renderer that owns its inputs.
+/// The scene (or another [`Source`]) and the backend are borrowed or owned:
+/// `Renderer::new(&scene, &options, &backend)`, or an [`Arc`](std::sync::Arc) of each for a
+/// renderer that owns its inputs.
 pub struct Renderer<S, B> {
     source: S,
     backend: B,

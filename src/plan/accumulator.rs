@@ -1,4 +1,5 @@
-//! How sums are kept on the device. What each costs and how much it errs: `src/passes/accumulate.rs`.
+//! The accumulators: formats of the sums on the device. For the cost and error of each, see
+//! `src/passes/accumulate.rs`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,15 +11,15 @@ use crate::error::Error;
 use crate::gpu::layout::ONE;
 use crate::scene::kernel::LEAST_AT_RIM;
 
-/// How sums are kept on the device.
+/// The format of sums on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Accumulator {
-    /// Fixed point, two words a sum: the default.
+    /// Fixed point, two u32 words per sum: the default.
     #[default]
     Fixed,
-    /// Fixed point in one word.
+    /// Fixed point, one u32 word per sum.
     Fixed32,
-    /// Fixed point in one u64.
+    /// Fixed point, one u64 per sum.
     Fixed64,
     /// Fixed point, two sums in one u64.
     Packed64,
@@ -29,13 +30,13 @@ pub enum Accumulator {
 }
 
 impl Accumulator {
-    /// What is true of it.
+    /// Its row in [`ACCUMULATORS`].
     pub fn row(self) -> &'static AccumulatorRow {
-        // The table has a row for each, in this order, which a test holds.
+        // The table has a row for each accumulator in this order; a test checks it.
         &ACCUMULATORS[self as usize]
     }
 
-    /// Its name.
+    /// Its name on the command line and in reports.
     pub fn name(self) -> &'static str {
         self.row().name
     }
@@ -64,29 +65,30 @@ impl FromStr for Accumulator {
     }
 }
 
-/// What is true of an accumulator: a row of [`ACCUMULATORS`], a file `wgsl/accumulator_*.wgsl`.
+/// Properties of an accumulator: a row of [`ACCUMULATORS`] and a file `wgsl/accumulator_*.wgsl`.
 #[derive(Debug)]
 pub struct AccumulatorRow {
-    /// Which it is.
+    /// The accumulator.
     pub of: Accumulator,
-    /// Its name.
+    /// Its name on the command line and in reports.
     pub name: &'static str,
-    /// Its file.
+    /// Name of its WGSL file.
     pub file: &'static str,
     /// u32 words of one sum.
     pub words: u32,
-    /// The image's bits are the same for any order of fragments.
+    /// Whether the image is bit-identical for any order of fragments.
     pub deterministic: bool,
-    /// What it needs of the adapter beyond core WebGPU.
+    /// The features that it needs beyond core WebGPU.
     pub features: Features,
-    /// Bound on the error of a mean of n fragments of summed weight w, B fraction bits, as a fraction of the range.
+    /// Bound on the error of a mean over n fragments of summed weight w with `bits` fraction bits,
+    /// as a fraction of the value range.
     pub error_bound: fn(n: f64, w: f64, bits: u32) -> f64,
 }
 
 /// Optional features of an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Features {
-    /// Core WebGPU.
+    /// None: core WebGPU is enough.
     None,
     /// 64-bit integers and atomics.
     AtomicsU64,
@@ -94,7 +96,7 @@ pub enum Features {
     AtomicsF32,
 }
 
-/// The rounding of one f32 operation.
+/// The unit roundoff of f32, 2^-24.
 const U: f64 = 1.0 / 16_777_216.0;
 
 /// Every accumulator, in the order of [`Accumulator`]; the first is the default.
@@ -156,23 +158,26 @@ pub const ACCUMULATORS: &[AccumulatorRow] = &[
 ];
 
 impl AccumulatorRow {
-    /// u32 words before the sums, in which those that wrapped are counted; of sums that cannot wrap none.
+    /// u32 words before the sums, which count the sums that wrapped; 0 if sums cannot wrap.
     pub fn head_words(&self) -> u64 {
         if matches!(self.of, Accumulator::Fixed32 | Accumulator::Packed64) { 2 } else { 0 }
     }
 
-    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sums of all surfels, or of 255
-    /// full weights, leave free.
+    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sum of
+    /// all surfels, or of 255 full weights, leaves free.
     pub fn fraction_bits(&self, surfels: u64) -> u32 {
         let most = surfels.clamp(1, 255) as u32;
         32 - (32 - most.leading_zeros())
     }
 }
 
-/// Fraction bits that `fixed64`, and `fixed` where terms may be small, keep of a term in a scene of `surfels`: 40, and of
-/// kernels that fall below [`LEAST_AT_RIM`] as many as the sums of all surfels leave free of 64, up to 56, so that a pixel of which their
-/// tails alone tell keeps its digits. So does one of which far fragments alone tell, where those weigh less ([`Oit`](super::Oit)); and as all of a pixel are summed
-/// then, sums have room for every surfel there is.
+/// Returns the fraction bits per term of `fixed64`, and of `fixed` if terms may be small.
+///
+/// They are 40, or up to 56 where small weights matter: as many as the sum of all `surfels` leaves
+/// free in 64 bits. Kernels that fall below [`LEAST_AT_RIM`] have at least 40, so that a pixel
+/// reached only by their tails keeps its digits. Order-free composites ([`Oit`](super::Oit)) need
+/// the digits where only far fragments show, which weigh less; as all fragments of a pixel are
+/// summed, they always leave room for every surfel.
 pub fn wide_bits(options: &RenderOptions, surfels: u64) -> u32 {
     if options.composite.is_order_free() {
         surfels.leading_zeros().min(56)

@@ -1,10 +1,11 @@
-//! Whether surfaces show through each other at all, and what becomes of their fragments if they do.
+//! Decides whether surfaces show through each other, and how their fragments are then composited.
 
 use super::{Facts, RenderOptions};
 use crate::scene::{Composite, Map};
 
-/// What is composited in a picture of the scene that `facts` are of: of surfaces that are all opaque the nearest one, as nobody sees
-/// another, unless a map asks for them.
+/// Returns the effective composite of a picture of the scene that `facts` describe. Layers of
+/// opaque surfaces become [`Composite::Opaque`], because only the nearest shows, unless a map asks
+/// for the others.
 pub fn composited(facts: &Facts, options: &RenderOptions) -> Composite {
     let (low, _) = facts.color;
     match options.composite {
@@ -15,26 +16,29 @@ pub fn composited(facts: &Facts, options: &RenderOptions) -> Composite {
     }
 }
 
-/// What becomes of the lists of pixels' fragments ([`fragments`](crate::passes::fragments)).
+/// How the fragment lists of pixels are composited ([`fragments`](crate::passes::fragments)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Lists {
-    /// Surfaces, blended each and composited ([`layers`](crate::passes::layers)).
+    /// Fragments are blended into surfaces, which are composited
+    /// ([`layers`](crate::passes::layers)).
     Layers,
-    /// They are composited one by one ([`sorted`](crate::passes::sorted)).
+    /// Fragments are composited one by one ([`sorted`](crate::passes::sorted)).
     Sorted,
 }
 
-/// What weighs a fragment beside its kernel, where all of a pixel are summed in any order ([`oit`](crate::passes::oit)).
+/// The weight of a fragment, besides its kernel's, where all fragments of a pixel are summed in any
+/// order ([`oit`](crate::passes::oit)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Oit {
-    /// Its depth.
+    /// A function of its depth.
     Weighted,
-    /// What the moments of all fragments say of its depth ([`moments`](crate::passes::moments)).
+    /// The transmittance in front of it, estimated from moments
+    /// ([`moments`](crate::passes::moments)).
     Moments,
 }
 
 impl Oit {
-    /// That of a picture, if it has one.
+    /// Returns the order-free weight of a picture, if it has one.
     pub(super) fn of(options: &RenderOptions) -> Option<Self> {
         match options.composite {
             Composite::Weighted => Some(Self::Weighted),
@@ -45,7 +49,7 @@ impl Oit {
 }
 
 impl Lists {
-    /// Those of a picture, whoever renders it.
+    /// Returns how a picture composites fragment lists, if it has any; the same for all renderers.
     pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
         match composited(facts, options) {
             Composite::Opaque | Composite::Weighted | Composite::Moments => None,

@@ -1,4 +1,4 @@
-//! What a renderer must know of all surfels together, looked up once and not for each frame. No view is in it.
+//! Facts of all surfels together, computed once per scene. They do not depend on the view.
 
 use glam::DVec3;
 
@@ -6,48 +6,51 @@ use super::{MeshFacts, RenderOptions};
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Atlas, Bounds, Colors, LevelFacts, Scene, Surfel, has_copies};
 
-/// Where a surfel's colour comes from.
+/// The source of a surfel's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ColorNeed {
-    /// All surfels share one colour: none is stored, none is accumulated.
+    /// All surfels share one colour: none is stored or accumulated.
     Constant,
-    /// A word of 8-bit sRGB each.
+    /// One word of 8-bit sRGB each.
     Srgb8,
     /// Four f32 each.
     Linear,
-    /// Four f32 each, of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
+    /// Four f32 each, the texture's mean over the disk, and a place in the texture, which is looked
+    /// up once per pixel.
     Textured,
-    /// Four f32 each and the terms of spherical harmonics of this degree, which are summed once a splat.
+    /// Four f32 each and the terms of spherical harmonics of this degree, which are summed once per
+    /// splat.
     Harmonics(u32),
 }
 
-/// Surfels that are kept in [`Facts::sample`], about.
+/// Approximate number of surfels in [`Facts::sample`].
 const SAMPLED: usize = 1024;
 
-/// The ranges that a scene's values lie in, and its counts.
+/// The ranges of a scene's values, and its counts.
 #[derive(Clone, Debug)]
 pub struct Facts {
     /// [`Scene::origin`].
     pub origin: DVec3,
-    /// Its surfels; where the scene holds a part of them, all.
+    /// Number of surfels of the whole scene, even if only a part is in memory.
     pub surfels: u64,
-    /// The surfels of each of its inputs that has some ([`Scene::provenance`]), in their order.
+    /// Number of surfels of each non-empty input ([`Scene::provenance`]), in the order of the
+    /// inputs.
     pub individuals: Vec<u64>,
-    /// Its triangles.
+    /// Facts of its triangles.
     pub mesh: MeshFacts,
     /// [`Scene::bounds`].
     pub bounds: Bounds,
-    /// The box of [`Scene::body`].
+    /// The bounding box of [`Scene::body`].
     pub body: Bounds,
     /// [`Scene::core`].
     pub core: Bounds,
-    /// Smallest and largest colour, [`Scene::color_range`].
+    /// Smallest and largest value of each colour channel, [`Scene::color_range`].
     pub color: ([f32; 4], [f32; 4]),
     /// [`Scene::encoded`].
     pub encoded: bool,
-    /// Where the colours come from.
+    /// The source of colours.
     pub colors: ColorNeed,
-    /// The range of places in the textures, and how these lie.
+    /// The range of places in the textures, and the layout of the texture atlas.
     pub texture: Option<(PlaceRange, Atlas)>,
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
@@ -57,21 +60,21 @@ pub struct Facts {
     pub oriented: bool,
     /// [`Scene::closed`].
     pub closed: bool,
-    /// Disks end at lines, [`Scene::clips`].
+    /// Whether disks are clipped by lines, [`Scene::clips`].
     pub clips: bool,
-    /// Disks curve, [`Scene::caps`].
+    /// Whether disks are curved, [`Scene::caps`].
     pub caps: bool,
-    /// Surfels have normals of their own, [`Scene::normals`].
+    /// Whether surfels have normals of their own, [`Scene::normals`].
     pub own_normals: bool,
-    /// There is less than all of some surfel, [`Scene::fades`].
+    /// Whether surfels belong to fading cuts, [`Scene::fades`].
     pub fades: bool,
-    /// Centres have trailing parts, [`Scene::low`].
+    /// Whether centres have low parts, [`Scene::low`].
     pub doubled: bool,
-    /// One surfel has many copies, which can be drawn as one.
+    /// Whether one surfel has many copies, which can be drawn as one.
     pub copies: bool,
-    /// Of nodes of levels of detail.
+    /// Facts of the octree's nodes, if there are levels of detail.
     pub levels: Option<LevelFacts>,
-    /// Every so many surfels one, and its centre with all digits.
+    /// Surfels at regular intervals of the scene, each with its centre in f64.
     pub sample: Vec<(Surfel, DVec3)>,
 }
 
@@ -81,17 +84,17 @@ impl Facts {
         self.nodes_of(options).map_or(self.largest_radius, |nodes| nodes.largest_radius.max(self.largest_radius))
     }
 
-    /// The longest shorter half-axis of what may be drawn, world units.
+    /// The largest shorter half-axis of what may be drawn, world units.
     pub fn drawn_shorter(&self, options: &RenderOptions) -> f32 {
         self.nodes_of(options).map_or(self.largest_shorter, |nodes| nodes.largest_shorter.max(self.largest_shorter))
     }
 
-    /// Nodes that may be drawn, of a picture that asks for some.
+    /// Facts of the nodes that may be drawn; `None` if the options ask for the finest level.
     pub fn nodes_of(&self, options: &RenderOptions) -> Option<LevelFacts> {
         self.levels.filter(|_| !options.detail.is_finest())
     }
 
-    /// Those of `scene`.
+    /// Returns the facts of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let ((low, high), has) = (scene.color_range(), scene.has());
         let step = scene.surfels.len().div_ceil(SAMPLED).max(1);

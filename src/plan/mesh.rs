@@ -1,4 +1,4 @@
-//! What a renderer must know of the triangles of a scene, and what they need.
+//! Facts of a scene's triangles, and what the kernels need for them.
 
 use std::borrow::Cow;
 
@@ -6,38 +6,38 @@ use glam::DVec3;
 
 use crate::scene::{Bounds, Camera, Join, Mipmap, Projection, Triangles};
 
-/// The counts of a scene's triangles, and what they have.
+/// Counts, attributes and bounding box of a scene's triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshFacts {
-    /// Different places of corners.
+    /// Number of distinct corner positions.
     pub vertices: u64,
-    /// Triangles.
+    /// Number of triangles.
     pub triangles: u64,
-    /// Corners have normals.
+    /// Whether corners have normals.
     pub normals: bool,
-    /// Corners differ in colour.
+    /// Whether corners differ in colour.
     pub colored: bool,
-    /// Triangles are painted with textures.
+    /// Whether triangles have textures.
     pub textured: bool,
-    /// Corners have trailing parts, [`Triangles::low`].
+    /// Whether corner positions have low parts ([`Triangles::low`]).
     pub doubled: bool,
-    /// The box of all corners, world units relative to the scene's origin.
+    /// The bounding box of all corners, in world units relative to the scene's origin.
     pub bounds: Bounds,
 }
 
-/// Pixels about the image in which a box still counts as seen.
+/// Border around the image, in pixels, within which a box still counts as visible.
 const BORDER: f64 = 1.0;
 
-/// Whether the view of `camera` may show something of a box at `origin`: not if all of it lies
-/// before the near depth or beyond one side of the image.
+/// Whether the view of `camera` may show part of a box relative to `origin`. It does not if all of
+/// the box lies before the near depth or beyond one side of the image.
 pub(crate) fn in_view(bounds: &Bounds, origin: DVec3, camera: &Camera) -> bool {
     let corner = |k: usize| {
         let [x, y, z] = [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] });
         camera.to_camera(origin + DVec3::new(x, y, z))
     };
     let [width, height] = [camera.width, camera.height].map(f64::from);
-    // How far inside each limit a corner lies, in pixels times depth for a pinhole: linear, so that
-    // corners tell of the whole box.
+    // Distance of a corner inside each limit, for a pinhole in pixels times depth. These are linear
+    // in the position, so the corners bound the whole box.
     let inside = |p: DVec3| {
         let depth = if camera.projection == Projection::Pinhole { p.z } else { 1.0 };
         let (x, y) = (camera.fx * p.x + camera.cx * depth, camera.fy * p.y + camera.cy * depth);
@@ -49,7 +49,7 @@ pub(crate) fn in_view(bounds: &Bounds, origin: DVec3, camera: &Camera) -> bool {
 }
 
 impl MeshFacts {
-    /// Those of `triangles`.
+    /// Returns the facts of `triangles`.
     pub fn of(triangles: &Triangles) -> Self {
         Self {
             vertices: triangles.vertices().len() as u64,
@@ -63,7 +63,7 @@ impl MeshFacts {
     }
 }
 
-/// The box of the corners of `triangles`, world units relative to the scene's origin.
+/// The bounding box of the corners of `triangles`, in world units relative to the scene's origin.
 pub(crate) fn bounds_of(triangles: &Triangles) -> Bounds {
     let wide = |part: &[f32; 3]| DVec3::from_array(part.map(f64::from));
     let low = |vertex: usize| triangles.low().get(vertex).map_or(DVec3::ZERO, wide);
@@ -71,43 +71,44 @@ pub(crate) fn bounds_of(triangles: &Triangles) -> Bounds {
     corners.fold(Bounds::EMPTY, Bounds::with_point)
 }
 
-/// What triangles need.
+/// The needs of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MeshNeeds {
-    /// What shows where they meet splats.
+    /// How splats and triangles are joined where they meet.
     pub join: Join,
-    /// Corners have normals; else triangles are facets.
+    /// Corners have normals; otherwise triangles are flat facets.
     pub normals: bool,
     /// Corners differ in colour.
     pub colored: bool,
-    /// Triangles are painted with textures.
+    /// Triangles have textures.
     pub textured: bool,
-    /// The f32 places of corners leave out digits that show, so trailing parts are stored too.
+    /// The f32 positions of corners omit digits that show, so their low parts are stored too.
     pub doubled: bool,
-    /// The nearest one is found in one pass, by 64-bit atomics.
+    /// The nearest triangle is found in one pass, by 64-bit atomics.
     pub once: bool,
-    /// The surfels' colours are codes of sRGB, and so those of triangles become codes before they
-    /// are joined.
+    /// The surfels' colours are sRGB codes, so those of triangles are encoded before they are
+    /// joined.
     pub coded: bool,
 }
 
 impl MeshNeeds {
-    /// Words of the normals of a triangle's corners.
+    /// Words of the normals of a triangle's three corners.
     pub fn normal_words(&self) -> u32 {
         if self.normals { 9 } else { 0 }
     }
 
-    /// Where the places in a texture start in a triangle's attributes.
+    /// Word offset of the texture coordinates in a triangle's attributes.
     pub fn places_at(&self) -> u32 {
         self.normal_words() + if self.colored { 12 } else { 0 }
     }
 
-    /// Words of a triangle's attributes: normals, then colours, then places in a texture and its number.
+    /// Words of a triangle's attributes: normals, colours, texture coordinates and the texture's
+    /// number.
     pub fn words(&self) -> u32 {
         self.places_at() + if self.textured { 7 } else { 0 }
     }
 
-    /// The places of corners: three words a vertex, or six with trailing parts behind.
+    /// The positions of corners: three words per vertex, or six with the low parts last.
     pub fn places<'a>(&self, triangles: &'a Triangles) -> Cow<'a, [f32]> {
         let vertices = triangles.vertices();
         if !self.doubled {
@@ -116,8 +117,8 @@ impl MeshNeeds {
         vertices.iter().zip(triangles.low()).flat_map(|(high, low)| high.iter().chain(low).copied()).collect()
     }
 
-    /// The attributes of `triangles`, a record each; before them, if all have one colour, the twelve words of that. Before their textures
-    /// are so many others.
+    /// The attributes of `triangles`, one record each. If all have one colour, its twelve words
+    /// precede the records. `others` textures precede those of the triangles.
     pub fn records(&self, triangles: &Triangles, others: u32) -> Vec<f32> {
         let common = triangles.colors().first().filter(|_| !self.colored).into_iter().flatten().flatten().copied();
         let mut words: Vec<f32> = common.collect();
@@ -126,7 +127,8 @@ impl MeshNeeds {
             words.extend(triangles.colors().get(triangle).filter(|_| self.colored).into_iter().flatten().flatten());
             if let Some(painted) = triangles.paint().get(triangle) {
                 words.extend(painted.places.as_flattened());
-                // One more, and 0 of none: as a number, not as bits, which no f32 need keep.
+                // The texture's number plus 1, or 0 for none. It is stored as a number, because an
+                // f32 need not keep bits.
                 words.push(painted.texture.checked_add(others + 1).unwrap_or(0) as f32);
             }
         }
@@ -134,12 +136,13 @@ impl MeshNeeds {
     }
 }
 
-/// The bit of a width that says that edges go on beyond [0, 1]. No image is so wide.
+/// The bit of a width that marks images whose edges are clamped beyond [0, 1]. No image is that
+/// wide.
 const CLAMPS: u32 = 1 << 31;
 
-/// The words of textures on a device: where each one's head is, then the heads, the number of
-/// levels and of each its width, its height and where its texels are, then the texels. A width has
-/// `CLAMPS` beside it where the edges of the image go on.
+/// Packs textures into u32 words: the offset of each texture's head, then per texture its head and
+/// texels. A head has the number of levels and, for each level, width, height and offset of the
+/// texels. The width has `CLAMPS` set if the edges of the image are clamped.
 pub fn texture_words(textures: &[&Mipmap]) -> Vec<u32> {
     let mut words = vec![0; textures.len()];
     for (number, mipmap) in textures.iter().enumerate() {

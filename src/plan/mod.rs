@@ -53,7 +53,7 @@ use steps::Part;
 /// A frame's buffers, bands and pages, and the needs that select its kernels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What scene and options need; the key of the compiled kernels.
+    /// The needs of scene and options; the key of the compiled kernels.
     pub needs: SceneNeeds,
     /// The layout of a pixel's sums and of its image record.
     pub pixel: PixelLayout,
@@ -68,7 +68,8 @@ pub struct Plan {
     pub bands: Vec<Band>,
     /// The facts of the scene's triangles.
     pub mesh: MeshFacts,
-    /// Number of pages of surfels; with separate inputs each input has its own pages.
+    /// Number of pages of surfels. Each separate input, and each branch of a cut, has its own
+    /// pages.
     pub pages: usize,
     /// Surfel slots for the cut, by branch; `None` if no cut is drawn or its size is not known yet.
     pub cut: Option<Vec<u64>>,

@@ -1,4 +1,4 @@
-//! What a scene and its options need, computed once: the only variant key of the kernels.
+//! The needs of a scene and its options, computed once: the only variant key of the kernels.
 
 use super::{
     Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth,
@@ -11,106 +11,117 @@ use crate::scene::{
     Shading,
 };
 
-/// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
+/// The needs of a render. They select the WGSL files that are joined, and with them the bindings,
+/// buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SceneNeeds {
     /// The camera model.
     pub projection: Projection,
-    /// How sums are kept on the device.
+    /// The format of sums on the device.
     pub accumulator: Accumulator,
-    /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
-    /// or a fragment's weight may be less than [`SMALL_WEIGHT`], as that of a far one among all of a pixel is. Then terms keep 40 bits or
-    /// more ([`wide_bits`](super::wide_bits)).
+    /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided
+    /// by a small mean alpha, or a fragment's weight may be less than [`SMALL_WEIGHT`], as for a
+    /// far fragment when all of a pixel are summed. Terms then keep 40 bits or more
+    /// ([`wide_bits`](super::wide_bits)).
     pub wide_sums: bool,
-    /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in half the additions.
+    /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in
+    /// half the additions.
     pub atomics_u64: bool,
-    /// Records are read and written 64 bits at a time, as the adapter has such integers: the same bits in half the accesses.
+    /// Records are read and written 64 bits at a time, on adapters with 64-bit integers: the same
+    /// bits in half the accesses.
     pub long_words: bool,
-    /// The f32 centres of surfels leave out digits that show, so trailing parts are stored too.
+    /// The f32 centres of surfels omit digits that show, so their low parts are stored too.
     pub doubled: bool,
-    /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, there is no texture, and no inputs are kept apart.
+    /// One surfel is drawn for all identical ones. This requires the accumulator `fixed`, a surfel
+    /// with many copies, no texture, and no separate inputs.
     pub copies: bool,
     /// A cut of levels of detail is drawn.
     pub levels: bool,
-    /// Nodes of the cut curve.
+    /// Octree nodes in the cut are drawn with curvature (caps).
     pub node_caps: bool,
-    /// There is less than all of some surfel, as cuts fade into each other.
+    /// Cuts fade into each other, and some surfel belongs to only a part of them.
     pub fades: bool,
-    /// Batches of surfels that are out of view or hidden are left out: no cut is drawn, and there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
+    /// Batches of surfels that are out of view or hidden are culled. This requires that no cut is
+    /// drawn, and enough surfels for the number of pixels, because the search for what hides them
+    /// visits every pixel ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
-    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
+    /// Tiles draw at least the large splats. This requires the accumulator `fixed`, and options
+    /// that do not ask for scatter.
     pub tiles: bool,
-    /// Tiles sum all splats, large and small, and resolve their pixels at once, or keep what an input shows: no sum is stored.
+    /// Tiles sum all splats, large and small, and resolve their pixels directly (or keep what an
+    /// input shows), so no sums are stored.
     pub gather: bool,
-    /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
-    /// invocations.
+    /// The invocations of a subgroup read a splat's record together; a software adapter would
+    /// otherwise read it for each of them.
     pub subgroups: bool,
-    /// Sums are the rasteriser's.
+    /// The rasteriser makes the sums, in this format.
     pub raster: Option<Raster>,
-    /// The nearest fragment alone shows, and how it is found.
+    /// Only the nearest fragment shows, and it is found in this way.
     pub winner: Option<Winner>,
-    /// There are triangles beside the splats.
+    /// The needs of the triangles drawn with the splats.
     pub mesh: Option<MeshNeeds>,
-    /// Inputs are kept apart ([`individuals`](crate::passes::individuals)).
+    /// Inputs are kept separate ([`individuals`](crate::passes::individuals)).
     pub separate: bool,
-    /// Pixels have lists of their fragments, and what becomes of these.
+    /// Pixels have lists of their fragments, which are composited in this way.
     pub lists: Option<Lists>,
-    /// Every fragment is summed, by what is before it as far as sums in any order tell.
+    /// All fragments of a pixel are summed in any order, weighted by an estimate of what lies in
+    /// front of each.
     pub oit: Option<Oit>,
-    /// The layers that it peels, one after the other.
+    /// Number of layers that the rasteriser peels, one after the other.
     pub peels: Option<u32>,
-    /// Lists end where nothing more shows: without that some would be too long.
+    /// Lists end where nothing behind shows; without that some would be too long.
     pub veils: bool,
-    /// Some lists are sorted and composited in rounds: one invocation's loops would not last for them.
+    /// Some lists are sorted and composited in rounds, because they exceed the loop limit of one
+    /// invocation.
     pub long_lists: bool,
-    /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
+    /// The rasteriser draws a triangle per splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
-    /// The kernel's formula.
+    /// The formula of the blending kernel.
     pub kernel: KernelShape,
     /// The filter for small splats.
     pub low_pass: LowPass,
-    /// What epsilon depends on.
+    /// The quantity that epsilon depends on.
     pub epsilon: EpsilonForm,
-    /// The colour source.
+    /// The source of colours.
     pub color: ColorNeed,
     /// Surfels differ in alpha.
     pub alpha: bool,
     /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
-    /// What is seen of surfels whose normals have a side.
+    /// The visible sides of surfels whose normals have a side.
     pub sides: Sides,
-    /// Normals are summed that are others than those of the disks' planes.
+    /// Surfels have normals other than those of their disks' planes, and these are summed.
     pub own_normals: bool,
-    /// Surfels that face away are left out.
+    /// Surfels that face away are culled.
     pub cull_back: bool,
-    /// Disks end at lines in their planes, or at a polygon's sides.
+    /// Disks are clipped by lines in their planes or by a polygon's sides.
     pub clips: bool,
     /// Polygons are drawn instead of disks.
     pub outline: bool,
-    /// Disks curve: neither the rasteriser nor the ellipse of `ewa` does that.
+    /// Disks are curved; neither the rasteriser nor the ellipse of `ewa` supports that.
     pub curved: bool,
-    /// Surfels are points of this shape that face the camera.
+    /// Surfels are drawn as points of this shape that face the camera.
     pub facing: Option<PointShape>,
-    /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
+    /// Samples per pixel. The pixels of kernels are samples, except those of the resolved image.
     pub samples: Samples,
-    /// How pixels, or splats, are lit.
+    /// The shading of pixels or splats.
     pub shading: Shading,
-    /// It is splats that are lit.
+    /// Splats are lit, not pixels.
     pub lit_splats: bool,
-    /// Maps that are written; depths are accumulated for theirs, and fragments counted.
+    /// The maps to write. Some need further sums: depth its depths, count the number of fragments.
     pub maps: Maps,
 }
 
-/// What epsilon depends on.
+/// The quantity that epsilon depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EpsilonForm {
-    /// The nearest depth, if anything.
+    /// The nearest depth, or nothing.
     Depth,
     /// The surfel's radius.
     Radius,
     /// The slope of the pixel's ray.
     Ray,
-    /// There is none, and every depth counts.
+    /// There is no epsilon: fragments of every depth are accepted.
     All,
 }
 
@@ -124,21 +135,21 @@ impl EpsilonForm {
     }
 }
 
-/// How the fragment is found that alone shows at a pixel ([`winner`](crate::passes::winner)).
+/// How the only fragment that shows at a pixel is found ([`winner`](crate::passes::winner)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Winner {
-    /// All surfels have one colour: the nearest depth says all.
+    /// All surfels have one colour, so the nearest depth is enough.
     Depth,
-    /// Depth and colour in one number, by 64-bit atomics.
+    /// Depth and colour in one 64-bit number, by one atomic minimum.
     Once,
-    /// The nearest depth first, and its colour in a second pass.
+    /// The nearest depth first, then its colour in a second pass.
     Second,
     /// By the rasteriser's depth test.
     Rasterised,
 }
 
-/// The needs of a scene's triangles, if the view may show any: beside some, depths of splats are
-/// weighted differently. Without splats nothing is joined.
+/// Returns the needs of the scene's triangles, or `None` if the view shows none. Next to triangles,
+/// the depths of splats are weighted differently. Without splats there is nothing to join.
 fn mesh(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Option<MeshNeeds> {
     let of = facts.mesh;
     let shows = of.triangles > 0 && in_view(&of.bounds, facts.origin, camera);
@@ -154,24 +165,25 @@ fn mesh(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Option<MeshN
     })
 }
 
-/// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would; where cuts fade into each other, of those that a 64th of a splat alone
-/// has, 17.
+/// Terms of at least this weight keep 23 of the 32 fraction bits of `fixed`, like f32; where cuts
+/// fade into each other, terms of which only a 64th of a splat remains keep 17.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
 fn may_be_small(options: &RenderOptions) -> bool {
-    // Squares have corners at sqrt(2) radii. The convolution with the pixel lowers the weight of splats below it.
+    // The corners of squares lie at sqrt(2) radii. The convolution of `ewa` with the pixel lowers
+    // the weight of splats smaller than a pixel.
     let square = options.facing.is_some_and(|facing| facing.shape == PointShape::Square);
     let farthest = if square { 2.0 } else { 1.0 };
     options.kernel.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
 }
 
-/// Whether surfels that face away are left out.
+/// Whether surfels that face away are culled.
 pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bool {
     match options.cull {
         _ if options.facing.is_some() => false,
         Cull::None => false,
         Cull::Back => facts.oriented,
-        // They are seen through what is before them.
+        // Back faces show through the surfaces in front of them.
         Cull::Auto if composited(facts, options) != Composite::Opaque => false,
         Cull::Auto => {
             let relative = camera.eye - facts.origin;
@@ -182,19 +194,21 @@ pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bo
     }
 }
 
-/// What is seen of surfels whose normals have a side.
+/// The visible sides of surfels whose normals have a side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Sides {
-    /// None has one, or all that are drawn face the viewer.
+    /// No normal has a side, or all that are drawn face the viewer.
     None,
-    /// A pixel shows one side: that of its nearest fragment. At outlines and in thin parts the back lies within epsilon of the front.
+    /// A pixel shows one side: that of its nearest fragment. At outlines and in thin parts the back
+    /// lies within epsilon of the front.
     Nearest,
-    /// Both, and normals are blended as they are given: the rasteriser's own depth test does not say what is nearest.
+    /// Both sides, with normals blended as they are given: the rasteriser's own depth test does not
+    /// tell which fragment is nearest.
     Both,
 }
 
 impl Sides {
-    /// Those in a picture.
+    /// Returns the visible sides in a picture.
     pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
         let both = options.facing.is_none() && !culls_back(facts, camera, options);
@@ -208,7 +222,7 @@ impl Sides {
 }
 
 impl SceneNeeds {
-    /// What the picture needs of the scene that `facts` are of, whoever renders it.
+    /// Returns the needs of a picture of the scene that `facts` describe, for any renderer.
     pub fn of_picture(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let (low, high) = facts.color;
         let lit = options.shading != Shading::Unlit;
@@ -252,10 +266,10 @@ impl SceneNeeds {
                 None if blends => EpsilonForm::of(options.epsilon, camera),
                 None => EpsilonForm::Depth,
             },
-            // Surfels of one colour differ once they are lit.
+            // Lit surfels differ even if all have one colour.
             color: match facts.colors {
                 ColorNeed::Constant if options.lights_splats() => ColorNeed::Linear,
-                // Where nothing is blended colours are words.
+                // Without blending each colour is one word.
                 ColorNeed::Linear if !blends => ColorNeed::Srgb8,
                 colors => colors,
             },
@@ -275,11 +289,11 @@ impl SceneNeeds {
         }
     }
 
-    /// What a render on `adapter` needs, before the image is cut into bands.
+    /// Returns the needs of a render on `adapter`, before the image is cut into bands.
     pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &RenderOptions) -> Self {
         let picture = Self::of_picture(facts, camera, options);
         let blends = picture.winner.is_none();
-        // Lists sum in registers.
+        // Lists are summed in registers.
         let stored = blends && picture.lists.is_none();
         let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none() && stored;
         let long_atomics = adapter.atomics_u64 && options.has(Optimisation::Pairs);
@@ -296,7 +310,7 @@ impl SceneNeeds {
             && !picture.levels
             && !picture.fades
             && picture.color != ColorNeed::Textured;
-        // Of copies tiles would make long lists.
+        // Copies would make the lists of tiles long.
         let tiles = picture.tiles && !copies;
         Self {
             copies,
@@ -310,42 +324,45 @@ impl SceneNeeds {
         }
     }
 
-    /// Weighted sums are kept by compute kernels, in storage or in a tile's registers.
+    /// Whether compute kernels make weighted sums, in storage or in a tile's registers.
     pub fn sums_by_compute(&self) -> bool {
         self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
     }
 
-    /// Tiles may sum all splats: with textures and triangles they would bind more buffers than core WebGPU has.
+    /// Whether tiles may sum all splats. With textures and triangles they would bind more buffers
+    /// than core WebGPU allows.
     pub fn may_gather(&self) -> bool {
         self.tiles && !(self.color == ColorNeed::Textured && self.mesh.is_some())
     }
 
-    /// These, but for what follows from how much is drawn.
+    /// Returns these needs without those that depend on how much is drawn.
     pub fn before_cut(&self) -> Self {
         Self { cull: false, gather: false, veils: false, long_lists: false, ..*self }
     }
 
-    /// Surfels of a cut are told apart by their places in the tree, as what is sorted goes by them at one depth.
+    /// Whether records store the surfels' places in the octree, which decide the order of sorted
+    /// fragments at one depth.
     pub fn numbers_surfels(&self) -> bool {
         self.levels && self.lists == Some(Lists::Sorted)
     }
 
-    /// Surfaces are told apart by the depth that they blend to.
+    /// Whether surfaces are compared by their blended depths.
     pub fn compares_depth(&self) -> bool {
         self.separate || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
     }
 
-    /// Depths are summed.
+    /// Whether depths are summed.
     pub fn sums_depth(&self) -> bool {
         self.compares_depth() || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
     }
 
-    /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.
+    /// Whether fragments have weights: they are summed, or drawn by the rasteriser, whose targets
+    /// hold terms even of a single fragment.
     pub fn weighs(&self) -> bool {
         matches!(self.winner, None | Some(Winner::Rasterised))
     }
 
-    /// The needs by name, for people and JSON.
+    /// Returns the names of the needs, for people and JSON.
     pub fn names(&self) -> Vec<&'static str> {
         let projection = match self.projection {
             Projection::Pinhole => "pinhole",
@@ -376,7 +393,7 @@ impl SceneNeeds {
             .collect()
     }
 
-    /// What may be there and has a name.
+    /// The optional needs, each with whether it is set and its name.
     fn flags(&self) -> Vec<(bool, &'static str)> {
         let joins = |join| self.mesh.is_some_and(|mesh| mesh.join == join);
         vec![

@@ -1,22 +1,27 @@
-//! What makes frames faster and changes no bit of them. All of it is on; a study leaves one out to show what it is worth.
+//! Optimisations that make frames faster without changing a bit of them. All are on; a study turns
+//! one off to measure its effect.
 
 use std::str::FromStr;
 
 use crate::error::Error;
 
-/// Something that no image depends on.
+/// An optimisation on which no image depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Optimisation {
-    /// Batches of surfels that are out of view or hidden are not projected, but of cuts (`passes/cull.rs`).
+    /// Batches of surfels that are out of view or hidden are not projected; cuts are not culled
+    /// (`passes/cull.rs`).
     Culling,
-    /// Surfels are stored along a Morton curve, in runs that are dealt out (`passes/order.rs`).
+    /// Surfels are stored along a Morton curve, in runs that are dealt out over the scene
+    /// (`passes/order.rs`).
     Order,
-    /// Splats that lie behind all nearest depths of their pixels add nothing and are left out (`wgsl/occlusion.wgsl`).
+    /// Splats that lie behind all nearest depths of their pixels are skipped, since they add
+    /// nothing (`wgsl/occlusion.wgsl`).
     Hiding,
-    /// Surfels that are the same are drawn once (`scene/copies.rs`).
+    /// Identical surfels are drawn once (`scene/copies.rs`).
     Copies,
-    /// Two sums share a 64-bit word, which one atomic addition serves (`wgsl/accumulator_fixed_pairs.wgsl`), or the nearest depth and its
-    /// colour do (`wgsl/nearest_color.wgsl`).
+    /// Two values share a 64-bit word, which one atomic operation serves: two sums
+    /// (`wgsl/accumulator_fixed_pairs.wgsl`), or the nearest depth and its colour
+    /// (`wgsl/nearest_color.wgsl`).
     Pairs,
     /// Records are read and written 64 bits at a time (`wgsl/words_long.wgsl`).
     LongWords,
@@ -24,12 +29,12 @@ pub enum Optimisation {
     Gathering,
     /// The invocations of a tile share what they fetch (`wgsl/splat_shared.wgsl`).
     Sharing,
-    /// Loops that are known to end are not counted (`gpu/loops.rs`).
+    /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,
 }
 
 impl Optimisation {
-    /// Every one and its name.
+    /// Every optimisation and its name.
     pub const ALL: [(Self, &'static str); 9] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
@@ -50,7 +55,7 @@ impl FromStr for Optimisation {
         let known = Self::ALL.iter().find(|(_, name)| *name == text);
         known.map(|(optimisation, _)| *optimisation).ok_or_else(|| {
             let names = Self::ALL.map(|(_, name)| name).join(", ");
-            Error::Usage(format!("there is no optimisation {text:?}: take {names}"))
+            Error::Usage(format!("there is no optimisation {text:?}: take one of {names}"))
         })
     }
 }

@@ -1,37 +1,38 @@
-//! A pass of the algorithm, as what a device needs of it: a row of WGSL files, kernels and constants.
+//! Describes a pass of the algorithm for the device: WGSL files, kernels and constants.
 
 use super::steps::Kernel;
 use super::{RenderOptions, SceneNeeds};
 
-/// What the numbers of a module follow from.
+/// Inputs that determine the constants of a module.
 #[derive(Clone, Copy, Debug)]
 pub struct Making<'a> {
-    /// What exists.
+    /// The needs of scene and options.
     pub needs: &'a SceneNeeds,
-    /// What was chosen.
+    /// The options of the render.
     pub options: &'a RenderOptions,
-    /// Surfels of the scene.
+    /// Number of surfels in the scene.
     pub surfels: u64,
 }
 
-/// A pass: which files it joins to a render's module, which kernels are dispatched, and which overridable constants are set. From
-/// these rows follow bindings, the proof that loops end, and the tests of the layout.
+/// A pass: the files it adds to a render's module, the kernels that are dispatched, and the
+/// override constants that are set. The bindings, the proof that loops end, and the tests of the
+/// layout follow from these rows.
 pub struct Pass {
-    /// Its name, that of its file, and of its time in reports.
+    /// Its name, also that of its file and of its time in reports.
     pub name: &'static str,
-    /// Its files.
+    /// Its WGSL files.
     pub files: fn(&SceneNeeds) -> Vec<&'static str>,
-    /// Its kernels.
+    /// The kernels that are dispatched.
     pub kernels: fn(&SceneNeeds) -> Vec<Kernel>,
-    /// Its constants, by name.
+    /// Its override constants, by name.
     pub constants: fn(&Making<'_>) -> Vec<(&'static str, f64)>,
 }
 
-/// Files that are compiled together, and the kernels among them that are dispatched.
+/// Files that are compiled together, with the kernels that are dispatched.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Module {
     /// Names of WGSL files; their order does not matter.
     pub files: Vec<&'static str>,
-    /// Entry points.
+    /// The entry points that are dispatched.
     pub kernels: Vec<Kernel>,
 }

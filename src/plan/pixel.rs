@@ -1,42 +1,44 @@
-//! The room that a pixel takes.
+//! The layout of a pixel's sums and of its image record.
 
 use super::{ColorNeed, SceneNeeds, Winner};
 use crate::scene::{MAPS, Map};
 
-/// Where a pixel's values lie, in the sums (by channel) and in the image (by word). What is not needed takes no room.
+/// Offsets of a pixel's values: in the sums by channel, in the image by u32 word. Values that are
+/// not needed take no space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelLayout {
-    /// Sums of a pixel: an even number, for accumulators that keep them in pairs. The weight's is channel 0.
+    /// Number of sums per pixel, even for accumulators that store pairs. Channel 0 is the weight.
     pub channels: u32,
     /// The first of the normal's three channels.
     pub normal_channel: u32,
     /// The depth's channel.
     pub depth_channel: u32,
-    /// The channel of the weights of depths, where they are others than those of all else.
+    /// The channel of the weights of depths, if these differ from those of all other values.
     pub middles_channel: u32,
     /// The fragment count's channel.
     pub count_channel: u32,
-    /// The channel of what is held back, where that is summed ([`oit`](crate::passes::oit)).
+    /// The channel of the optical depth, where all fragments are summed
+    /// ([`oit`](crate::passes::oit)).
     pub held_back_channel: u32,
-    /// The first of the five channels of places in a texture.
+    /// The first of the five channels of texture places.
     pub place_channel: u32,
-    /// Words of a pixel in the image; the colour's four come first.
+    /// u32 words of a pixel in the image; its colour is in the first four.
     pub image_words: u32,
     /// The first word of each map in the image, in the order of [`MAPS`].
     pub map_words: [u32; MAPS.len()],
 }
 
-/// The first colour channel: next to the weight's, so that the two make a pair.
+/// The first colour channel, next to the weight's, so that the two form a pair.
 pub const COLOR_CHANNEL: u32 = 1;
 
-/// Words of a pixel's colour in the image.
+/// u32 words of a pixel's colour in the image.
 const COLOR_WORDS: u32 = 4;
 
 impl PixelLayout {
     /// The layout for `needs`.
     pub fn of(needs: &SceneNeeds) -> Self {
         let channels = |needed: bool, count: u32| if needed { count } else { 0 };
-        // The normal's x and y are a pair, and pairs start at even channels.
+        // The normal's x and y form a pair, and pairs start at even channels.
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
         let middles_channel = depth_channel + channels(needs.sums_depth(), 1);
@@ -62,7 +64,8 @@ impl PixelLayout {
         }
     }
 
-    /// u32 words of a pixel's sums in storage, or of its nearest colour; the rasteriser's are in textures.
+    /// u32 words per pixel of sums in storage, or of the nearest colour; 0 if sums are in the
+    /// rasteriser's textures or in lists.
     pub fn sum_words(&self, needs: &SceneNeeds) -> u32 {
         match needs.winner {
             _ if needs.raster.is_some() || needs.lists.is_some() => 0,
@@ -73,13 +76,13 @@ impl PixelLayout {
         }
     }
 
-    /// Blended targets of four channels that a pixel's sums need.
+    /// Number of blended four-channel targets for a pixel's sums.
     pub fn targets(&self) -> u32 {
         self.channels.div_ceil(4)
     }
 }
 
-/// Colour sums of a pixel.
+/// Number of colour sums per pixel.
 pub fn color_channels(needs: &SceneNeeds) -> u32 {
     match needs.color {
         ColorNeed::Constant => 0,

@@ -1,22 +1,22 @@
-//! The rasteriser's path, with which compute is compared.
+//! Options of the rasteriser's path, the baseline for the compute kernels.
 
 use std::str::FromStr;
 
 use crate::error::Error;
 
-/// Sums by the rasteriser's blender instead of in storage buffers; see `passes::raster`.
+/// Sums are made by the rasteriser's blender instead of in storage buffers; see `passes::raster`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Raster {
-    /// What sums are kept in.
+    /// The format of the sums.
     pub format: BlendFormat,
-    /// How the visible surface is told.
+    /// How fragments of the visible surface are identified.
     pub depth: RasterDepth,
 }
 
 /// The format of the blended targets, four channels each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BlendFormat {
-    /// 8 bits, sums end at [`BlendFormat::MOST_WEIGHTS_8`] full weights.
+    /// 8 bits; sums saturate at [`BlendFormat::MOST_WEIGHTS_8`] full weights.
     Rgba8Unorm,
     /// 11 significant bits.
     Rgba16Float,
@@ -29,39 +29,42 @@ impl BlendFormat {
     pub const ALL: [(Self, &'static str); 3] =
         [(Self::Rgba8Unorm, "rgba8unorm"), (Self::Rgba16Float, "rgba16float"), (Self::Rgba32Float, "rgba32float")];
 
-    /// Full weights that a sum of 8 bits holds: terms are divided by it, which costs three of the bits.
+    /// Number of full weights that an 8-bit sum can hold: terms are divided by it, which costs
+    /// three bits.
     pub const MOST_WEIGHTS_8: u32 = 8;
 
-    /// Bytes of a pixel of one target, of four channels, as an adapter counts them.
+    /// Bytes per pixel of one four-channel target, as adapters count them.
     pub fn bytes(self) -> u32 {
         match self {
-            // Counted as eight, by the letter of WebGPU.
+            // WebGPU counts `Rgba8Unorm` as eight bytes too.
             Self::Rgba8Unorm | Self::Rgba16Float => 8,
             Self::Rgba32Float => 16,
         }
     }
 
-    /// Its name.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(format, _)| *format == self).map_or("", |(_, name)| name)
     }
 }
 
-/// How the rasteriser's path tells which fragments belong to the visible surface.
+/// How the rasteriser's path decides which fragments belong to the visible surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RasterDepth {
-    /// Each fragment writes its own depth, and compares it with the nearest in the shader: what compute does.
+    /// Each fragment writes its own depth and compares it with the nearest in the shader, as the
+    /// compute kernels do.
     Exact,
-    /// The rasteriser interpolates and compares depths, which the visibility pass moves away by epsilon: along the camera's axis (Botsch et
-    /// al. 2005), or along the view ray where epsilon lies along it (paper 000, section 5.3).
+    /// The rasteriser interpolates and compares depths, which the visibility pass moves away by
+    /// epsilon: along the camera's axis (Botsch et al. 2005), or along the view ray if epsilon lies
+    /// along it (paper 000, section 5.3).
     Offset,
 }
 
 impl RasterDepth {
-    /// Every way by name.
+    /// Every mode by name.
     pub const ALL: [(Self, &'static str); 2] = [(Self::Exact, "exact"), (Self::Offset, "offset")];
 
-    /// Its name.
+    /// Its name on the command line.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(depth, _)| *depth == self).map_or("", |(_, name)| name)
     }

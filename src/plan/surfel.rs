@@ -23,8 +23,8 @@ pub struct SurfelLayout {
     pub normal: u32,
     /// Its place in the octree.
     pub number: u32,
-    /// Its opacity factor between cuts that fade into each other. It is the last word; surfels of
-    /// an octree do without it.
+    /// The range of fading cuts that contain it. It is the last word; surfels of an octree do
+    /// without it.
     pub fade: u32,
 }
 

@@ -1,4 +1,4 @@
-//! The uniform of a view: camera, options and the scene's ranges in the units that kernels work in.
+//! Fills the uniform of a view: camera, options and the scene's ranges in the units of the kernels.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use crate::scene::options::HIGHLIGHT;
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Atlas, Bounds, Camera, Composite, Light, Projection, Samples, Shading};
 
-/// x as the nearest f32 and the nearest f32 to what that leaves.
+/// Splits x into the nearest f32 and the nearest f32 to the remainder.
 fn split(x: f64) -> (f32, f32) {
     let high = x as f32;
     (high, (x - f64::from(high)) as f32)
@@ -23,11 +23,12 @@ fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
     (high, low)
 }
 
-/// The largest coordinate of a stray surfel in device units: squares of lengths stay finite.
+/// The largest coordinate of an outlier in device units, so that squares of lengths stay finite.
 const FARTHEST_STRAY: f64 = (1u64 << 60) as f64;
 
-/// The power of two that brings the extent of the scene's `body` and its distance from the camera to at most one, and all of
-/// its `bounds` to at most 2^60.
+/// The scale from world to device units. It is the power of two that brings the extent of the
+/// scene's `body` and its distance from the camera to at most 1, and all of its `bounds` to at most
+/// 2^60.
 pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
     let reach = |bounds: &Bounds| {
         let corners = [bounds.min, bounds.max].into_iter();
@@ -37,11 +38,12 @@ pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
     if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
 }
 
-/// A fraction of a depth that bounds nothing: with it no product overflows.
+/// An upper bound on epsilon as a fraction of depth. It limits nothing in practice and prevents
+/// overflow in products.
 const LARGEST_FRACTION: f64 = 1e9;
 
 impl View {
-    /// The view by `camera` of the scene that `facts` are of.
+    /// The uniform for `camera` and the scene that `facts` describe.
     pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let Facts { bounds, body, core, color, .. } = facts;
         let [low, span] = mapped(lit_range([color.0, color.1], options), composited(facts, options));
@@ -104,19 +106,21 @@ impl View {
     }
 }
 
-/// The depths at which the scene's body starts and ends: of the box of its centres, and as far as the largest surfel reaches, but not by
-/// more than a quarter of the box. Its last is greater than its first, and neither depends on what strays. World units.
+/// The nearest and farthest depth of the scene's body, in world units. They are those of the box of
+/// its centres, extended by the largest radius, but by at most a quarter of the box's diagonal. The
+/// second is greater than the first, and outliers affect neither.
 pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
     let eye = camera.eye - facts.origin;
     let (first, last) = (nearest_of(&facts.body, eye, camera), farthest_of(&facts.body, eye, camera));
     let reach = f64::from(facts.largest_radius).min(0.25 * facts.body.extent().length());
     let first = (first - reach).max(camera.near);
-    // Of one depth all are the first.
+    // A scene of a single depth lies at the first of the two.
     [first, (last + reach).max(first * (1.0 + 1e-6)).max(first + f64::MIN_POSITIVE)]
 }
 
-/// A depth past every surfel, with room for the rounding of depths: an epsilon that accepts everything must not make the interval that depths
-/// are measured in infinite, nor coarser than the scene. World units.
+/// A depth beyond every surfel, with a margin for rounding, in world units. With an epsilon that
+/// accepts everything it keeps the interval in which depths are measured finite and no coarser than
+/// the scene.
 pub fn farthest(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
     let reach = f64::from(facts.drawn_radius(options));
     (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + reach) * 1.001
@@ -138,7 +142,7 @@ fn nearest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
     least(0) + least(1) + least(2)
 }
 
-/// The range of premultiplied colours in `range` once they are lit, if splats are.
+/// The range of premultiplied colours after lighting; `range` itself unless splats are lit.
 fn lit_range([low, high]: [[f32; 4]; 2], options: &RenderOptions) -> [[f32; 4]; 2] {
     if !options.lights_splats() {
         return [low, high];
@@ -148,28 +152,30 @@ fn lit_range([low, high]: [[f32; 4]; 2], options: &RenderOptions) -> [[f32; 4]; 
     let mut lit = [low, high];
     for k in 0..3 {
         lit[0][k] = (low[k] * light).min(0.0);
-        // A hair for roundings.
+        // A margin for rounding.
         lit[1][k] = ((high[k] * light).max(0.0) + highlight) * 1.000_01;
     }
     lit
 }
 
-/// The least value and the span of colours in `range`, by which they are mapped to [0, 1] before they are summed. What is composited fragment
-/// by fragment is not summed, and not mapped where it varies: small alphas keep their digits.
+/// The least value and the span by which colours are mapped to [0, 1] before they are summed.
+/// Colours composited fragment by fragment are not summed; their channels stay unmapped where they
+/// vary, so that small alphas keep their digits.
 fn mapped([low, high]: [[f32; 4]; 2], composite: Composite) -> [[f32; 4]; 2] {
     let summed = !matches!(composite, Composite::Sorted | Composite::Gaussians);
     let of = |k: usize| if summed || low[k] == high[k] { [low[k], high[k] - low[k]] } else { [0.0, 1.0] };
     [std::array::from_fn(|k| of(k)[0]), std::array::from_fn(|k| of(k)[1])]
 }
 
-/// The size of a node that is drawn, square pixels of the image, and the part of a pixel that a sample is across and down.
+/// The area of a drawn octree node in square pixels of the image, then the width and height of a
+/// sample as fractions of a pixel.
 fn levels(camera: &Camera, options: &RenderOptions) -> [f32; 4] {
     let Samples { across, down } = options.samples;
     let image = camera.pixels() as f64 / f64::from(across * down);
     [options.detail.pixels(image) as f32, 1.0 / across as f32, 1.0 / down as f32, 0.0]
 }
 
-/// The lights as the kernels see them: a direction, zero for a headlight, and an intensity.
+/// The lights in the layout of the kernels: a direction (zero for a headlight) and an intensity.
 fn lights(lights: &[Light]) -> [[f32; 4]; MAX_LIGHTS] {
     let mut slots = [[0.0; 4]; MAX_LIGHTS];
     for (slot, light) in slots.iter_mut().zip(lights) {

@@ -53,9 +53,7 @@ pub(super) fn one_alone(options: &RenderOptions) -> Result<()> {
     if options.samples == Samples::ONE {
         return Ok(());
     }
-    Err(Error::Usage(
-        "sums can be read back only at one sample per pixel: use a camera with one pixel per sample".into(),
-    ))
+    Err(Error::Usage("sums can be read back only at one sample per pixel: give the camera a pixel per sample".into()))
 }
 
 /// Joins the colours of one render with the maps of others, and adds up their times.

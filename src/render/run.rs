@@ -28,8 +28,7 @@ pub struct Tally {
     pub drawn: u64,
     /// Number of surfels and nodes in the cut, if a cut is drawn.
     pub cut: Option<u64>,
-    /// Whether the image is valid. If not, the next try succeeds with what this one recorded in
-    /// `known`.
+    /// Whether the image is valid. If not, `known` holds the sizes that the next try needs.
     pub complete: bool,
 }
 
@@ -281,9 +280,7 @@ impl<'a> Run<'a> {
 
     /// The error after too many tries.
     pub fn never_fits(gpu: &Gpu) -> Error {
-        gpu.error(
-            "the buffers were still too small after every retry of the frame: choose a smaller image or fewer surfels",
-        )
+        gpu.error("the buffers were too small after every retry of the frame: choose a smaller image")
     }
 }
 

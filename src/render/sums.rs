@@ -198,9 +198,7 @@ pub fn resolve(
     let whole = sums.nearest.len() == pixels && sums.sums.len() == pixels * plan.pixel.channels as usize;
     let of = |sums: &Sums| (sums.size, sums.pixel, sums.one, sums.view);
     if !whole || of(sums) != of(&expected) {
-        return Err(Error::Usage(
-            "the sums belong to another scene, view or choice of options: use those with which they were made".into(),
-        ));
+        return Err(Error::Usage("the sums belong to another scene, view or options: pass the same ones".into()));
     }
     let kernels = Kernels::new(sources, &plan, options, facts.surfels);
     let scene_wide = Uploaded { pages: Vec::new(), branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };

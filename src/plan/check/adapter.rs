@@ -1,14 +1,14 @@
-//! What goes with an adapter.
+//! Checks that an adapter supports what a render needs.
 
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::plan::{Accumulator, BlendFormat, Features, PixelLayout, RasterDepth, SceneNeeds};
 use crate::scene::Camera;
 
-/// Fails if `adapter` lacks what `needs` ask for.
+/// Fails if `adapter` lacks what `needs` require.
 ///
 /// # Errors
-/// A sentence that says what is lacking and what to do.
+/// A sentence that says what is missing and what to do.
 pub fn on_adapter(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
     match needs.raster {
         None => sums(adapter, needs.accumulator),
@@ -19,7 +19,7 @@ pub fn on_adapter(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Cam
 /// Fails if `adapter` lacks the atomics of `accumulator`.
 ///
 /// # Errors
-/// A sentence that says what is lacking and what to do.
+/// A sentence that says what is missing and what to do.
 pub fn sums(adapter: &AdapterDescription, accumulator: Accumulator) -> Result<()> {
     let (has, what) = match accumulator.row().features {
         Features::None => return Ok(()),

@@ -98,7 +98,7 @@ fn a_device_makes_the_cut_of_its_twin() {
             assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
             assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
             // The first adapter draws all of them, and the others a third each, as kernels take seconds to compile.
-            let draws = |on: usize| name != "plain" || on == 0 || (on + step) % 3 == 0;
+            let draws = |on: usize| name != "plain" || on == 0 || (on + step).is_multiple_of(3);
             for (_, (on, backend)) in backends.iter().take(adapters).enumerate().filter(|(on, _)| draws(*on)) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
                 assert_eq!(report.cut, Some(drawn as u64), "{name} {on} {options:?}");

@@ -393,7 +393,7 @@ fn what_cannot_be_sampled_is_counted_or_said() {
     for (mesh, said) in [
         (Mesh { triangles: vec![], ..mesh.clone() }, "no triangles"),
         (Mesh { triangles: bad.to_vec(), ..mesh.clone() }, "none of the mesh's 5 triangles has an area"),
-        (Mesh { triangles: vec![[0, 1, 99_999]], ..mesh.clone() }, "names three of its vertices"),
+        (Mesh { triangles: vec![[0, 1, 99_999]], ..mesh.clone() }, "triangles of existing vertices"),
         (Mesh { material: Some(vec![]), ..mesh.clone() }, "materials"),
     ] {
         let error = sample(&mesh, 10, &Method::Uniform, 0, &()).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! `epsplat adapters`: what could render.
+//! `epsplat adapters`: lists the graphics adapters of this machine.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -10,18 +10,18 @@ use serde::Serialize;
 
 use super::{outputs, print, write_json};
 
-/// List the adapters, with their limits and features, and the one that auto takes.
+/// List the adapters, with their limits and features, and the one that auto selects.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat adapters --json -")]
 pub struct Arguments {
-    /// The list as JSON, to a file or - for stdout
+    /// Write the list as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
 struct List {
-    /// The adapter `auto` takes; null: the reference.
+    /// Name of the adapter that `auto` selects; null if it selects the reference.
     auto: Option<String>,
     adapters: Vec<AdapterDescription>,
 }

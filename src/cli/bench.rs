@@ -1,4 +1,4 @@
-//! `epsplat bench`: a study of speed and error from a definition.
+//! `epsplat bench`: runs a study of speed and error that a TOML file defines.
 
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -16,29 +16,29 @@ use super::{note, outputs, print};
 
 /// Run a study of speed beside error: every configuration on every scene of a TOML file.
 ///
-/// Configurations take turns, so a machine that slows down slows all of them. Errors are against
-/// the f64 reference with the same options, over the pixels that it does not excuse, and against
-/// ray-cast ground truth where a scene asks for it.
+/// Runs of the configurations alternate, so a machine that slows down slows all of them. Errors are
+/// against the f64 reference with the same options, over the pixels that it does not excuse, and
+/// against ray-cast ground truth for scenes that ask for it.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat bench benches/accumulators.toml --quick --out report\n\n\
     Exits with 1, after everything is written, if a configuration misses its error limit or, where its bits must not\n\
     change, gives different bits in two runs.")]
 pub struct Arguments {
-    /// The study's definition: .toml
+    /// Definition of the study: .toml
     definition: PathBuf,
-    /// A folder for the report: index.html, results.csv, results.json
+    /// Folder for the report: index.html, results.csv, results.json
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Timed runs of each configuration, instead of the definition's
+    /// Number of timed runs of each configuration [default: the definition's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: Option<u32>,
-    /// The definition's quick form, of some seconds
+    /// Run the definition's quick form, which takes some seconds
     #[arg(long)]
     quick: bool,
-    /// Print Markdown instead: time as a multiple of the baseline's, errors, same bits, which adapters
+    /// Print Markdown instead: times relative to the baseline, errors, equal bits, adapters
     #[arg(long)]
     table: bool,
-    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if let (Some(foreign), Some(missing)) = (there.first(), missing.first()) {
             let missing = missing.file_name().unwrap_or_default().display();
             return Err(Error::Usage(format!(
-                "{} is no report's, as there is no {missing} beside it: name another folder for --out",
+                "{} is not part of a report, as there is no {missing} beside it: name another folder for --out",
                 foreign.display()
             )));
         }

@@ -1,4 +1,4 @@
-//! `epsplat card`: all that shows what an adapter does, in one run of limited time.
+//! `epsplat card`: measures accuracy, equal bits and speed of an adapter in limited time.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -15,10 +15,10 @@ use super::{note, outputs, print};
 
 /// Make a record of an adapter in limited time: accuracy, equal bits, speed.
 ///
-/// The record holds, in this order: the adapter; its copy bandwidth; the hard cases; images that
-/// must have the same bits; frames of spheres, with the bytes per second that each pass moves at
-/// least; and studies. Each step is written as soon as it is done, and steps for which there was no
-/// time are named. STUDIES are TOML files, as for `epsplat bench`; without any, card runs those of
+/// The record has, in this order: the adapter; its copy bandwidth; the hard cases; images that must
+/// have the same bits; frames of spheres, with a lower bound of the bytes per second that each pass
+/// moves; and studies. Each step is written as soon as it is done, and steps that were left out for
+/// lack of time are named. STUDIES are TOML files, as for `epsplat bench`; by default card runs
 /// accumulators, organisation, optimisations, scaling and compute-vs-raster in the folder benches.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat card --out card\n  epsplat card --quick --out card-tried\n\n\
@@ -26,24 +26,25 @@ use super::{note, outputs, print};
     Exits with 1, after everything is written, if an image misses its bound or differs in a bit,\n\
     a study fails, or a step could not be done.")]
 pub struct Arguments {
-    /// Definitions of studies: .toml
+    /// Definitions of studies: .toml [default: those in the folder benches]
     studies: Vec<PathBuf>,
-    /// A folder for the records
+    /// Folder for the records
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// A form of less than a minute, which tries everything before a long run
+    /// Run a short form of less than a minute, which tries every step before a long run
     #[arg(long)]
     quick: bool,
-    /// Minutes that it may take, about: the last frame or scene that fits is ended
+    /// Time limit in minutes; a frame or scene that has started is finished
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     minutes: u32,
-    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }
 
-/// The folder of the studies that are run if none is named, and these: the short ones first.
+/// Folder of the studies that are run by default.
 const FOLDER: &str = "benches";
+/// Names of the studies that are run by default, the short ones first.
 const STUDIES: [&str; 5] = ["accumulators", "organisation", "optimisations", "scaling", "compute-vs-raster"];
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -75,20 +76,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// The definitions that are named, or those of [`STUDIES`].
+/// Returns the named definitions, or those of [`STUDIES`] if none is named.
 fn definitions(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     if !named.is_empty() {
         return Ok(named.to_vec());
     }
     if !Path::new(FOLDER).is_dir() {
         return Err(Error::Usage(format!(
-            "there is no folder {FOLDER} here, whose studies are run if none is named: name some, or run this where the folder is"
+            "there is no folder {FOLDER} here with the default studies: name studies, or run this where the folder is"
         )));
     }
     Ok(STUDIES.iter().map(|name| Path::new(FOLDER).join(name).with_extension("toml")).collect())
 }
 
-/// Refuses a folder in which the records cannot be written, or would overwrite what is read.
+/// Fails if the records cannot be written to the folder, or would overwrite a file that is read.
 fn check_outputs(out: &Path, files: &[PathBuf], studies: &[Definition]) -> Result<()> {
     let folders: Vec<PathBuf> = studies.iter().map(|study| out.join(&study.name)).collect();
     let reports = folders.iter().flat_map(|folder| report::FILES.map(|name| folder.join(name)));

@@ -1,4 +1,4 @@
-//! `epsplat compare`: the error of one image against another.
+//! `epsplat compare`: measures the error of one image against another.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -14,14 +14,14 @@ use super::{outputs, print, write_json};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat compare gpu.exr reference.exr --json -\n\n\
     If B has a `decision` map (--backend reference --aov decision), pixels in which a fragment lies within 1e-6 of a\n\
-    yes-or-no decision are excused in a second maximum, and their share is printed. Ends with 1 where a value that is\n\
-    not finite stands against another, so that measures mean nothing.")]
+    yes-or-no decision are excused in a second maximum, and their share is printed. Exits with 1 if a value is not\n\
+    finite and differs between the images, so that no error can be measured.")]
 pub struct Arguments {
-    /// The image in question: .png or .exr
+    /// Image to measure: .png or .exr
     a: PathBuf,
-    /// What it should be
+    /// Image that it is compared with, which counts as exact: .png or .exr
     b: PathBuf,
-    /// The measures as JSON, to a file or - for stdout
+    /// Write the measures as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
@@ -41,12 +41,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let maps = comparison.maps.iter().filter(|map| map.not_finite > 0);
     let maps = maps.map(|map| format!("{} of {}", map.not_finite, map.map)).collect::<Vec<_>>().join(", ");
     let what = format!(
-        "pixels in which a value that is not finite stands against another: {maps}; no measure of these means anything"
+        "it has pixels with a value that is not finite in one image and differs in the other, so that their error cannot be measured: {maps}"
     );
     Err(Error::malformed(&arguments.a, what))
 }
 
-/// The text in place of an error where a value is not finite and its counterpart differs.
+/// Printed in place of an error if a value is not finite and differs in the other image.
 const NOT_FINITE: &str = "not finite";
 
 fn read(path: &Path) -> Result<Frame> {
@@ -56,7 +56,7 @@ fn read(path: &Path) -> Result<Frame> {
 
 fn table(c: &Comparison) -> String {
     let mut text = String::new();
-    // RGB and alpha are the first two of the maps, together all that is not of a map alone.
+    // RGB and alpha are the first two maps. The measures above the table are of these two only.
     let finite = c.maps.iter().take(2).all(|map| map.not_finite == 0);
     let measure = |value: f64| if finite { format!("{value:.3e}") } else { NOT_FINITE.to_owned() };
     let psnr = match c.psnr_db {
@@ -83,7 +83,7 @@ fn table(c: &Comparison) -> String {
         let of_range = |error: f64| if map.range > 0.0 { format!("{error:.3e}") } else { "-".to_owned() };
         let range = format!("{:.4e}", map.range);
         let in_one = if map.in_one > 0 {
-            format!("  ({} pixels have nothing in one image alone)", map.in_one)
+            format!("  ({} pixels have a value in one image only)", map.in_one)
         } else {
             String::new()
         };
@@ -101,7 +101,7 @@ fn table(c: &Comparison) -> String {
     text
 }
 
-/// The maps that could not be compared.
+/// Returns a line for each image that names the maps that only it has.
 fn unshared(arguments: &Arguments, c: &Comparison) -> String {
     let sides = [(&arguments.a, &c.only_in_a), (&arguments.b, &c.only_in_b)];
     let only = sides.into_iter().filter(|(_, maps)| !maps.is_empty());

@@ -1,4 +1,4 @@
-//! `epsplat coverage`: whether surfels cover a mesh, and how far they lie from it.
+//! `epsplat coverage`: measures holes of surfels that represent a mesh, and their distance to it.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -16,29 +16,29 @@ use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
-/// Measure holes of surfels that stand for a mesh, and their distance from it.
+/// Measure holes of surfels that represent a mesh, and their distance from it.
 ///
-/// Rays are cast at the mesh from all around. A ray is covered if a disk lies on it within the disk's
-/// own radius of the point where the ray first meets the mesh. An uncovered ray is a hole where the
-/// surface goes on around it, and an edge at an outline or a step in depth, which flat disks cut off.
-/// Nothing is rendered, so no filter and no epsilon hides a hole.
+/// Rays are cast at the mesh from all directions. A ray is covered if it hits a disk within the
+/// disk's radius of the point where the ray first meets the mesh. An uncovered ray is an edge if it
+/// lies at an outline or a step in depth, which flat disks cut off, and otherwise a hole. Nothing
+/// is rendered, so no filter and no epsilon hides a hole.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Files of surfels, or of points, whose radii are estimated"))]
+    #[arg(required = true, help = help_of("Files of surfels, or of points, whose radii are then estimated"))]
     surfels: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// The mesh that they stand for: .obj or .ply
+    /// Mesh that the surfels represent: .obj or .ply
     #[arg(long)]
     mesh: PathBuf,
-    /// Directions to look from
+    /// Number of directions to cast rays from
     #[arg(long, default_value_t = DEFAULT_VIEWS, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     views: u32,
-    /// Rays along each side of a view
+    /// Rays along each side of a direction's square grid
     #[arg(long, value_name = "RAYS", default_value_t = DEFAULT_SIDE, value_parser = clap::value_parser!(u32).range(1..=8192))]
     side: u32,
-    /// The measures as JSON, to a file or - for stdout (then without the table)
+    /// Write the measures as JSON to a file, or to stdout for - (in place of the table)
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
@@ -47,7 +47,7 @@ pub struct Arguments {
 struct Outcome {
     surfels: u64,
     triangles: u64,
-    /// Of the mesh's bounds, world units.
+    /// Diagonal of the mesh's bounding box, world units.
     diagonal: f64,
     hole_free: bool,
     #[serde(flatten)]
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (scene, preparation) = build(points, &bars).map_err(|error| named(error, &arguments.surfels))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_radii > 0 {
-        note(&format!("{} surfels had no radius: theirs are estimated from neighbours", preparation.estimated_radii));
+        note(&format!("{} surfels have no radius: it is estimated from neighbours", preparation.estimated_radii));
     }
     mesh.notes.iter().for_each(|line| note(line));
     let dropped = mesh.triangles.len() - triangles.len();
@@ -118,7 +118,7 @@ fn table(outcome: &Outcome) -> String {
     let _ = writeln!(text, "holes      {}", counted(seen.seen.holes, seen.hole_share));
     match &seen.worst_view {
         None => {
-            let _ = writeln!(text, "hole-free  from all {} views; what is uncovered are edges", seen.views);
+            let _ = writeln!(text, "hole-free  from all {} views; the uncovered rays lie at edges", seen.views);
         }
         Some(worst) => {
             let [x, y, z] = worst.from;

@@ -1,4 +1,4 @@
-//! `epsplat generate`: analytic scenes with exact normals, radii and colours.
+//! `epsplat generate`: writes analytic shapes with exact normals, radii and colours.
 
 use std::path::PathBuf;
 
@@ -12,29 +12,33 @@ use super::{note, outputs};
 
 /// Write an analytic shape as PLY: surfels with exact normals, radii and colours.
 ///
-/// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1 and
-/// 0.4), crossing (two squares), plane (a square of side 2, one colour), checkerboard (the same with
-/// 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii
-/// are 1.5 times the spacing.
+/// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1
+/// and 0.4), crossing (two squares), plane (a square of side 2, one colour), checkerboard (the same
+/// with 32x32 squares) or text (the same with lines of text, each half as high as the one above).
+/// Radii are 1.5 times the spacing.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
     epsplat generate torus --count 20000 --texture -o torus.ply\n  \
     epsplat generate torus --count 100000 --gaussians -o gaussians.ply")]
 pub struct Arguments {
-    /// sphere, torus, plane, checkerboard, text, shells or crossing
+    /// Shape: sphere, shells, torus, crossing, plane, checkerboard or text
     shape: Shape,
-    /// Surfels
+    /// Number of surfels
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=4_000_000_000))]
     count: u64,
-    /// Write texture coordinates too, for render --texture: turns around the upward axis and, upward, latitudes or turns around the
-    /// tube; across and up a square
+    /// Also write texture coordinates, for render --texture
+    ///
+    /// On spheres and the torus they are turns around the upward axis and, upward, latitudes or
+    /// turns around the tube; on squares positions across and up
     #[arg(long)]
     texture: bool,
-    /// Write Gaussian surfels instead, as 2D Gaussian splatting has them: opacities of 0.1 to 0.95, and harmonics of degree 3 of a light
-    /// beside the eye
+    /// Write Gaussian surfels instead, in the format of 2D Gaussian splatting
+    ///
+    /// They have opacities of 0.1 to 0.95, and colours as harmonics of degree 3 of a light beside
+    /// the eye
     #[arg(long, conflicts_with = "texture")]
     gaussians: bool,
-    /// The file: .ply
+    /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
 }
@@ -50,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     bars.begin("writing surfels", arguments.count);
     let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {
-        // Once in a while, not once a surfel: the bar is behind a lock.
+        // Not for each surfel, as the progress bar takes a lock.
         if index % 65_536 == 65_535 {
             bars.advance(65_536);
         }

@@ -1,4 +1,4 @@
-//! `epsplat hardcases`: scenes that renderers like to get wrong, and how this adapter does.
+//! `epsplat hardcases`: judges an adapter by scenes that are hard to render exactly.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -15,21 +15,21 @@ use super::{note, outputs, print, write_json};
 
 /// Render hard scenes with every accumulator and judge each pixel by a derived bound.
 ///
-/// A row stands for a case and an accumulator. It gives the errors of the map that used most of its
-/// bound, as fractions of the map's range; the share of the bound that was used (the bound follows
-/// from the pixel's own fragments and is that of `fixed`); the pixels that only the reference (lost)
-/// or only the device (invented) covers; and the verdict.
+/// Each row is a case with an accumulator. It gives the errors of the map that came closest to its
+/// bound, as fractions of the map's range; the used share of the bound (which follows from the
+/// pixel's own fragments and is that of `fixed`); the pixels that only the reference covers (lost)
+/// or only the device (invented); and the verdict.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat hardcases --accumulator fixed --json hardcases.json\n\n\
-    Exits with 1 if a row fails that was not expected to.")]
+    Exits with 1 if a row fails that is not expected to.")]
 pub struct Arguments {
-    /// The rows as JSON, to a file or - for stdout (then without the table)
+    /// Write the rows as JSON to a file, or to stdout for - (in place of the table)
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
-    /// Only this accumulator; else all that the adapter has
+    /// Only this accumulator [default: all that the adapter supports]
     #[arg(long, value_name = "NAME")]
     accumulator: Option<Accumulator>,
-    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Only cases whose name contains this
@@ -48,7 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     outputs::check([], &arguments.json)?;
     let gpu = Gpu::open(arguments.adapter.as_deref()).map_err(|error| match error {
-        Error::NoAdapter(why) => Error::NoAdapter(format!("hard cases judge an adapter by the reference, but {why}")),
+        Error::NoAdapter(why) => Error::NoAdapter(format!("hard cases need an adapter to judge, but {why}")),
         other => other,
     })?;
     if let Some(chosen) = chosen {
@@ -94,10 +94,10 @@ fn table(rows: &[Row]) -> String {
         let mut notes = String::new();
         let mut remark = |text: String| notes.push_str(&format!("; {text}"));
         if let Some(of_smallest) = row.of_smallest {
-            remark(format!("colours err by up to {of_smallest:.1} of the smallest"));
+            remark(format!("colour errors are up to {of_smallest:.1} of the smallest colour"));
         }
         if row.overflows > 0 {
-            remark("a sum wrapped, rendered with fixed".to_owned());
+            remark("a sum wrapped, so it was rendered again with fixed".to_owned());
         }
         if row.nan > 0 {
             remark(format!("{} NaN", row.nan));

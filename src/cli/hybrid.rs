@@ -1,4 +1,4 @@
-//! `epsplat hybrid`: surfels where the triangles of a mesh are smaller than pixels, and the other triangles.
+//! `epsplat hybrid`: replaces the triangles of a mesh that are smaller than pixels by surfels.
 
 use std::path::{Path, PathBuf};
 
@@ -15,29 +15,29 @@ use super::{note, outputs, print, write_json};
 
 /// Divide a mesh into surfels, where its triangles are tiny, and triangles elsewhere.
 ///
-/// Triangles of less than a twentieth of a square pixel become surfels, four for each pixel; larger
-/// ones stay. Surfels are written to OUT.ply, triangles to OUT.mesh.ply beside it, and images to
-/// OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Files with these names are replaced,
-/// or removed where nothing is left to write, only if an earlier run wrote them.
+/// Triangles smaller than a twentieth of a square pixel become surfels, four for each pixel; larger
+/// ones are kept. Surfels are written to OUT.ply, triangles to OUT.mesh.ply beside it, and images
+/// to OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Existing files with these
+/// names are replaced, or removed if they are not needed, only if an earlier run wrote them.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat hybrid dragon.ply -o far.ply --pixels 400\n  epsplat render far.ply -o far.png"
 )]
 pub struct Arguments {
-    /// The mesh: .obj or .ply; - is standard input
+    /// Mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
     #[command(flatten)]
     input: InputFormat,
-    /// The file of the surfels: .ply
+    /// Output file of the surfels: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// How many pixels the diagonal of the mesh's box will be seen as long as
+    /// Length of the diagonal of the mesh's bounding box in the pictures, in pixels
     #[arg(long, value_name = "N", default_value = "1000", value_parser = pixels)]
     pixels: f64,
-    /// An image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
+    /// Image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
-    /// What became of the mesh as JSON, to a file or - for stdout
+    /// Write counts and file names as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
@@ -47,12 +47,12 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
     number.ok_or_else(|| "it is a number of pixels from 1 to 1000000".into())
 }
 
-/// The outcome as JSON.
+/// The JSON report.
 #[derive(Serialize)]
 struct Outcome {
     #[serde(flatten)]
     report: Report,
-    /// The file of the triangles, if any stay, and those of their images.
+    /// The file of the kept triangles, if there are any, and those of their images.
     files: Vec<PathBuf>,
 }
 
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     paths.iter().try_for_each(|path| earlier.check_image(path))?;
     outputs::check(read(), written().chain(&paths))?;
     if divided.triangles.iter().flat_map(|mesh| &mesh.materials).any(Material::clamps) {
-        note("materials say -clamp on, which a PLY file cannot: their images are repeated beyond their edges");
+        note("a PLY file cannot store the option -clamp on of materials: their images repeat beyond their edges");
     }
     for (image, path) in images.iter().zip(&paths) {
         io::png::write_texture(path, image)?;
@@ -102,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// The mesh, painted as the arguments say.
+/// Reads the mesh, and paints it with the image of `--texture` if that is given.
 fn mesh(arguments: &Arguments, bars: &Bars) -> Result<Mesh> {
     let mut mesh = arguments.input.mesh(&arguments.mesh, bars)?;
     mesh.notes.iter().for_each(|line| note(line));
@@ -115,17 +115,22 @@ fn mesh(arguments: &Arguments, bars: &Bars) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// The file of image number `k`, from 1.
+/// Returns the path of image number `k`, counted from 1.
 fn image(output: &Path, k: usize) -> PathBuf {
     output.with_extension(format!("mesh-{k}.png"))
 }
 
-/// The files of triangles and images that an earlier run left beside the output: no option names
-/// them, so they alone are replaced.
+/// Files of triangles and images that an earlier run wrote beside the output.
+///
+/// No option names such files, so only those of an earlier run may be replaced.
 struct Earlier(Vec<PathBuf>);
 
 impl Earlier {
-    /// Refuses a file of triangles that `epsplat hybrid` did not write.
+    /// Finds the files of an earlier run with this output.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if a file at `beside` was not written by `epsplat hybrid`.
     fn of(output: &Path, beside: &Path) -> Result<Self> {
         let textures = io::ply::textures_of_hybrid(beside);
         if textures.is_none() && beside.symlink_metadata().is_ok() {
@@ -136,17 +141,17 @@ impl Earlier {
         Ok(Self(textures.iter().map(|_| beside.to_owned()).chain(images).collect()))
     }
 
-    /// Refuses to replace an image that is not of that run.
+    /// Fails if a file at `path` exists that the earlier run did not write.
     fn check_image(&self, path: &Path) -> Result<()> {
         let known = self.0.iter().any(|file| file == path);
         if known || path.symlink_metadata().is_err() { Ok(()) } else { Err(not_ours(path)) }
     }
 
-    /// Removes those that are not written again, which nothing names any more.
+    /// Removes the files that are not written again, as no file names them any more.
     fn remove_but(&self, written: &[PathBuf]) -> Result<()> {
         for file in self.0.iter().filter(|file| !written.contains(file) && file.symlink_metadata().is_ok()) {
             std::fs::remove_file(file).map_err(|error| Error::write(file, error))?;
-            note(&format!("{}: removed, as nothing of an earlier run stays in it", file.display()));
+            note(&format!("{}: removed, as this run does not need the file of an earlier one", file.display()));
         }
         Ok(())
     }
@@ -154,7 +159,7 @@ impl Earlier {
 
 fn not_ours(path: &Path) -> Error {
     Error::Usage(format!(
-        "{} would be written too, and is there already, not written by `epsplat hybrid` for this output: choose another name for the output, \
+        "{} would be overwritten, and `epsplat hybrid` did not write it for this output: choose another name for the output, \
          or remove that file",
         path.display()
     ))
@@ -166,7 +171,7 @@ fn name(path: &Path) -> String {
 
 fn summary(report: &Report, output: &Path) -> String {
     format!(
-        "{} of {} triangles stay, {} surfels for the others, where a pixel is {:.3e} wide: `epsplat render {}` draws both\n",
+        "{} of {} triangles stay, {} surfels replace the others, for pixels {:.3e} wide: `epsplat render {}` draws both\n",
         report.kept,
         report.triangles,
         report.surfels,

@@ -1,4 +1,4 @@
-//! `epsplat info`: what a file holds, and what a renderer would make of it.
+//! `epsplat info`: describes a file and the surfels that the renderer would make of it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +15,7 @@ use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{outputs, print, write_json};
 
-/// Describe a file: its points, attributes, place, coverage and what a picture makes of them.
+/// Describe a file: its points, attributes, bounding box, coverage, and how they are rendered.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat info scan.laz")]
 pub struct Arguments {
@@ -23,67 +23,68 @@ pub struct Arguments {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// What is known of the points as JSON, to a file or - for stdout
+    /// Write the description as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
 
-/// The share of surfels without an open gap beside them above which a surface counts as covered.
+/// A surface counts as covered if at least this share of its surfels has no open gap beside it.
 const COVERED: f64 = 0.9;
 
 #[derive(Serialize)]
 struct Info {
-    /// The file's description of itself.
+    /// Description in the file's header.
     file: About,
     points: u64,
     normals: bool,
     radii: bool,
-    /// Points that have a normal, if some lack one.
+    /// Number of points with a usable normal, if only some have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     points_with_normals: Option<u64>,
+    /// Number of points with a usable radius, if only some have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     points_with_radii: Option<u64>,
     colors: &'static str,
-    /// What it says of Gaussians, if they are some.
+    /// Statistics of a file of Gaussians; None for other files.
     gaussians: Option<Gaussians>,
-    /// Points of each class of a laser scan.
+    /// Number of points of each class of a laser scan.
     classes: BTreeMap<u8, u64>,
-    /// Nodes and levels, of a file with levels of detail.
+    /// Size of the octree; None for files without levels of detail.
     levels_of_detail: Option<LevelsOfDetail>,
-    /// Texture coordinates, by which `render --texture` paints.
+    /// True if points have texture coordinates, which `render --texture` needs.
     texture: bool,
-    /// In so many images.
+    /// Number of images that the texture coordinates refer to.
     images: u64,
-    /// The mesh whose triangles are drawn beside them.
+    /// Mesh whose triangles are drawn together with the surfels (`epsplat hybrid`).
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<PathBuf>,
-    /// It has triangles.
+    /// True if the file has faces.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     is_mesh: bool,
     up: &'static str,
-    /// World coordinates of the smallest box.
+    /// Corners of the bounding box, world coordinates.
     min: [f64; 3],
     max: [f64; 3],
-    /// Subtracted before coordinates become f32.
+    /// World coordinates that are subtracted before coordinates are converted to f32.
     origin: [f64; 3],
     largest_radius: f64,
-    /// None if all points are at one position.
+    /// Coverage of the surface; None for Gaussians and if all points are at one position.
     coverage: Option<Coverage>,
-    /// What the file lacks, and a renderer has to guess or do without.
+    /// Attributes that are missing in the file, so that they are estimated or not used.
     lacks: Vec<&'static str>,
-    /// The command that supplies what can be.
+    /// Command that writes a file with the missing attributes, except colours.
     supplied_by: Option<String>,
     preparation: Preparation,
 }
 
-/// What `epsplat hybrid` leaves of a mesh without small triangles.
+/// A file that `epsplat hybrid` wrote for a mesh without small triangles: it has no points.
 #[derive(Serialize)]
 struct TrianglesAlone {
     points: u64,
     triangles: PathBuf,
 }
 
-/// What a file with levels of detail holds.
+/// Size of the octree of a file with levels of detail.
 #[derive(Serialize)]
 struct LevelsOfDetail {
     nodes: u64,
@@ -97,14 +98,14 @@ impl LevelsOfDetail {
     }
 }
 
-/// What a file of Gaussians holds.
+/// Statistics of a file of Gaussians.
 #[derive(Serialize)]
 struct Gaussians {
-    /// Of the harmonics by which colours change with the view, 0 for none.
+    /// Degree of the spherical harmonics of view-dependent colours, 0 for constant colours.
     degree: u32,
-    /// The least, the median and the greatest of those that are drawn.
+    /// Minimum, median and maximum opacity of the Gaussians that are drawn.
     opacities: [f32; 3],
-    /// The median of the longer and of the shorter standard deviation, world units.
+    /// Medians of the longer and of the shorter standard deviation, world units.
     deviations: [f32; 2],
 }
 
@@ -142,7 +143,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return match &arguments.json {
             Some(path) => write_json(path, &TrianglesAlone { points: 0, triangles }),
             None => print(&format!(
-                "{}\n  points    none: what `epsplat render` draws of it are the triangles of {}\n",
+                "{}\n  points    none: `epsplat render` draws only the triangles of {}\n",
                 arguments.input.display(),
                 triangles.display()
             )),
@@ -153,13 +154,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
     let numbers = points.texture_numbers.iter().flatten().filter(|number| **number != u32::MAX);
     let images = numbers.max().map_or(u64::from(texture), |last| u64::from(*last) + 1);
-    // Grey of intensities is no colour.
+    // The greys made from intensities do not count as colours.
     let of_colors = if about.intensities.is_some() { "none" } else { colors(&points) };
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), of_colors);
     let (scene, preparation) =
         surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
     let gaussians = Gaussians::of(&scene);
-    // They are no samples of a surface that others would have to close.
+    // Gaussians are no samples of a closed surface, so gaps between them mean nothing.
     let coverage = if gaussians.is_some() { None } else { surfels::coverage(&scene, &bars)? };
     let lacking = [
         (preparation.estimated_normals > 0, if held.1 { "some normals" } else { "normals" }),
@@ -202,10 +203,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// The command that makes surfels of the input.
+/// Returns the command that makes surfels of the input.
 fn supplied_by(arguments: &Arguments) -> String {
     let Arguments { input, reading, .. } = arguments;
-    // Beside a pipe is no place for a file.
+    // The folder of a pipe is no place for the output.
     let output = if input.is_file() { input.with_extension("surfels.ply") } else { PathBuf::from("surfels.ply") };
     format!("epsplat surfels {}{} -o {}", input.display(), reading.arguments(), output.display())
 }
@@ -234,18 +235,19 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
     if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
-        // Rounded down: 100 % are all.
+        // Rounded down, so that 100 % means all.
         let percent = |share: f64| (1e4 * share).floor() / 100.0;
-        let open = if open > 0 { format!("; next to {open} one is open") } else { String::new() };
+        let open = if open > 0 { format!("; {open} have one") } else { String::new() };
         let _ = writeln!(
             text,
             "  coverage  {} % of the surfels have no open gap to their neighbours{open}",
             percent(covered)
         );
-        // The facets of a mesh meet at bends, next to which flat disks part.
+        // Not for meshes: where facets meet at an angle, flat disks leave gaps when seen aslant.
         if !info.is_mesh {
             let aslant = percent(covered_aslant);
-            let _ = writeln!(text, "            {aslant} % have none seen from {ASLANT} degrees over their plane");
+            let _ =
+                writeln!(text, "            {aslant} % have none when seen from {ASLANT} degrees above their plane");
         }
         if lone > 0 {
             let _ = writeln!(text, "            {lone} more have no surface around them");
@@ -262,10 +264,10 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));
     if let Some(command) = &info.supplied_by {
         let colors = if info.colors == "none" { " (but colours)" } else { "" };
-        let _ = writeln!(text, "What it lacks{colors} is estimated each time it is read; {command} keeps it.");
+        let _ = writeln!(text, "What it lacks{colors} is estimated at each reading; to store it, run {command}");
     }
     if info.is_mesh {
-        let _ = writeln!(text, "Its triangles are drawn as they are by epsplat render --triangles FILE.");
+        let _ = writeln!(text, "Its triangles are drawn without surfels by epsplat render --triangles FILE.");
     }
     for note in info.preparation.notes() {
         let _ = writeln!(text, "{note}");
@@ -273,7 +275,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     text
 }
 
-/// The lines of what the file says of itself.
+/// Writes the lines of the file's own description: format, scanner, attributes.
 fn told(text: &mut String, about: &About) {
     let mut line = |name: &str, what: &str| {
         // Writing to a string cannot fail.
@@ -305,21 +307,21 @@ fn told(text: &mut String, about: &About) {
     }
 }
 
-/// Names in a line, the first of many.
+/// Joins names with commas, at most the first 24.
 fn listed(names: &[String]) -> String {
-    /// Gaussians have 45 coefficients.
+    /// Gaussians have 45 attributes for the coefficients of harmonics alone.
     const MOST: usize = 24;
     let more = names.len().saturating_sub(MOST);
     let first = names[..names.len() - more].join(", ");
     if more > 0 { format!("{first} and {more} more") } else { first }
 }
 
-/// A name from a file on one line.
+/// Returns an attribute's name in one line: at most 40 characters, control characters replaced.
 fn shown(name: &str) -> String {
     name.chars().take(40).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
-/// The lines of what each point of the file has, and of what the file has beside them.
+/// Writes the lines of the points' attributes, classes, levels of detail, texture and triangles.
 fn held(text: &mut String, info: &Info) {
     let all = info.points;
     let given = |on: bool, with: Option<u64>| match with {
@@ -353,7 +355,7 @@ fn held(text: &mut String, info: &Info) {
             _ => writeln!(text, "  colours   {}", info.colors),
         };
     }
-    // One class says nothing.
+    // A single class is mostly a default value.
     if info.classes.len() > 1 {
         let named = |(class, count): (&u8, &u64)| match class_name(*class) {
             Some(name) => format!("{class} ({name}): {count}"),

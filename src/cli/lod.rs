@@ -1,4 +1,4 @@
-//! `epsplat lod`: surfels with levels of detail.
+//! `epsplat lod`: builds an octree of surfels with levels of detail.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -17,10 +17,11 @@ use super::{note, outputs, print, write_json};
 
 /// Build levels of detail for `render --lod`, written as PLY with the surfels.
 ///
-/// Points are divided at their mean into eight, until eight or fewer are left (Pajarola 2003). Each
-/// node of this octree is a surfel: the smallest ellipse with the shape of the points' covariance
-/// that bounds the disks below it, with their mean colour and normal. Surfels are written in the
-/// order of the tree, so other programs read the file as a cloud.
+/// Points are divided at their mean into octants until eight or fewer are left (Pajarola 2003).
+/// Each node of this octree is a surfel: the smallest ellipse with the shape of the points'
+/// covariance that bounds the disks below it, with their mean colour and normal. The surfels are
+/// written as the file's points, in the order of the tree, so other programs read the file as a
+/// cloud.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply\n  epsplat lod tiles/*.ply -o city.lod.ply --memory 4GiB"
@@ -30,37 +31,42 @@ pub struct Arguments {
     pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) reading: Reading,
-    /// The file: .ply
+    /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
     #[command(flatten)]
     limits: LimitArguments,
-    /// Write no tree, but a cut of it: nodes that fit with all below them into a ball of this radius, world units, in place of the surfels below them. Where these lie off a
-    /// node's cap it counts as larger, up to twice
+    /// Write a cut of the tree in place of the tree: nodes of up to this radius, world units
+    ///
+    /// A node replaces the surfels below it if all of them fit into a ball of this radius. A node
+    /// whose surfels deviate from its cap counts as larger, up to twice
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
-    /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of up to twice
-    /// its size. The same file as without
+    /// Limit the memory, such as 4GiB, by sorting the points in temporary files
+    ///
+    /// Inputs must be binary PLY files with normals and radii, or half-axes. The temporary files
+    /// are beside the output and up to twice its size. The output is the same as without the option
     #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
     memory: Option<u64>,
-    /// What the tree is like as JSON, to a file or - for stdout
+    /// Write the tree's counts and times as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
 
-/// The outcome.
+/// Counts and times of the tree, as text or JSON.
 #[derive(Serialize)]
 struct Report {
     surfels: u64,
     nodes: u64,
     levels: u64,
-    /// Surfels that were written in place of all, if a cut was.
+    /// Number of surfels in the cut that was written; None without `--cut`.
     #[serde(skip_serializing_if = "Option::is_none")]
     cut: Option<u64>,
-    /// Trees that were made one after the other, if memory was bounded.
+    /// Number of subtrees that were built one after the other; None without `--memory`.
     #[serde(skip_serializing_if = "Option::is_none")]
     subtrees: Option<u64>,
-    /// Seconds to read, to make surfels, to make the tree, and to write; together if memory was bounded.
+    /// Seconds to read, to make surfels, to build the tree, and to write; with `--memory` only
+    /// their sum.
     seconds: Vec<f64>,
 }
 
@@ -85,7 +91,7 @@ fn in_memory(arguments: &Arguments, bars: &Bars) -> Result<Report> {
     let inputs = arguments.reading.all(&arguments.inputs, bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;
     if inputs.iter().any(|points| points.texture.is_some()) {
-        note("warning: texture coordinates are left out, as levels of detail have none yet");
+        note("warning: texture coordinates are left out, as levels of detail do not support them");
     }
     let read = seconds();
     let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), bars)
@@ -111,7 +117,7 @@ fn in_memory(arguments: &Arguments, bars: &Bars) -> Result<Report> {
     })
 }
 
-/// Of points that are read piece by piece.
+/// Builds the tree within `memory` bytes from points that are read piece by piece.
 fn out_of_core(arguments: &Arguments, memory: u64, bars: &Bars) -> Result<Report> {
     let started = Instant::now();
     let files = arguments.reading.rows(&arguments.inputs)?;
@@ -129,10 +135,10 @@ fn out_of_core(arguments: &Arguments, memory: u64, bars: &Bars) -> Result<Report
     })
 }
 
-/// A positive length, world units.
+/// Parses a positive length, world units.
 fn parse_length(text: &str) -> std::result::Result<f64, String> {
     let length: Option<f64> = text.parse().ok().filter(|length: &f64| length.is_finite() && *length > 0.0);
-    length.ok_or_else(|| format!("'{text}' is no length: a positive number, world units"))
+    length.ok_or_else(|| format!("'{text}' is not a length: give a positive number of world units"))
 }
 
 fn summary(report: &Report) -> String {

@@ -1,4 +1,4 @@
-//! One file per subcommand; no maths.
+//! The command line: one file for each subcommand. All computation is in the library.
 
 mod adapters;
 mod bench;
@@ -43,7 +43,7 @@ Measuring:
   bench      Run a study of speed beside error: every configuration on every scene of a TOML file
   hardcases  Render hard scenes with every accumulator and judge each pixel by a derived bound
   card       Make a record of an adapter in limited time: accuracy, equal bits, speed
-  adapters   List the adapters, with their limits and features, and the one that auto takes
+  adapters   List the adapters, with their limits and features, and the one that auto selects
 
 Exit codes: 0 done, 1 the run failed, 2 the arguments cannot be used.";
 
@@ -69,7 +69,7 @@ enum Command {
     Adapters(adapters::Arguments),
 }
 
-/// Runs the command line and says how it ended.
+/// Parses the arguments, runs the subcommand, and returns its exit code after printing any error.
 pub fn run() -> ExitCode {
     signals::watch();
     let outcome = match Arguments::parse().command {
@@ -98,19 +98,19 @@ pub fn run() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Nobody may be listening any more, which is no reason to panic.
+            // `eprintln!` would panic if stderr is closed.
             let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::from(error.exit_code())
         }
     }
 }
 
-/// One line on stderr that is no error.
+/// Prints a note or a warning, one line, to stderr. Ignores a closed stderr.
 fn note(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Text on stdout; a closed pipe ends it quietly.
+/// Prints `text` to stdout. A closed pipe is not an error.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::write(Path::new("standard output"), e)),
@@ -118,7 +118,7 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Writes `value` as JSON to the file, or to stdout for `-`.
+/// Writes `value` as JSON to the file at `path`, or to stdout for `-`.
 fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::write(path, e.into()))?;
     text.push('\n');

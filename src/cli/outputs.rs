@@ -1,5 +1,5 @@
-//! What a command writes takes the place neither of what it reads nor of what else it writes, and can be written: found out
-//! before anything is read.
+//! Checks of outputs before anything is read: they can be written and overwrite neither inputs nor
+//! each other.
 
 use std::collections::HashMap;
 use std::fs::Metadata;
@@ -13,9 +13,9 @@ use super::note;
 /// A file that a command reads.
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
-    /// A cloud or a mesh, of this format if one is given: it may name other files.
+    /// A cloud or a mesh, which may name other files, such as textures. The format is optional.
     Cloud(&'a Path, Option<Format>),
-    /// Another file.
+    /// A file that names no other files.
     Other(&'a Path),
 }
 
@@ -35,7 +35,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Refuses outputs that cannot be written, or that [`check_distinct`] refuses.
+/// Fails for outputs that cannot be written, and where [`check_distinct`] fails.
 pub(super) fn check<'a, O: AsRef<Path>>(
     inputs: impl IntoIterator<Item = Source<'a>>,
     outputs: impl IntoIterator<Item = O>,
@@ -45,14 +45,15 @@ pub(super) fn check<'a, O: AsRef<Path>>(
     outputs.iter().try_for_each(|output| try_output(output.as_ref()))
 }
 
-/// Refuses an output that cannot be written.
+/// Fails if the output cannot be written. `-`, stdout, always can.
 pub(super) fn try_output(output: &Path) -> Result<()> {
     if output == Path::new("-") { Ok(()) } else { atomic::try_output(output) }
 }
 
-/// Refuses outputs that would overwrite an input, a file that is read with one because it or
-/// another names it, or each other: under another name too, by a symbolic link or a hard one. What
-/// is no file (a device, a pipe, `-` for stdout) overwrites nothing.
+/// Fails for outputs that would overwrite an input, a file that an input names, or each other.
+///
+/// Files are recognised under other names too, by symbolic and hard links. Outputs that are no
+/// files (a device, a pipe, `-` for stdout) overwrite nothing.
 pub(super) fn check_distinct<'a, O: AsRef<Path>>(
     inputs: impl IntoIterator<Item = Source<'a>>,
     outputs: impl IntoIterator<Item = O>,
@@ -66,7 +67,7 @@ pub(super) fn check_distinct<'a, O: AsRef<Path>>(
         if let Some(other) = written.add(output) {
             let (output, other) = (output.display(), other.display());
             return Err(Error::Usage(format!(
-                "{output} and {other} are one file, of which the second would overwrite the first: give them different names"
+                "{output} and {other} are the same file, so one output would overwrite the other: give them different names"
             )));
         }
     }
@@ -76,12 +77,12 @@ pub(super) fn check_distinct<'a, O: AsRef<Path>>(
     }
     let inputs: Vec<Source<'_>> = inputs.into_iter().collect();
     inputs.iter().try_for_each(|input| written.check_against(input.path()))?;
-    // Whoever writes to streams alone, such as stdout, need not know.
+    // Commands that write only to streams, such as stdout, do not need the files that inputs name.
     let named = if written.is_empty() { Vec::new() } else { all_named(inputs)? };
     named.iter().try_for_each(|named| written.check_against(named))
 }
 
-/// The files that are read at second hand with these inputs.
+/// Returns the files that these inputs name, such as textures, and that are read with them.
 pub(super) fn all_named<'a>(inputs: impl IntoIterator<Item = Source<'a>>) -> Result<Vec<PathBuf>> {
     let mut named = Vec::new();
     for input in inputs {
@@ -92,20 +93,22 @@ pub(super) fn all_named<'a>(inputs: impl IntoIterator<Item = Source<'a>>) -> Res
     Ok(named)
 }
 
-/// Refuses a file that a line of a PLY header cannot name.
+/// Fails for a file whose name cannot be written in a line of a PLY header.
 pub(super) fn check_named_in_ply(path: &Path) -> Result<()> {
     let name = path.to_str().filter(|name| name.trim() == *name && !name.contains(|c: char| c.is_control()));
     match name.filter(|name| cfg!(windows) || !name.contains('\\')) {
         Some(_) => Ok(()),
         None => Err(Error::Usage(format!(
-            "{} has a character, or a space at an end, with which a PLY file cannot name it: choose another name",
+            "{} cannot be named in a PLY file, because of a character or a space at an end: choose another name",
             path.display()
         ))),
     }
 }
 
-/// The mesh that `output` is drawn beside if the one input is, by its name: both lie in one folder.
-/// A mesh of another folder or of several inputs is left out, and told.
+/// Returns the name of the mesh whose triangles are drawn with the surfels of `output`.
+///
+/// It is the mesh that the only input names, if that lies in the folder of `output`. Otherwise the
+/// meshes are left out, with a warning for each.
 pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>> {
     let meshes: Vec<&PathBuf> = inputs.iter().filter_map(|points| points.beside.as_ref()).collect();
     if let ([mesh], [_], Some(name)) = (meshes.as_slice(), inputs, meshes.first().and_then(|mesh| mesh.file_name())) {
@@ -129,21 +132,21 @@ pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>
     Ok(None)
 }
 
-/// Files that are written, by what makes them one: the place that a path leads to, and the file that is there already.
+/// Files to be written, by their resolved path and, if they exist, by their identity on disk.
 #[derive(Default)]
 struct Files {
     places: HashMap<PathBuf, PathBuf>,
     nodes: HashMap<Node, PathBuf>,
-    /// Files that streams lead to, such as a redirected stdout.
+    /// Existing files behind streams, such as a redirected stdout.
     streams: HashMap<Node, PathBuf>,
 }
 
 impl Files {
-    /// Adds a file; returns the path under which it is known already.
+    /// Adds a file. If it is there already, returns the path under which it was added.
     fn add(&mut self, path: &Path) -> Option<PathBuf> {
         let Some(place) = atomic::place_of(path) else {
-            // A stream may lead to a file all the same: two outputs may follow each other there,
-            // but it is no input.
+            // A stream such as a redirected stdout may end in a file. Several outputs may be
+            // written to it one after the other, but it must not be an input.
             self.streams.extend(node_of(path).map(|node| (node, path.to_owned())));
             return None;
         };
@@ -161,7 +164,7 @@ impl Files {
         self.places.is_empty() && self.streams.is_empty()
     }
 
-    /// Refuses to overwrite a file that is read.
+    /// Fails if the file `read`, an input, would be overwritten.
     fn check_against(&self, read: &Path) -> Result<()> {
         let standard = read == Path::new("-");
         let node = if standard { standard_input() } else { node_of(read) };
@@ -180,7 +183,7 @@ impl Files {
         place.or_else(|| self.nodes.get(&node_of(path)?)).map(PathBuf::as_path)
     }
 
-    /// A file, and another that would need it to be a folder.
+    /// Returns a file and another one that would lie in it as in a folder, if there are such.
     fn file_as_folder(&self) -> Option<(&Path, &Path)> {
         self.places.iter().find_map(|(place, inside)| {
             let file = place.ancestors().skip(1).find_map(|folder| self.places.get(folder))?;
@@ -189,18 +192,18 @@ impl Files {
     }
 }
 
-/// What a file is, whatever its names.
+/// Identity of a file under all its names: device and inode on Unix, otherwise the canonical path.
 #[cfg(unix)]
 type Node = (u64, u64);
 #[cfg(not(unix))]
 type Node = PathBuf;
 
-/// The file that is at `path` now. Of what is no file there is none.
+/// Returns the identity of the regular file that `path` leads to, or None if there is none.
 fn node_of(path: &Path) -> Option<Node> {
     std::fs::metadata(path).ok().filter(Metadata::is_file).and_then(|there| node(path, &there))
 }
 
-/// The file that standard input is, if it is one.
+/// Returns the identity of the file that standard input is redirected from, if it is one.
 #[cfg(unix)]
 fn standard_input() -> Option<Node> {
     use std::os::fd::AsFd;

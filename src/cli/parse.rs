@@ -1,10 +1,10 @@
-//! Values of arguments: texts into numbers, or a sentence that says what is expected.
+//! Parsers of argument values. Errors are sentences that say what is expected.
 
 use epsplat::options::values::numbers;
 use epsplat::surfels::Orientation;
 use glam::DVec3;
 
-/// `WIDTHxHEIGHT`, pixels.
+/// Parses a size in pixels: `WIDTHxHEIGHT`.
 pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
@@ -13,7 +13,7 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
-/// A factor that makes pictures larger or smaller.
+/// Parses a positive factor of the size of pictures.
 pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(factor),
@@ -21,7 +21,7 @@ pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
     }
 }
 
-/// `X,Y,Z`.
+/// Parses a vector: `X,Y,Z`.
 pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
     match numbers(text).map_err(|error| error.to_string())?[..] {
         [x, y, z] => Ok(DVec3::new(x, y, z)),
@@ -29,7 +29,7 @@ pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
     }
 }
 
-/// `X,Y,Z`, or an axis by its name: x, y, z, -x, -y or -z.
+/// Parses a direction: `X,Y,Z`, or the name of an axis: x, y, z, -x, -y or -z.
 pub(super) fn parse_up(text: &str) -> Result<DVec3, String> {
     let (name, sign) = text.strip_prefix('-').map_or((text, 1.0), |name| (name, -1.0));
     match name {
@@ -40,7 +40,7 @@ pub(super) fn parse_up(text: &str) -> Result<DVec3, String> {
     }
 }
 
-/// A direction as [`parse_up`] reads it: the axis by its name, if it is one.
+/// Formats a direction for [`parse_up`]: by its name if it is an axis.
 pub(super) fn up_argument(up: DVec3) -> String {
     let axes = [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")];
     let named = |(axis, name): (DVec3, &str)| match up {
@@ -51,12 +51,12 @@ pub(super) fn up_argument(up: DVec3) -> String {
     axes.into_iter().find_map(named).unwrap_or_else(|| vector_argument(up))
 }
 
-/// A vector as [`parse_vector`] reads it, to the last bit.
+/// Formats a vector for [`parse_vector`], which restores it exactly.
 pub(super) fn vector_argument(v: DVec3) -> String {
     format!("{},{},{}", v.x, v.y, v.z)
 }
 
-/// `propagate`, `up`, or the `X,Y,Z` of a scanner.
+/// Parses an orientation: `propagate`, `up`, or the position `X,Y,Z` of a scanner.
 pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
     match text {
         "propagate" => Ok(Orientation::Propagate),
@@ -67,7 +67,7 @@ pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
     }
 }
 
-/// Bytes of memory: `2GiB`, `512MiB` or `4GB`.
+/// Parses a size of memory, such as `2GiB`, `512MiB` or `4GB`, and returns bytes.
 pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
     let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("TiB", 40)].map(|(unit, power)| (unit, 2f64.powi(power)));
     let decimal = [("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
@@ -77,10 +77,10 @@ pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
     let bytes = bytes.filter(|bytes| *bytes > 0.0 && *bytes < 1e18);
     bytes
         .map(|bytes| bytes as u64)
-        .ok_or_else(|| format!("'{text}' is no size of memory: a number and a unit, 2GiB or 512MiB"))
+        .ok_or_else(|| format!("'{text}' is not a size of memory: give a number and a unit, such as 2GiB or 512MiB"))
 }
 
-/// `FX,FY,CX,CY`, pixels.
+/// Parses intrinsics in pixels: `FX,FY,CX,CY`.
 pub(super) fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
     numbers(text)
         .map_err(|error| error.to_string())?

@@ -7,7 +7,9 @@ use std::time::Duration;
 use epsplat::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// A bar per stage on stderr, gone when the stage ends; silent if stderr is no terminal.
+/// A progress bar on stderr for each stage, cleared when the stage ends.
+///
+/// Nothing is printed if stderr is not a terminal.
 pub struct Bars(Option<Mutex<ProgressBar>>);
 
 impl Bars {
@@ -31,7 +33,7 @@ impl Progress for Bars {
             } else {
                 "{spinner} {msg:24} {elapsed}"
             };
-            // The templates are constants that parse; the default serves should one ever not.
+            // Both templates are valid. The default style avoids a panic in any case.
             bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_message(what.to_owned());
             bar.enable_steady_tick(Duration::from_millis(120));

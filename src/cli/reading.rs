@@ -1,4 +1,4 @@
-//! How commands read their inputs, and what their help says of them.
+//! Input options shared by the subcommands: help texts, folders, and reading of files.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,65 +15,65 @@ use super::note;
 use super::outputs::Source;
 use super::progress::Bars;
 
-/// Files of folders that a sentence names where they cannot be read.
+/// Most unreadable files of folders that a note names.
 const MOST_NAMED: usize = 8;
 
-/// The format of inputs, and the attributes that are left out.
+/// Options for the format of the inputs and for attributes to ignore.
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
 pub(super) struct InputFormat {
-    /// Format of the inputs [default: by their names, or else their first bytes]
+    /// Format of the inputs [default: from their names, or else their first bytes]
     #[arg(long, value_name = "FORMAT", value_parser = formats(), hide_short_help = true)]
     input_format: Option<Format>,
-    /// Leave out the alphas of colours, which some programs fill with other values
+    /// Ignore the alphas of colours, where some programs store other values
     ///
-    /// The opacities of Gaussians stay
+    /// The opacities of Gaussians are still used
     #[arg(long, hide_short_help = true)]
     ignore_alpha: bool,
 }
 
-/// How point clouds are read.
+/// Options for reading point clouds.
 #[derive(Args)]
 #[command(next_help_heading = "Input")]
 pub(super) struct Reading {
     #[command(flatten)]
     input: InputFormat,
-    /// Keep the points that a LAS file marks as withheld (deleted); else they are left out
+    /// Keep points that a LAS file marks as withheld (deleted), which are left out by default
     #[arg(long, hide_short_help = true)]
     keep_withheld: bool,
     /// Opacities of LAS classes: CLASS:A or FIRST-LAST:A, such as 3-5:0.3,7:0
     ///
-    /// The example makes trees thin and leaves noise out. Points of opacity 0 are left out and
-    /// counted; others show through with render --composite
+    /// The example makes vegetation (3 to 5) transparent and leaves out noise (7). Points of
+    /// opacity 0 are left out and counted; others are transparent with render --composite
     #[arg(long, value_name = "RULES", hide_short_help = true)]
     pub(super) class_opacity: Option<ClassOpacities>,
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis
     #[arg(long, hide_short_help = true)]
     flatten: bool,
-    /// Refuse inputs of which a part cannot be read; else the rest is drawn
+    /// Fail if a part of an input cannot be read; by default the rest is drawn
     ///
-    /// A part is a file of a folder, a scan of an E57 file, a chunk of a LAZ or a node of a COPC
-    /// file. A note names the parts that are left out
+    /// A part is a file of a folder, a scan of an E57 file, a chunk of a LAZ file or a node of a
+    /// COPC file. A note names the parts that are left out
     #[arg(long, hide_short_help = true)]
     strict: bool,
-    /// Inputs that were found in folders.
+    /// Paths of the inputs that were found in folders.
     #[arg(skip)]
     of_folders: BTreeSet<PathBuf>,
 }
 
-/// Which points become surfels, and how large those may be.
+/// Options for outliers and for the size and shape of estimated surfels.
 #[derive(Args)]
 #[command(next_help_heading = "Surfels from points")]
 pub(super) struct LimitArguments {
-    /// Drop stray points: those K standard deviations farther from their neighbours than the mean
+    /// Drop outliers: points K standard deviations farther from their neighbours than the mean
     ///
-    /// The distance is the mean one to 16 neighbours
+    /// A point's distance is its mean distance to 16 neighbours
     #[arg(long, value_name = "K", hide_short_help = true)]
     outliers: Option<f64>,
-    /// Largest estimated half-axis, as a factor of the neighbours' median; inf for no limit
+    /// Largest estimated half-axis, as a multiple of the neighbours' median; inf for no limit
     #[arg(long, value_name = "FACTOR", default_value = "3", hide_short_help = true)]
     max_radius: f64,
-    /// Estimate flat disks in place of disks that curve as the surface does: faster frames
+    /// Estimate flat disks instead of disks that curve with the surface: faster frames
     #[arg(long)]
     flat: bool,
 }
@@ -84,18 +84,20 @@ impl LimitArguments {
     }
 }
 
-/// The formats of this build.
+/// Parses the names of the formats that this build reads.
 fn formats() -> impl TypedValueParser<Value = Format> {
     let names = Format::READ.iter().map(|(name, _)| *name);
     PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
 }
 
-/// Puts the files of a folder in its place, in the order of their names: those that are read by
-/// these names, and do not begin with a dot, as what programs and systems keep for themselves does.
+/// Replaces each folder among the inputs by its readable files, sorted by name.
+///
+/// A file is readable if its extension is a format's name. Names with a leading dot are skipped, as
+/// they are files that programs and systems store for themselves. Subfolders are not searched.
 ///
 /// # Errors
 ///
-/// [`Error::Read`] where the system cannot list them, [`Error::Usage`] where there is none.
+/// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file.
 pub(super) fn with_folders(inputs: &mut Vec<PathBuf>, reading: &mut Reading) -> Result<()> {
     let is_read = |path: &PathBuf| {
         if path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b".")) {
@@ -123,18 +125,18 @@ pub(super) fn with_folders(inputs: &mut Vec<PathBuf>, reading: &mut Reading) -> 
     Ok(())
 }
 
-/// The help of inputs that are `what`.
+/// Returns the help text of an input: `what` it is and its file extensions.
 pub(super) fn help_of(what: &str) -> String {
     let extensions: Vec<_> = Format::READ.iter().map(|(name, _)| format!(".{name}")).collect();
     format!("{what}: {}; - is standard input", extensions.join(", "))
 }
 
-/// The same of inputs that may be folders.
+/// Returns the help text of inputs that may also be folders.
 pub(super) fn help_of_all(what: &str) -> String {
     format!("{}; a folder stands for its files", help_of(what))
 }
 
-/// What is wrong with a scene, with the name of its file if there is one.
+/// Adds the file's name to an [`Error::EmptyScene`] if the scene has exactly one input.
 pub(super) fn named(error: Error, inputs: &[PathBuf]) -> Error {
     match (error, inputs) {
         (Error::EmptyScene(what), [input]) => Error::malformed(input, what),
@@ -143,17 +145,21 @@ pub(super) fn named(error: Error, inputs: &[PathBuf]) -> Error {
 }
 
 impl InputFormat {
-    /// A file that is read as this says.
+    /// Returns the file at `path` with this format, for checks of outputs.
     pub(super) fn source<'a>(&self, path: &'a Path) -> Source<'a> {
         Source::Cloud(path, self.input_format)
     }
 
-    /// The triangles of a mesh.
+    /// Reads a mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if `--input-format` is neither obj nor ply, or an error of reading.
     pub(super) fn mesh(&self, path: &Path, bars: &Bars) -> Result<Mesh> {
         let format = self.input_format;
         if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
             return Err(Error::Usage(
-                "only obj and ply files are read as meshes: choose one of them for --input-format".into(),
+                "only obj and ply files can be read as meshes: choose one of them for --input-format".into(),
             ));
         }
         let options = ReadOptions { format, ignore_alpha: self.ignore_alpha, ..ReadOptions::default() };
@@ -162,20 +168,20 @@ impl InputFormat {
 }
 
 impl Reading {
-    /// The files that are read as this says.
+    /// Returns the files with their format, for checks of outputs.
     pub(super) fn sources<'a>(&self, paths: &'a [PathBuf]) -> impl Iterator<Item = Source<'a>> + use<'a> {
         let format = self.input.input_format;
         paths.iter().map(move |path| Source::Cloud(path, format))
     }
 
-    /// The points of a file, with what it says of itself.
+    /// Reads the points of a file and the description in its header ([`Points::about`]).
     pub(super) fn described(&self, path: &Path, bars: &Bars) -> Result<Points> {
         let points = io::read_with(path, ReadOptions { describe: true, ..self.options() }, bars)?;
         self.check_classes(std::slice::from_ref(&points))?;
         Ok(points)
     }
 
-    /// Whether alphas are left out.
+    /// Returns true if `--ignore-alpha` is given.
     pub(super) fn ignores_alpha(&self) -> bool {
         self.input.ignore_alpha
     }
@@ -192,8 +198,11 @@ impl Reading {
         }
     }
 
-    /// Opens or reads each file, and gives a sentence for those that were left out,
-    /// for which `stands_in` is there: files of folders that cannot be read.
+    /// Opens or reads each file. Returns the results and a sentence that names unreadable files.
+    ///
+    /// Unless `--strict` is given, a file of a folder that cannot be read is replaced by
+    /// `stands_in()`, or left out if that is None. If no file can be read, the first error is
+    /// returned.
     fn each<T>(
         &self,
         paths: &[PathBuf],
@@ -226,7 +235,9 @@ impl Reading {
         Ok((all, (count > 0).then_some(sentence)))
     }
 
-    /// The files, if all of them are COPC and can be read in parts: standard input is read once.
+    /// Opens the files as octrees if all of them are COPC. Otherwise returns None.
+    ///
+    /// Standard input is never an octree, as it cannot seek to a node.
     pub(super) fn octrees(&self, paths: &[PathBuf]) -> Result<Option<Vec<Copc>>> {
         let open = |path: &Path| {
             let is_file = path.is_file() && path != Path::new("-");
@@ -238,13 +249,18 @@ impl Reading {
         Ok(files)
     }
 
-    /// The file, if it has levels of detail and can be read in parts.
+    /// Opens the file if it is a regular file with levels of detail. Otherwise returns None.
     pub(super) fn levels(&self, path: &Path) -> Result<Option<Levels>> {
         let is_file = path.is_file() && path != Path::new("-");
         if is_file { Levels::open(Input::open(path, self.input.input_format)?) } else { Ok(None) }
     }
 
-    /// The files, whose points are read piece by piece.
+    /// Opens the files for reading their points piece by piece.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if a file cannot be read like this, for example because it is not binary
+    /// PLY.
     pub(super) fn rows(&self, paths: &[PathBuf]) -> Result<Vec<Rows>> {
         let open = |path: &Path| {
             let is_file = path.is_file() && path != Path::new("-");
@@ -252,7 +268,7 @@ impl Reading {
             let rows = input.map_or(Ok(None), |input| Rows::open(input, self.input.ignore_alpha))?;
             rows.ok_or_else(|| {
                 Error::Usage(format!(
-                    "--memory takes binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, and {} is another one: make surfels of it first (epsplat surfels), or leave it out",
+                    "--memory needs binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, which {} is not: make surfels of it first (epsplat surfels), or leave --memory out",
                     path.display()
                 ))
             })
@@ -263,8 +279,10 @@ impl Reading {
         Ok(files)
     }
 
-    /// The points of some nodes of each of several files; what their colours mean is told by the
-    /// first ones that are read with these `rules`.
+    /// Reads the points of the given nodes of each file.
+    ///
+    /// The first points read with `rules` decide how colours are interpreted, so that later calls
+    /// with the same rules agree.
     pub(super) fn nodes<'a>(
         &self,
         files: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
@@ -278,10 +296,10 @@ impl Reading {
         Ok(points)
     }
 
-    /// Fails for opacities of classes if none of the inputs has classes.
+    /// Fails if `--class-opacity` is given and none of the inputs has classes.
     fn check_classes(&self, inputs: &[Points]) -> Result<()> {
         let plain = self.class_opacity.is_none_or(|opacities| opacities.are_plain());
-        // Who has no points has no classes.
+        // An input without points may be a LAS file: only inputs with points show what is missing.
         let none = inputs.iter().all(|input| input.classes.is_empty() && !input.positions.is_empty());
         if plain || !none {
             return Ok(());
@@ -289,22 +307,23 @@ impl Reading {
         Err(Error::Usage("no input has points with classes, which LAS files have: leave --class-opacity out".into()))
     }
 
-    /// The points of each of several files.
+    /// Reads the points of each file, one entry for each path.
     pub(super) fn all(&self, paths: &[PathBuf], bars: &Bars) -> Result<Vec<Points>> {
         if paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
-            return Err(Error::Usage("standard input can be read once only: name - once".into()));
+            return Err(Error::Usage("standard input can be read only once: give - once".into()));
         }
         let read = |path: &Path| io::read_raw(path, self.options(), bars);
         let (mut inputs, left_out) = self.each(paths, read, || Some(Points::default()))?;
-        // Inputs keep their numbers, so that one without points stands for each that is left out.
+        // An unreadable file has an entry without points, so that indices of inputs stay those of
+        // `paths`.
         inputs.iter_mut().take(1).for_each(|first| first.unread.extend(left_out.clone()));
-        // Two tiles of one scan have one white.
+        // All tiles of one scan must use the same white point.
         io::settle_colors(&mut inputs);
         self.check_classes(&inputs)?;
         Ok(inputs)
     }
 
-    /// These options as arguments, for a command that reads the same file.
+    /// Returns these options as arguments, each after a space, for a command that reads the file.
     pub(super) fn arguments(&self) -> String {
         let format = self.input.input_format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
         let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));

@@ -1,4 +1,4 @@
-//! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
+//! `epsplat render`: renders files to an image with its maps, or to one image for each camera.
 
 mod arguments;
 mod levels;
@@ -36,7 +36,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// A single picture.
+/// Renders a single picture.
 fn one(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     let settings = settings(arguments, format)?;
@@ -67,28 +67,28 @@ fn one(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// What a single picture leaves as JSON.
+/// The JSON report of a single picture.
 #[derive(Serialize)]
 struct Outcome<'a> {
     #[serde(flatten)]
     report: &'a Report,
     view: ToldView,
-    /// None where the inputs were not read in parts.
+    /// Counts of what was read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<Read>,
 }
 
-/// All that a single picture is made of.
+/// Everything needed to render a single picture.
 struct Staged {
     made: Made,
     settings: Settings,
     camera: Camera,
     seen: Seen,
-    /// Of files that were read in parts.
+    /// Counts of what was read; None if the inputs were read whole.
     read: Option<Read>,
 }
 
-/// The scene of a single picture, for which files with levels of detail are read as far as it takes them.
+/// Reads the scene of a single picture: of files with levels of detail only the needed nodes.
 fn staged(arguments: &Arguments, settings: Settings, view: &View, bars: &Bars) -> Result<Staged> {
     let told = |(_, preparation): &Made| preparation.notes().iter().for_each(|line| note(line));
     if let Some(mut parts) = Parts::of(arguments, &settings, bars)? {

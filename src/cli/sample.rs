@@ -1,4 +1,4 @@
-//! `epsplat sample`: surfels from the triangles of a mesh.
+//! `epsplat sample`: samples the triangles of a mesh as surfels.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,48 +16,48 @@ use super::{note, outputs};
 
 /// Cover a mesh with a given number of surfels, written as PLY.
 ///
-/// The surfels lie on the mesh's triangles and take its colours, normals and texture coordinates. The
-/// mesh is divided into voxels, which share the samples by priority: triangles (their number in the
-/// voxel), touched (the same, counting a triangle wholly wherever it reaches), area, curvature (where
-/// the surface bends) or texture (where the colour changes).
+/// The surfels lie on the mesh's triangles and have its colours, normals and texture coordinates.
+/// The mesh is divided into voxels, and the samples are distributed to them by priority: triangles
+/// (their number in the voxel), touched (the same, but a triangle counts fully in each voxel that
+/// it touches), area, curvature (where the surface bends) or texture (where the colour changes).
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
-    /// The mesh: .obj or .ply; - is standard input
+    /// Mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
     #[command(flatten)]
     input: InputFormat,
-    /// The file: .ply
+    /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// Samples
+    /// Number of samples
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST as u64))]
     count: u64,
-    /// triangles, touched (as in Tien 2008), area, curvature or texture
+    /// Priority of voxels: triangles, touched (as in Tien 2008), area, curvature or texture
     #[arg(long, default_value = "triangles")]
     priority: Priority,
     /// How samples are placed
     #[arg(long, value_enum, default_value = "stratified")]
     method: Placement,
-    /// What surfels are: disk (ellipses in their planes) or cap (curved as the surface is around them)
+    /// Shape of surfels
     #[arg(long, value_enum, default_value = "disk")]
     shape: Shape,
-    /// How often the mesh's box is halved; else until there is a voxel for every four samples
+    /// Number of halvings of the mesh's box into voxels [default: one voxel per four samples]
     #[arg(long, value_name = "HALVINGS", value_parser = clap::value_parser!(u32).range(0..=60))]
     depth: Option<u32>,
-    /// An image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
+    /// Image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
-    /// Another seed gives other samples, but of projected ones
+    /// Seed of the random samples; not used by --method projected
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Placement {
-    /// By the priority of voxels, and spread evenly
+    /// By the priority of voxels, spread evenly over the triangles
     Stratified,
-    /// By the priority of voxels, at points of these projected onto their triangles, as in Tien 2008: a baseline
+    /// By the priority of voxels, projected onto their triangles as in Tien 2008: a baseline
     Projected,
     /// Independent random points, by area: a baseline without radii
     Uniform,
@@ -67,7 +67,7 @@ enum Placement {
 enum Shape {
     /// Ellipses in their planes
     Disk,
-    /// Curved as the surface is around them
+    /// Ellipses that curve with the surface around them
     Cap,
 }
 
@@ -107,22 +107,22 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         note(&format!("to paint them by their images: epsplat render {}{painted}", quoted(&arguments.output)));
         let dyed = |material: &Material| material.texture.is_some() && material.diffuse != [1.0; 4];
         if mesh.materials.iter().any(dyed) {
-            note("their own colours are those of the images times the materials' colours, which --texture leaves out");
+            note("the surfels' own colours are images times materials' colours; --texture leaves the latter out");
         }
         if mesh.materials.iter().any(Material::clamps) {
-            note("materials say -clamp on, which --texture leaves out: it repeats images beyond their edges");
+            note("the option -clamp on of materials is ignored by --texture: images repeat beyond their edges");
         }
     }
     Ok(())
 }
 
-/// A path as a shell reads it.
+/// Returns a path quoted for a shell if it has characters that need it.
 fn quoted(path: &Path) -> String {
     let path = path.display().to_string();
     if path.contains([' ', '(', ')', '&', '$']) { format!("'{path}'") } else { path }
 }
 
-/// The files of a mesh's textures, by their numbers.
+/// Returns the image files of a mesh's textures, in the order of their numbers.
 fn images(mesh: &Mesh) -> Vec<PathBuf> {
     let (textures, _) = mesh.textures();
     let image = |texture: &Arc<Texture>| {

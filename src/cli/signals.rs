@@ -1,31 +1,33 @@
-//! Signals that end a run: what it was writing goes with it.
+//! Signals that end a run: its temporary files are removed.
 
 #[cfg(unix)]
 use std::sync::{Arc, atomic::AtomicBool};
 
-/// From here on SIGINT, SIGTERM, SIGHUP and SIGXCPU, of a limit of processor time, remove the
-/// temporary files and end the run with the exit code that a shell gives them: 130, 143, 129, 152.
-/// Signals that were ignored at the start, as `nohup` has it, stay so. At a limit of the size of
-/// files, whose SIGXFSZ would end the run at once, writing fails instead. An abort, as where memory
-/// ends, exits with 1.
+/// Installs the signal handlers.
+///
+/// - SIGINT, SIGTERM, SIGHUP and SIGXCPU (limit of processor time) remove the temporary files and
+///   end the run with the exit code that a shell gives them: 130, 143, 129, 152. Signals that were
+///   ignored at the start, as with `nohup`, stay ignored.
+/// - SIGXFSZ (limit of file size) would end the run at once: instead, writing fails.
+/// - SIGABRT, as when memory runs out, exits with 1.
 #[cfg(unix)]
 pub fn watch() {
     use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM, SIGXCPU, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
-    // An allocation that fails says so, and aborts: a run that failed has the exit code 1, as
-    // others do.
+    // A failed allocation prints a message and aborts. Like every failed run it must exit with 1.
     let _ = signal_hook::flag::register_conditional_shutdown(SIGABRT, 1, Arc::new(AtomicBool::new(true)));
-    // Nobody looks at the flag: with a handler the system call returns an error.
+    // The flag is never read: with any handler the system call returns an error.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     let ignored = ignored();
     let watched = [SIGHUP, SIGINT, SIGTERM, SIGXCPU].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    // Without its handler a signal ends the run as it always did.
+    // Without handlers the signals end the run as by default, and temporary files remain.
     let Ok(mut signals) = Signals::new(watched) else { return };
     std::thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
             epsplat::io::atomic::abandon();
-            // Not by way of destructors: threads of graphics drivers are still at work.
+            // Skips destructors and exit handlers, as threads of graphics drivers are still
+            // running.
             signal_hook::low_level::exit(128 + signal);
         }
     });
@@ -34,8 +36,9 @@ pub fn watch() {
 #[cfg(not(unix))]
 pub fn watch() {}
 
-/// The signals that are ignored, a bit each, the lowest for number 1, SIGHUP; that one where the system does not say, as
-/// `nohup` may have it.
+/// Returns the mask of ignored signals: bit `n - 1` for signal `n`.
+///
+/// Without `/proc/self/status` it has SIGHUP (1), which `nohup` may have set to be ignored.
 #[cfg(unix)]
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! `epsplat simplify`: fewer, larger surfels for the same surface.
+//! `epsplat simplify`: replaces surfels by fewer, larger ones.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -17,36 +17,40 @@ use super::{note, outputs, print, write_json};
 
 /// Replace surfels by fewer, larger ones within a tolerance, without holes.
 ///
-/// Around each point grows the largest disk whose points all lie within the tolerance of it, and few
-/// of these disks are selected that cover the surface together. Flat parts keep few surfels, edges
-/// and details keep theirs. Texture coordinates stay, with their slopes, and no surfel stands for
-/// points on both sides of a seam.
+/// A disk grows around each point while all of its points lie within the tolerance of it, and a few
+/// of these disks are selected that together cover the surface. Flat parts have few surfels left,
+/// edges and details most of theirs. Texture coordinates and their slopes are kept, and no surfel
+/// replaces points on both sides of a seam.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
 )]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Point clouds or meshes, of which the vertices are taken"))]
+    #[arg(required = true, help = help_of("Point clouds or meshes, whose vertices are used"))]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
-    /// The file: .ply
+    /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// How far points may lie from their surfel: rel:E (fraction of the diagonal of their box) or abs:E (world units)
+    /// Largest distance of points from their surfel: rel:E (of the diagonal) or abs:E (world units)
+    ///
+    /// The diagonal is that of the points' bounding box
     #[arg(long, default_value = "rel:0.0005")]
     tolerance: Tolerance,
-    /// What surfels grow to
+    /// Shape of surfels
     #[arg(long, value_enum, default_value_t = ShapeName::Disk)]
     shape: ShapeName,
-    /// Rounds in which surfels move until some are not needed; more than 3 hardly change anything
+    /// Rounds in which surfels move so that some are not needed; more than 3 hardly change anything
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     relax: u32,
-    /// cells, without holes; or thesis:R, disks as Tien 2008 selects them, to compare with: each conquers what is within R (0.5 to 0.7
-    /// there) of its radius, and holes may be left
+    /// Selection of surfels: cells (without holes) or thesis:R (as in Tien 2008, a baseline)
+    ///
+    /// With thesis:R each selected disk covers the points within R times its radius (0.5 to 0.7 in
+    /// the thesis), and holes may be left
     #[arg(long, value_name = "HOW", default_value = "cells")]
     cover: Cover,
-    /// Counts and deviations as JSON, to a file or - for stdout
+    /// Write counts and deviations as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
@@ -55,13 +59,13 @@ pub struct Arguments {
 enum ShapeName {
     /// Circles
     Disk,
-    /// Ellipses along the principal curvatures where they cover more: a fifth fewer
+    /// Also ellipses along the principal curvatures, if they cover more: a fifth fewer surfels
     Ellipse,
-    /// Circles and ellipses that curve as the surface does: a third to three quarters as many
+    /// Circles and ellipses that curve with the surface: a third to three quarters as many surfels
     Cap,
 }
 
-/// How what a splat covers is told.
+/// How the surfels that cover the surface are selected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Cover {
     Cells,
@@ -84,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
     if arguments.cover != Cover::Cells && !(arguments.shape == ShapeName::Disk && arguments.relax == 0) {
         return Err(Error::Usage(
-            "the thesis has disks and no relaxation: leave --shape and --relax out with --cover thesis:R".into(),
+            "--cover thesis:R selects disks without relaxation: leave --shape and --relax out".into(),
         ));
     }
     let written = [&arguments.output].into_iter().chain(&arguments.json);
@@ -101,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {
         note(&format!(
-            "{} normals are missing: estimated ones have no side, so sheets that lie closer than points do may become one",
+            "{} normals are missing: estimated ones have no side, so sheets that are closer than their points may merge",
             preparation.estimated_normals
         ));
     }
@@ -139,8 +143,8 @@ fn summary(report: &Report) -> String {
     );
     if report.beyond_tolerance > 0 {
         text += &format!(
-            "{} surfels at creases, where the surface bends by more than the tolerance from a point to the next, are as large as \
-             the cell of their own point\n",
+            "{} surfels are as large as their own point's cell: they lie at creases, where the surface bends by more than the \
+             tolerance from one point to the next\n",
             report.beyond_tolerance
         );
     }

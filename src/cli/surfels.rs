@@ -1,4 +1,4 @@
-//! `epsplat surfels`: oriented surfels from points.
+//! `epsplat surfels`: estimates oriented surfels from points.
 
 use std::path::PathBuf;
 
@@ -12,32 +12,38 @@ use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs};
 
-/// Make surfels from points and write them as PLY: normals with a side, ellipses without gaps.
+/// Make surfels from points and write them as PLY: oriented normals, ellipses without gaps.
 ///
-/// The inputs become one cloud. Given normals stay; the others are those of a plane through 16
-/// neighbours.
+/// The inputs are joined to one cloud. Normals in the files are used; missing ones are those of a
+/// plane fitted to 16 neighbours.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
 pub struct Arguments {
-    #[arg(required = true, help = help_of_all("Point clouds, or meshes, of which the vertices are taken"))]
+    #[arg(required = true, help = help_of_all("Point clouds, or meshes, whose vertices are used"))]
     pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
     pub(super) reading: Reading,
-    /// The file: .ply
+    /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// knn: the ellipse that holds what is nearer to a point than to its neighbours; ellipse: the one that bounds 8 neighbours in the tangent
-    /// plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere; bsp:global,
-    /// bsp:global-circumsphere: one disk for all, of such clusters' mean; qsplat: as large as the largest triangle at a mesh's vertex
+    /// Size and shape of surfels: knn, ellipse, bsp, qsplat, ... (all in --help)
+    ///
+    /// knn: the smallest ellipse that holds the point's Voronoi cell in the tangent plane; ellipse:
+    /// the one that bounds 8 neighbours in the tangent plane; bsp, bsp:circumsphere: disks from
+    /// clusters of three points, by their mean edge or circumsphere; bsp:global,
+    /// bsp:global-circumsphere: one radius for all disks, the mean over such clusters; qsplat: at
+    /// each vertex of a mesh, a disk as large as the largest triangle there
     #[arg(long, default_value = "knn")]
     size: Size,
-    /// Which side estimated normals point to: propagate from neighbour to neighbour, outward; X,Y,Z, toward the nearest
-    /// scanner (once for each); up
+    /// Side of estimated normals: outward (propagate), up, or toward a scanner at X,Y,Z
+    ///
+    /// propagate carries the side from neighbour to neighbour. For several scanners give the option
+    /// once for each: normals point to the nearest one
     #[arg(long, value_name = "propagate|up|X,Y,Z", default_value = "propagate", value_parser = parse_orientation,
         allow_hyphen_values = true)]
     orient: Vec<Orientation>,
-    /// Estimate normals even where they are given
+    /// Estimate all normals, also those that the files have
     #[arg(long)]
     estimate_normals: bool,
     #[command(flatten)]
@@ -69,7 +75,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Joins several --orient: the positions of several scanners make one orientation.
+/// Joins several `--orient` options into one orientation.
+///
+/// # Errors
+///
+/// [`Error::Usage`] if there are several and one of them is not the position of a scanner.
 fn orientation(given: &[Orientation]) -> Result<Orientation> {
     if let [one] = given {
         return Ok(one.clone());
@@ -78,7 +88,7 @@ fn orientation(given: &[Orientation]) -> Result<Orientation> {
     for orientation in given {
         let Orientation::Toward(positions) = orientation else {
             return Err(Error::Usage(
-                "--orient is given once, or several times with the position of a scanner each".into(),
+                "several --orient options must each be a scanner's position X,Y,Z: give others only once".into(),
             ));
         };
         scanners.extend(positions);

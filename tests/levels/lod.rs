@@ -251,8 +251,8 @@ fn memory_is_bounded() {
     assert!(taken > 100 && taken < all && report["read"]["points"][0].as_u64().unwrap() < 20000, "{report}");
     for (arguments, words) in [
         (&["--lod", "10px", "--memory", "324MiB"][..], "less than the 0."),
-        (&["--lod", "0.0001px", "--memory", "330MiB"], "take --lod of a larger size"),
-        (&["--lod", "10px", "--memory", "2"], "no size of memory"),
+        (&["--lod", "0.0001px", "--memory", "330MiB"], "give --lod a larger size"),
+        (&["--lod", "10px", "--memory", "2"], "not a size of memory"),
         (&["--lod", "0", "--memory", "2GiB"], "above 0"),
         (&["--memory", "2GiB"], "--lod"),
         (&["--lod", "10px", "--memory", "2GiB", "--outliers", "3"], "--outliers"),
@@ -318,7 +318,7 @@ fn trees_are_made_within_memory() {
     let refused = path("refused.ply");
     for (arguments, words) in [
         (&[&surfels[..], "--memory", "9MiB"][..], "take at least"),
-        (&[&surfels, "--memory", "9"], "no size of memory"),
+        (&[&surfels, "--memory", "9"], "not a size of memory"),
         (&[&surfels, "--memory", "9GiB", "--cut", "0.1"], "--cut"),
         (&[&bare, "--memory", "9GiB"], "epsplat surfels"),
         (&[&levels, "--memory", "9GiB"], "epsplat surfels"),

@@ -1,4 +1,4 @@
-//! The arguments of `epsplat render`: the options of a picture, its inputs, camera and device.
+//! The arguments of `epsplat render`: inputs, camera, device and the options of a picture.
 
 use std::path::PathBuf;
 
@@ -78,7 +78,7 @@ pub(super) struct CameraArguments {
     pub(super) target: Option<DVec3>,
     /// Direction of up in the image: x, y, z, -x, -y, -z or X,Y,Z [default: as the file says]
     ///
-    /// LAS files and the PLY files of epsplat say it; of others up is z for flat clouds, else y
+    /// LAS files and the PLY files of epsplat say it; in others up is z for flat clouds, else y
     #[arg(long, value_name = "AXIS|X,Y,Z", value_parser = parse_up, allow_hyphen_values = true)]
     pub(super) up: Option<DVec3>,
     /// Vertical field of view [default: 45]
@@ -90,7 +90,7 @@ pub(super) struct CameraArguments {
     /// Focal lengths and principal point in pixels
     #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics, allow_hyphen_values = true, hide_short_help = true)]
     pub(super) intrinsics: Option<[f64; 4]>,
-    /// A camera file (see the guide), in place of all other camera options but --size
+    /// Camera file (see the guide), in place of all other camera options except --size
     #[arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true)]
     pub(super) file: Option<PathBuf>,
     /// Many cameras: a transforms.json, or a folder with COLMAP's cameras.txt and images.txt
@@ -105,7 +105,7 @@ pub(super) struct CameraArguments {
     /// Factor of the width and height of --cameras' images; intrinsics are scaled too
     #[arg(long, value_name = "FACTOR", value_parser = parse_scale, requires = "cameras", hide_short_help = true)]
     pub(super) scale: Option<f64>,
-    /// Leave the lens distortion of --cameras out; else a distorted camera is refused
+    /// Ignore the lens distortion of --cameras; by default a distorted camera is an error
     #[arg(long, requires = "cameras", hide_short_help = true)]
     pub(super) ignore_distortion: bool,
     /// Smallest depth drawn, world units [default: a millionth of the scene]
@@ -125,45 +125,45 @@ pub(super) struct TriangleArguments {
     pub(super) texture: Option<PathBuf>,
 }
 
-/// How surfels are made, and painted.
+/// How surfels are sized and painted.
 #[derive(Args)]
 #[command(next_help_heading = "Surfels from points")]
 pub(super) struct SurfelArguments {
-    /// Measure the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat, ...
+    /// Size the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat, ...
     #[arg(long = "surfel-size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true)]
     pub(super) size: Option<Size>,
     /// Image that paints the surfels by their texture coordinates: .png, .jpg, .bmp or .tga
     ///
-    /// It takes the place of the surfels' own colours; `epsplat sample` writes texture coordinates.
-    /// Given again it is the image of the next input, or of the next number (texnumber) of an
-    /// input's points
+    /// It replaces the surfels' own colours; `epsplat sample` writes texture coordinates. Given
+    /// several times, the images are those of the inputs in order, or of the image numbers
+    /// (texnumber) of one input's points
     #[arg(long = "texture", id = "textures", value_name = "IMAGE")]
     pub(super) textures: Vec<PathBuf>,
 }
 
-/// Who renders, within how much memory.
+/// The backend, its adapter and its limit of memory.
 #[derive(Args)]
 #[command(next_help_heading = "Device")]
 pub(super) struct DeviceArguments {
-    /// Who renders: auto, gpu, raster or reference [default: auto]
+    /// Backend: auto, gpu, raster or reference [default: auto]
     ///
-    /// gpu is the compute kernels on an adapter, raster the adapter's rasteriser and blender, for
-    /// comparison, reference the kernels' f64 twins on the processor, and auto gpu on the best
-    /// adapter, or the reference where there is none
+    /// gpu: compute kernels on an adapter; raster: the adapter's rasteriser and blender, for
+    /// comparison; reference: the kernels' f64 twins on the processor; auto: gpu on the best
+    /// adapter, or reference if there is none
     #[arg(long, value_parser = backend_parser(), default_value = "auto", hide_default_value = true, hide_possible_values = true)]
     pub(super) backend: Chosen,
     /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long, value_name = "NAME", hide_short_help = true)]
     pub(super) adapter: Option<String>,
-    /// The most memory that host and device may take together for a part of a file: 2GiB
+    /// Limit the memory of host and device together, such as 2GiB
     ///
-    /// One file of `epsplat lod` is read in part, by --lod or --splats; a picture that needs more
-    /// ends with an error
+    /// Needs one file of `epsplat lod` with --lod or --splats, so that a part of it is read. A
+    /// picture that needs more memory is an error
     #[arg(long, value_name = "SIZE", value_parser = parse_memory, requires = "cut", hide_short_help = true)]
     pub(super) memory: Option<u64>,
 }
 
-/// A backend, or none for the best that there is.
+/// A backend, or None for `auto`.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) struct Chosen(Option<BackendName>);
 
@@ -172,24 +172,24 @@ fn backend_parser() -> impl TypedValueParser<Value = Chosen> {
 }
 
 impl Arguments {
-    /// The files that are read, but those of `--cameras`.
+    /// Returns the files that are read, except those of `--cameras`.
     pub(super) fn files(&self) -> impl Iterator<Item = Source<'_>> {
         let others = self.triangles.texture.iter().chain(&self.camera.file).chain(&self.surfels.textures);
         let meshes = self.triangles.meshes.iter().map(Source::cloud);
         self.reading.sources(&self.inputs).chain(meshes).chain(others.map(Source::other))
     }
 
-    /// The surfels are those of one file, which is no folder.
+    /// Returns true if the surfels come from at most one file, and from no folder.
     pub(super) fn is_one_file(&self) -> bool {
         self.inputs.len() < 2 && self.inputs.iter().all(|path| !path.is_dir())
     }
 
-    /// The backend; `None` for the best that there is.
+    /// Returns the backend, or None for `auto`.
     pub(super) fn backend(&self) -> Option<BackendName> {
         self.device.backend.0
     }
 
-    /// Whether the f64 twins render.
+    /// Returns true if the f64 twins render.
     pub(super) fn is_reference(&self) -> bool {
         self.backend() == Some(BackendName::Reference)
     }

@@ -1,4 +1,4 @@
-//! `epsplat render --lod`: levels of detail for a scene that comes without.
+//! `epsplat render --lod`: builds levels of detail for a scene that has none.
 
 use epsplat::plan::RenderOptions as Settings;
 use epsplat::scene::Scene;
@@ -8,20 +8,20 @@ use epsplat::{Error, Result};
 use super::super::note;
 use super::super::progress::Bars;
 
-/// Gives `scene` levels of detail if a picture with `settings` asks for some and it has none.
+/// Builds levels of detail for `scene` if `settings` need them and it has none.
 ///
 /// # Errors
-/// [`Error::Usage`] for a scene that has none to give.
+/// [`Error::Usage`] for a scene without surfels.
 pub(super) fn made(mut scene: Scene, settings: &Settings, bars: &Bars) -> Result<Scene> {
     if settings.detail.is_finest() || scene.hierarchy.is_some() {
         return Ok(scene);
     }
     if scene.surfels.is_empty() {
         return Err(Error::Usage(
-            "levels of detail are of surfels, and there are none: leave --lod and --splats out".into(),
+            "--lod and --splats need surfels, and there are none: leave these options out".into(),
         ));
     }
     (scene, _) = hierarchy::build(scene, bars)?;
-    note("levels of detail are made for this picture: `epsplat lod` keeps them in a file");
+    note("levels of detail are built for this run only: `epsplat lod` writes them to a file");
     Ok(scene)
 }

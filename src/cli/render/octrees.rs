@@ -1,4 +1,4 @@
-//! `epsplat render --lod` of COPC files: a picture reads those of their nodes that it takes.
+//! `epsplat render --lod` of COPC files: only the octree nodes that a picture needs are read.
 
 use epsplat::io::las::Copc;
 use epsplat::io::{ColorRules, Points};
@@ -15,19 +15,24 @@ use super::Arguments;
 use super::parts::{Part, Read};
 use super::scene::scene_of;
 
-/// COPC files that are one scene, and what tells where it is.
+/// COPC files, together one scene, and a coarse overview of it.
 pub(super) struct Octrees {
     files: Vec<Copc>,
     octrees: Vec<PointOctree>,
-    /// The meaning of colours' numbers, as the coarsest nodes say.
+    /// How colour values are interpreted, as decided by the coarsest nodes.
     rules: ColorRules,
-    /// Of the coarsest nodes.
+    /// Surfels of the coarsest nodes, from which the camera is framed.
     pub overview: Scene,
 }
 
 impl Octrees {
-    /// The inputs, if a picture that asks for levels of detail takes parts of them: if all are COPC files, and nothing is asked that
-    /// only all of their points tell: which of them are outliers, or where they are beside triangles.
+    /// Opens the inputs if they can be read in part: if all of them are COPC files.
+    ///
+    /// Returns None if an option needs all points: `--outliers`, `--surfel-size` or `--triangles`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if `--lod-fade on` is given, or an error of reading.
     pub fn of(arguments: &Arguments, bars: &Bars) -> Result<Option<Self>> {
         let all = arguments.limits.limits().outliers.is_some()
             || arguments.surfels.size.is_some()
@@ -38,7 +43,7 @@ impl Octrees {
         let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
         if arguments.options.levels.lod_fade == Some(Switch(true)) {
             return Err(Error::Usage(
-                "the nodes of COPC files do not fade into each other: take --lod-fade off".into(),
+                "the nodes of COPC files cannot fade into each other: set --lod-fade to off".into(),
             ));
         }
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
@@ -50,7 +55,7 @@ impl Octrees {
         Ok(Some(Self { files, octrees, rules, overview }))
     }
 
-    /// What the picture of `camera` takes, or where that is nothing the overview; and what that was of all.
+    /// Reads the nodes that the picture of `camera` needs, or the overview's if they have no point.
     pub fn scene(
         &mut self,
         arguments: &Arguments,
@@ -65,12 +70,15 @@ impl Octrees {
         let points = read(arguments, (&mut self.files, &mut self.rules), &nodes, progress)?;
         let mut made = scene_of(arguments, points, progress)?;
         self.end(&mut made.0, &nodes);
-        // What was read is drawn whole.
+        // All read points are drawn.
         let settings = Settings { detail: Detail::FINEST, ..settings.clone() };
         Ok(Part { made, settings, read: read_of(&self.files, &nodes) })
     }
 
-    /// Lets a scene of these nodes end where all points do: at the box of all files, where each tells its own.
+    /// Makes surfels of these nodes end at the bounding box of all points.
+    ///
+    /// Surfels of coarse nodes are large and would reach beyond it. Does nothing if a file states
+    /// no bounding box.
     fn end(&self, scene: &mut Scene, nodes: &[Vec<usize>]) {
         if self.octrees.iter().any(|octree| octree.bounds.is_empty()) {
             return;
@@ -78,13 +86,13 @@ impl Octrees {
         let bounds = self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds));
         let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
         let thinned: Vec<Thinned> = thinned.collect();
-        // Where several files have a place their points lie between each other's.
+        // Where files overlap, their points lie between each other's: the largest fraction is used.
         let part = |place| thinned.iter().filter_map(|octree| octree.part_of_size(place)).reduce(f64::max);
         borders::end_at(scene, &bounds, |place| part(place).unwrap_or(1.0));
     }
 }
 
-/// What these nodes of each file are of all.
+/// Counts these nodes, their points and bytes, and the totals of the files.
 fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
     let mut sum = Read { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
     for (file, taken) in files.iter().zip(nodes) {
@@ -99,7 +107,7 @@ fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
     sum
 }
 
-/// The points of these nodes of each file.
+/// Reads the points of these nodes of each file.
 fn read(
     arguments: &Arguments,
     (files, rules): (&mut [Copc], &mut ColorRules),

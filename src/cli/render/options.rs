@@ -1,4 +1,4 @@
-//! The settings of a picture, as the arguments and the scene say.
+//! The settings of a picture, from the arguments and the scene.
 
 use epsplat::options::Suggested;
 use epsplat::plan::{RenderOptions as Settings, check};
@@ -12,35 +12,36 @@ use super::output::Format;
 /// Returns the settings of a scene that has no Gaussians, before anything is read.
 pub(super) fn settings(arguments: &Arguments, format: Format) -> Result<Settings> {
     if !arguments.options.maps.aov.is_empty() && format == Format::Png {
-        return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
+        return Err(Error::Usage("a PNG holds no maps: use an .exr output with --aov".into()));
     }
     let settings = settled(arguments, false)?;
     if arguments.surfels.textures.is_empty() {
         return Ok(settings);
     }
     if arguments.options.points.facing.is_some() {
-        return Err(Error::Usage("points that face the camera have no plane to paint: leave --texture out".into()));
+        return Err(Error::Usage("--facing leaves points no plane to paint: leave it or --texture out".into()));
     }
-    // Surfels have the mean of their texture where surfaces show through (scene.rs).
+    // In transparent pictures surfels have their texture's mean colour (scene.rs), so that the
+    // check is that of an opaque picture.
     let opaque = Settings { composite: Composite::Opaque, ..settings.clone() };
     check::textured(&opaque, arguments.is_reference())?;
     Ok(settings)
 }
 
-/// Returns the settings for a scene: Gaussians are drawn by the rules that their files are trained with, unless the
+/// Returns the settings for a scene. Gaussians are drawn by the rules of their training, unless the
 /// options say otherwise.
 ///
 /// # Errors
-/// [`Error::Usage`] for options that do not go with Gaussians.
+/// [`Error::Usage`] for options that cannot be used with Gaussians.
 pub(super) fn for_scene(arguments: &Arguments, settings: Settings, scene: &Scene) -> Result<Settings> {
     if settings.blend == Blend::Nearest && matches!(scene.colors, Colors::Linear(_)) {
-        note("--blend nearest keeps colours of 8 bits: finer ones are rounded, and what lies beyond white is cut");
+        note("--blend nearest stores 8-bit colours: finer ones are rounded, and values above white are clamped");
     }
     if !scene.encoded {
         return Ok(settings);
     }
     let settings = settled(arguments, true)?;
-    // Points that face the camera, the rasteriser and --blend nearest draw no kernels of Gaussians.
+    // --facing, the rasteriser and --blend nearest never draw the Gaussians' own kernel.
     let has_kernel = settings.facing.is_none() && settings.raster.is_none() && settings.blend != Blend::Nearest;
     if has_kernel && arguments.options.replaces_gaussians() {
         note("warning: --kernel takes the place of the Gaussians' own: leave it out for pictures as they were trained");

@@ -1,4 +1,4 @@
-//! What a render leaves: images, a report, and lines on stderr.
+//! Outputs of a render: images, the summary and notes on stderr.
 
 use std::num::NonZeroU64;
 use std::path::Path;
@@ -10,7 +10,7 @@ use epsplat::{Error, Result, io};
 
 use super::super::note;
 
-/// How images are written.
+/// File format of images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub(super) enum Format {
     /// 8-bit sRGB
@@ -20,7 +20,11 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// What the output's name asks for.
+    /// Returns the format of an output by its extension.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if the extension is neither png nor exr.
     pub(super) fn of(path: &Path) -> Result<Self> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
             Some("png") => Ok(Self::Png),
@@ -29,7 +33,7 @@ impl Format {
         }
     }
 
-    /// The extension of its files.
+    /// Returns the extension of its files.
     pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -45,7 +49,7 @@ impl Format {
     }
 }
 
-/// Tells of a frame that had to be rendered twice.
+/// Prints a note if sums overflowed, so that the frame was rendered twice.
 pub(super) fn note_overflows(report: &Report) {
     if report.overflows > 0 {
         note(&format!(
@@ -55,19 +59,18 @@ pub(super) fn note_overflows(report: &Report) {
     }
 }
 
-/// Tells of the first of some pictures that draws more surfels and nodes than the `most` that are
-/// asked for.
+/// Prints a note about the first picture that draws more than `most` surfels and nodes.
 pub(super) fn note_cut<'a>(reports: impl IntoIterator<Item = &'a Report>, most: Option<NonZeroU64>) {
     let Some(most) = most.map(NonZeroU64::get) else { return };
     if let Some(cut) = reports.into_iter().filter_map(|report| report.cut).find(|cut| *cut > most) {
         note(&format!(
-            "{cut} surfels and nodes are drawn, not the {most} of --splats: nodes at the camera's plane, and at the outline of a closed mesh, are \
-             divided at any size (--cull none keeps the latter whole)"
+            "{cut} surfels and nodes are drawn, not the {most} of --splats: nodes at the camera's plane and at the outline of a closed mesh are \
+             always divided (with --cull none those at the outline are not)"
         ));
     }
 }
 
-/// One line: what was drawn, and how long each pass took.
+/// Returns one line: counts of what was drawn, and the time of each pass.
 pub(super) fn summary(report: &Report, output: &Path) -> String {
     let order = ["select_ms", "project_ms", "visibility_ms", "triangles_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
     let passes = order
@@ -79,7 +82,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     };
     let tail = report.tail.map_or_else(String::new, |tail| {
         format!(
-            "; the tail is {:.2} % of the picture, at most {:.1} % of a pixel",
+            "; the tail's weight is {:.2} % on average, at most {:.1} % at a pixel",
             100.0 * tail.mean,
             100.0 * tail.largest
         )

@@ -1,4 +1,5 @@
-//! `epsplat render --lod` of files with levels of detail of their own: a picture reads what it takes of them.
+//! `epsplat render --lod` of files with levels of detail: only the nodes that a picture needs are
+//! read.
 
 use epsplat::plan::RenderOptions as Settings;
 use epsplat::scene::{Camera, Scene};
@@ -12,38 +13,41 @@ use super::octrees::Octrees;
 use super::scene::Made;
 use super::tree::Tree;
 
-/// Inputs of which a picture reads what it takes, which depends on nothing that another picture takes.
+/// Inputs that are read in part for each picture. The part does not depend on earlier pictures.
 pub(super) enum Parts {
-    /// COPC files that are one scene.
+    /// COPC files, together one scene.
     Octrees(Box<Octrees>),
-    /// A file of `epsplat lod`.
+    /// A file that `epsplat lod` wrote.
     Tree(Box<Tree>),
 }
 
-/// What a picture takes.
+/// The part of the inputs that a picture needs, as a scene.
 pub(super) struct Part {
     pub made: Made,
-    /// How it is drawn.
+    /// Settings to draw it with: without levels of detail if the part is to be drawn whole.
     pub settings: Settings,
     pub read: Read,
 }
 
-/// What a picture read of what there is: of all files together.
+/// Counts of what a picture read, and totals: `[read, total]`, summed over all files.
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct Read {
     pub nodes: [u64; 2],
     pub points: [u64; 2],
-    /// Of nodes and points as the files have them.
+    /// Bytes of nodes and points in the files.
     pub bytes: [u64; 2],
 }
 
 impl Parts {
-    /// The inputs, if a picture with `settings` takes parts of them.
+    /// Opens the inputs if a picture with `settings` needs only parts of them. Otherwise None.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if `--memory` is given and the inputs have to be read whole.
     pub fn of(arguments: &Arguments, settings: &Settings, bars: &Bars) -> Result<Option<Self>> {
         if settings.detail.is_finest() {
             return match arguments.device.memory {
                 Some(_) => {
-                    Err(Error::Usage("--memory is of pictures that take a part: take --lod of a size above 0".into()))
+                    Err(Error::Usage("--memory needs levels of detail: give --lod a size that is above 0".into()))
                 }
                 None => Ok(None),
             };
@@ -54,7 +58,7 @@ impl Parts {
         Ok(Octrees::of(arguments, bars)?.map(|octrees| Self::Octrees(Box::new(octrees))))
     }
 
-    /// What tells where the scene is, before a camera is.
+    /// A coarse scene from which the camera is framed before anything else is read.
     pub fn overview(&self) -> &Scene {
         match self {
             Self::Octrees(octrees) => &octrees.overview,
@@ -62,7 +66,9 @@ impl Parts {
         }
     }
 
-    /// What the picture of `camera` with `settings` takes, of which there may be so many frames at once.
+    /// Reads the part for the picture of `camera` with `settings`.
+    ///
+    /// `frames` is the number of frames in memory at once, for the limit of `--memory`.
     pub fn scene(
         &mut self,
         arguments: &Arguments,
@@ -79,7 +85,7 @@ impl Parts {
 }
 
 impl Read {
-    /// One line.
+    /// Returns the counts as one line for people.
     pub fn sentence(&self) -> String {
         let Self { nodes: [nodes, all_nodes], points: [points, all_points], bytes } = self;
         let [bytes, all_bytes] = bytes.map(|bytes| bytes as f64 / 1e6);

@@ -1,4 +1,4 @@
-//! The scene of a picture: all inputs, and the triangles beside them.
+//! Builds the scene of a picture from all inputs and triangle meshes.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -18,17 +18,17 @@ use super::Arguments;
 use super::options::settings;
 use super::output::Format;
 
-/// A scene, and what became of its points.
+/// A scene, and counts of how its points became surfels.
 pub(super) type Made = (Scene, Preparation);
 
-/// What all inputs hold, as one scene.
+/// Reads all inputs and meshes into one scene.
 pub(super) fn scene(arguments: &Arguments, bars: &Bars) -> Result<Made> {
     let inputs =
         if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
     scene_of(arguments, inputs, bars)
 }
 
-/// What was read of all inputs, and the triangles beside it, as one scene.
+/// Builds one scene from the points of the inputs, reading the triangle meshes to draw with them.
 pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     if arguments.inputs.is_empty() && !arguments.surfels.textures.is_empty() {
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
@@ -36,16 +36,16 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
     }
     if arguments.options.surface.separate && arguments.is_one_file() {
         note(
-            "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
+            "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
         );
     }
-    // What `epsplat hybrid` left of a mesh names itself.
+    // A file of `epsplat hybrid` names the mesh of its remaining triangles.
     let beside = inputs.iter().filter_map(|points| points.beside.clone());
     let mut paths: Vec<PathBuf> = arguments.triangles.meshes.iter().cloned().chain(beside).collect();
-    // What two files of surfels name is drawn once.
+    // A mesh that is named twice is drawn once.
     let mut known = BTreeSet::new();
     paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
-    // An input of neither points nor triangles is told as that.
+    // Inputs with neither points nor triangles fail in `surfels_of`, whose error says so.
     let none = !inputs.is_empty() && inputs.iter().all(|points| points.beside.is_none());
     let of_surfels = if none || inputs.iter().any(|points| !points.positions.is_empty()) {
         Some(surfels_of(arguments, inputs, progress)?)
@@ -55,7 +55,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
     };
     if paths.is_empty() {
         if arguments.options.surface.join.is_some() || arguments.triangles.texture.is_some() {
-            let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
+            let what = "--join and --triangle-texture need triangles, and there are none: name a mesh by --triangles";
             return Err(Error::Usage(what.into()));
         }
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
@@ -71,13 +71,17 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
     Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
 }
 
-/// The meshes, those that no material paints with the image for triangles.
+/// Paints meshes whose materials have no texture with the image of `--triangle-texture`.
+///
+/// # Errors
+///
+/// [`Error::Malformed`] if such a mesh has no texture coordinates.
 fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> Result<Vec<Mesh>> {
     let Some(image) = &arguments.triangles.texture else { return Ok(meshes) };
     let texture = Texture::read(image)?;
     let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
     if !meshes.iter().any(bare) {
-        note("warning: every mesh has a texture of its own, so that --triangle-texture paints none");
+        note("warning: --triangle-texture is not used, as every mesh has a texture of its own");
     }
     for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
         if mesh.texture.is_none() {
@@ -88,8 +92,9 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
     Ok(meshes)
 }
 
-/// Whether surfels can be painted with the images of their meshes' materials, as pictures are made;
-/// else they have the means of these.
+/// Returns true if these options can paint surfels with the images of their meshes' materials.
+///
+/// Otherwise each surfel has the mean colour of its part of the image.
 fn paints(arguments: &Arguments) -> bool {
     let levels = &arguments.options.levels;
     let finest = levels.lod.is_none() && levels.splats.is_none();
@@ -98,7 +103,7 @@ fn paints(arguments: &Arguments) -> bool {
     finest && settings.is_ok_and(|settings| textured(&settings, reference).is_ok() && settings.blend != Blend::Nearest)
 }
 
-/// The surfels of all inputs.
+/// Builds the surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = arguments.surfels.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
@@ -107,18 +112,18 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
         if !inputs.iter().any(Points::has_places)
             && let Some(path) = paths.clone().next()
         {
-            let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
+            let what = "its points have no texture coordinates, so they cannot be textured: use `epsplat sample` to make surfels of a mesh with texture coordinates";
             return Err(Error::malformed(path, what));
         }
         let names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
-        note(&format!("{names}: no texture coordinates, so that --texture leaves the points in their own colours"));
+        note(&format!("{names}: no texture coordinates, so the points have their own colours in spite of --texture"));
     }
     let limits = arguments.limits.limits();
     let in_file = |error| named(error, &arguments.inputs);
     if let Some(size) = arguments.surfels.size {
         let options = FromPoints { size, limits, ..FromPoints::default() };
         let Surfels { points, preparation, .. } = from_points(inputs, &options, progress).map_err(in_file)?;
-        // Outliers are dropped, and half-axes limited, once.
+        // No limits here: `from_points` has already dropped outliers and limited half-axes.
         let (scene, of_scene) = surfels::build(vec![points], progress).map_err(in_file)?;
         let Preparation { guessed_up, strays, rounding, .. } = of_scene;
         return Ok((seen_through(scene, arguments), Preparation { guessed_up, strays, rounding, ..preparation }));
@@ -134,14 +139,15 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
     Ok((seen_through(scene, arguments), preparation))
 }
 
-/// Takes the mean of the texture over each surfel where surfaces show through each other: lists of
-/// fragments keep no texture coordinates.
+/// Replaces texture coordinates by each surfel's mean colour if the scene is transparent.
+///
+/// The fragment lists of transparent pictures store no texture coordinates.
 fn seen_through(scene: Scene, arguments: &Arguments) -> Scene {
     let Colors::Textured(textured) = &scene.colors else { return scene };
     let settings = arguments.options.settle(arguments.backend(), Suggested::default());
     if settings.composite == Composite::Opaque || composited(&Facts::of(&scene), &settings) == Composite::Opaque {
         return scene;
     }
-    note("where surfaces show through each other each surfel has the mean colour of its texture");
+    note("the picture is transparent, so each surfel has the mean colour of its texture");
     Scene { colors: Colors::Linear(textured.colors().to_vec()), ..scene }
 }

@@ -1,4 +1,5 @@
-//! `epsplat render --lod` of a file that `epsplat lod` wrote: a picture reads the nodes and surfels that it may come to.
+//! `epsplat render --lod` of a file that `epsplat lod` wrote: a picture reads only the nodes and
+//! surfels that its cut may reach.
 
 use epsplat::io::ply::Levels;
 use epsplat::plan::RenderOptions as Settings;
@@ -13,27 +14,33 @@ use super::Arguments;
 use super::memory::Memory;
 use super::parts::{Part, Read};
 
-/// Files of fewer surfels are read whole: that is soon done.
+/// Files with fewer surfels are read whole, as that takes little time.
 const FEWEST: u32 = 500_000;
 
-/// The coarsest nodes, which tell where a scene is.
+/// Number of the coarsest nodes that are read to frame the camera.
 const OVERVIEW: u32 = 50_000;
 
-/// A file that is a scene.
+/// A file of `epsplat lod` that is the only input.
 pub(super) struct Tree {
     levels: Levels,
-    /// The places of its coarsest nodes.
+    /// Points at the centres of its coarsest nodes.
     pub overview: Scene,
 }
 
 impl Tree {
-    /// The input, if it is one large file with levels of detail, and nothing is asked that is of all of its surfels, of other inputs or of triangles.
+    /// Opens the input if it can be read in part: one file with levels of detail.
+    ///
+    /// Without `--memory` it must have at least 500,000 surfels. Returns None if an option needs
+    /// all surfels, other inputs or triangles.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if `--memory` is given and the input cannot be read in part.
     pub fn of(arguments: &Arguments) -> Result<Option<Self>> {
         let bounded = arguments.device.memory.is_some();
         let levels = match (&arguments.inputs[..], asks_for_all(arguments)) {
             (_, Some(option)) if bounded => {
                 return Err(Error::Usage(format!(
-                    "--memory is of pictures that take a part of a file, and {option} is of all: leave one of them out"
+                    "--memory reads a part of the file, and {option} needs all of it: leave one of them out"
                 )));
             }
             ([input], None) => arguments.reading.levels(input)?,
@@ -41,8 +48,7 @@ impl Tree {
         };
         if bounded && levels.is_none() {
             return Err(Error::Usage(
-                "--memory is of pictures that take a part of one file of `epsplat lod`: leave it out, or make one"
-                    .into(),
+                "--memory needs one file of `epsplat lod` as the only input: make one, or leave --memory out".into(),
             ));
         }
         let Some(levels) = levels.filter(|levels| bounded || levels.whole.surfels >= FEWEST) else {
@@ -52,15 +58,19 @@ impl Tree {
         let mut rows = Vec::new();
         levels.read_nodes(std::slice::from_ref(&coarsest), &mut rows)?;
         let nodes: Vec<Node> = levels.nodes(&rows, |part| part.nodes)?.concat();
-        // Those that stand for what is not here.
+        // Leaves, and nodes whose children are not among the read ones.
         let lowest = nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.len());
-        // Nodes reach past what is below them, and few of them farther than a margin of the view.
+        // Points, not disks: nodes reach past the surfels below them, and few of them by more than
+        // the margin of the framed view.
         let surfels = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
         let overview = Scene { surfels, ..nothing(&levels) };
         Ok(Some(Self { levels, overview }))
     }
 
-    /// What the picture of `camera` with `settings` takes, within `memory` if there is a bound.
+    /// Reads the nodes and surfels that the picture of `camera` with `settings` needs.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if they do not fit into `memory`, or an error of reading.
     pub fn scene(
         &self,
         memory: Option<Memory>,
@@ -81,7 +91,7 @@ impl Tree {
     }
 }
 
-/// An option that is of all surfels of a file, or of more than these, if one is given.
+/// Returns the first given option that needs all surfels of a file, other inputs or triangles.
 fn asks_for_all(arguments: &Arguments) -> Option<&'static str> {
     let limits = arguments.limits.limits();
     let all = [

@@ -1,4 +1,4 @@
-//! The camera of a picture, as far as arguments and camera files decide it.
+//! The camera of a picture, from the arguments, camera files and, by default, the scene.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::Arguments;
 
 pub(super) const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
 
-/// A view, which lacks at most what the scene decides.
+/// A view as given by arguments or a camera file: complete but for values from the scene.
 pub(super) struct View {
     size: (u32, u32),
     lens: Lens,
@@ -24,16 +24,16 @@ pub(super) struct View {
 }
 
 enum Place {
-    /// Chosen to show the scene, with this up if there is one.
+    /// Framed to show the whole scene, with this direction of up if it is given.
     Framed(Option<DVec3>),
-    /// At the eye; looks at the scene's centre.
+    /// At this eye, looking at the scene's centre, with this direction of up if it is given.
     Eye(DVec3, Option<DVec3>),
-    /// As given.
+    /// A given pose.
     Pose(Pose),
 }
 
 impl View {
-    /// What the arguments say, `--cameras` apart.
+    /// Returns the view that the arguments describe, `--camera` included and `--cameras` not.
     pub(super) fn of(arguments: &Arguments) -> Result<Self> {
         if let Some(path) = &arguments.camera.file {
             return Self::of_file(arguments, camera::read(path)?, path);
@@ -54,7 +54,7 @@ impl View {
         Self { size, lens, place, near: arguments.camera.near }.checked()
     }
 
-    /// What a camera of the file at `path` says, and the arguments that add to it.
+    /// Returns the view of a camera of the file at `path`, completed by the arguments.
     pub(super) fn of_file(arguments: &Arguments, file: CameraFile, path: &Path) -> Result<Self> {
         if let (Some(size), Some(own)) = (arguments.camera.size, file.size)
             && size != own
@@ -82,7 +82,9 @@ impl View {
         view.checked().map_err(|error| said_by(path.display(), error))
     }
 
-    /// What the arguments decide is refused before minutes of reading: only the scene's centre is not known yet.
+    /// Checks the view with stand-ins for values from the scene, such as its centre.
+    ///
+    /// Errors thus come before the inputs are read, which may take minutes.
     fn checked(self) -> Result<Self> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
@@ -103,8 +105,9 @@ impl View {
         }
     }
 
-    /// The camera of the view, and what it looks at; `default_near` is [`Camera::default_near`] of
-    /// the scene.
+    /// Returns the camera of the view and the point that it looks at.
+    ///
+    /// `default_near` is [`Camera::default_near`] of the scene.
     pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or(default_near);
         let (pose, up, by) = match &self.place {
@@ -130,55 +133,54 @@ impl View {
         })
     }
 
-    /// Pixels of the picture.
+    /// Returns the number of pixels of the picture.
     pub(super) fn pixels(&self) -> u64 {
         u64::from(self.size.0) * u64::from(self.size.1)
     }
 }
 
-/// The point that a camera looks at, and its up.
+/// The point that a camera looks at, and its direction of up.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
-    /// World coordinates.
+    /// The point, world coordinates. For a pose of a file it is at the depth of the scene's centre.
     pub target: DVec3,
-    /// Up as it was given, or as it follows from a pose.
+    /// Direction of up as given or as the pose has it; None for the scene's.
     up: Option<DVec3>,
     by: By,
 }
 
-/// The source of a view.
+/// Source of a view's pose.
 #[derive(Clone, Copy, PartialEq)]
 enum By {
-    /// It was chosen to show the scene, up apart.
+    /// Framed by the scene, though up may be given.
     Choice,
-    /// The options or a file.
+    /// Eye and target of the options or of a file.
     Arguments,
-    /// A file, as a pose.
+    /// A rotation and eye of a file.
     File,
 }
 
-/// Degrees: where the line of sight is nearer to up than this, up says little of how the picture is
-/// turned.
+/// Angle between the line of sight and up, degrees, below which up barely fixes the picture's roll.
 const NEARLY_UP: f64 = 5.0;
 
-/// Degrees by which a picture may be turned without a word.
+/// Roll of a picture, degrees, up to which no warning is printed.
 const TURNED: f64 = 1.0;
 
-/// A view in the words of the options that give it again.
+/// A view as the options that reproduce it.
 #[derive(Serialize)]
 pub(super) struct ToldView {
     eye: [f64; 3],
     target: [f64; 3],
     up: [f64; 3],
-    /// Why up is what it is.
+    /// Source of the direction of up.
     because: &'static str,
-    /// How the picture is turned, where up says little of it.
+    /// Warning about the picture's roll, if the line of sight is nearly along up.
     #[serde(skip_serializing_if = "Option::is_none")]
     turned: Option<String>,
 }
 
 impl ToldView {
-    /// The words for `camera`, which looks at `seen`; the scene's up may have been `guessed`.
+    /// Describes `camera`, which looks at `seen`. `guessed` is true if the scene's up is a guess.
     pub(super) fn new(camera: &Camera, seen: &Seen, scene: &Scene, guessed: bool) -> Self {
         let because = match (seen.up, guessed, scene.up) {
             (Some(_), ..) if seen.by == By::File => "as the file of the camera says",
@@ -189,27 +191,28 @@ impl ToldView {
         };
         let given = seen.up.unwrap_or(scene.up.axis());
         let forward = camera.rotation.row(2);
-        // Along up itself the camera takes the other axis.
+        // A camera that looks along the scene's up uses the other axis as up.
         let is_along = seen.up.is_none() && forward.cross(given).length() <= 1e-3;
         let up = if is_along { scene.up.other() } else { given };
         let turned = if is_along || seen.by == By::File { None } else { turned(camera, up, scene.up) };
         Self { eye: camera.eye.into(), target: seen.target.into(), up: up.into(), because, turned }
     }
 
-    /// The options, and why.
+    /// Returns the options in one line, with the source of up.
     pub(super) fn sentence(&self) -> String {
         let [eye, target] = [self.eye, self.target].map(|v| vector_argument(v.into()));
         format!("view: --eye {eye} --target {target} --up {} ({})", up_argument(self.up.into()), self.because)
     }
 
-    /// How the picture is turned, where that may surprise.
+    /// Returns the warning about the picture's roll, if there is one.
     pub(super) fn warning(&self) -> Option<String> {
         self.turned.as_ref().map(|turned| format!("warning: {turned}"))
     }
 }
 
-/// How the picture of a view nearly along `up` is turned: what lies across up decides that, however
-/// little it is.
+/// Returns a warning if a view is nearly along `up` and its picture is rolled.
+///
+/// Such a picture's roll is fixed by the small component of up across the line of sight.
 fn turned(camera: &Camera, up: DVec3, scene_up: Up) -> Option<String> {
     let up = up.normalize();
     let (forward, top) = (camera.rotation.row(2), -camera.rotation.row(1));
@@ -225,13 +228,13 @@ fn turned(camera: &Camera, up: DVec3, scene_up: Up) -> Option<String> {
     let angle = shown.angle_between(top).to_degrees();
     (angle > TURNED).then(|| {
         format!(
-            "the view is {off:.1} degrees off the direction of up, which so says little of how the picture is turned: {name} lies \
-             {angle:.0} degrees from its top; {option} puts it there"
+            "the view is only {off:.1} degrees off the direction of up, which thus barely fixes the picture's roll: {name} is \
+             {angle:.0} degrees from its top; {option} turns it to the top"
         )
     })
 }
 
-/// An error of a value, with the option or the file that gave it.
+/// Returns an error of a value, prefixed with the option or file that it came from.
 fn said_by(who: impl Display, error: Error) -> Error {
     Error::Usage(format!("{who}: {error}"))
 }

@@ -1,4 +1,5 @@
-//! Many pictures of one scene, a camera each: while one is rendered, those before it are encoded and written.
+//! `epsplat render --cameras`: a picture for each camera. While one is rendered, earlier ones are
+//! encoded and written.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -26,21 +27,24 @@ use super::scene::scene;
 use super::view::{DEFAULT_SIZE, View};
 use super::{Arguments, backend, levels};
 
-/// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
+/// Limit of host memory for frames that wait for a writer or are being written, bytes.
+///
+/// A single larger frame is still written.
 const MOST_WAITING: u64 = 1 << 30;
 
-/// What a frame takes of host memory on its way to a file, bytes a pixel: each value of a map takes more.
+/// Returns the host memory of a frame while it is encoded and written, bytes per pixel: 48, plus 8
+/// for each value of a map.
 pub(super) fn pixel_bytes(maps: Maps) -> u64 {
     48 + 8 * maps.iter().map(|map| map.width() as u64).sum::<u64>()
 }
 
-/// A view's picture, and what rendering it did.
+/// The JSON report of a view's picture.
 #[derive(Serialize)]
 struct Picture {
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
-    /// None where the inputs were not read in parts.
+    /// Counts of what was read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<Read>,
     /// Milliseconds of encoding and writing, while other pictures were rendered.
@@ -50,27 +54,29 @@ struct Picture {
 #[derive(Serialize)]
 struct Reports {
     views: Vec<Picture>,
-    /// Threads that encoded and wrote.
+    /// Number of threads that encoded and wrote.
     writers: usize,
-    /// Milliseconds of rendering, and of encoding and writing, over all views.
+    /// Milliseconds of rendering, summed over all views.
     render_ms: f64,
+    /// Milliseconds of encoding and writing, summed over all views.
     write_ms: f64,
-    /// Milliseconds from the scene in host memory, or of files that are read in parts the overview, to the last written picture.
+    /// Milliseconds from the scene in host memory to the last written picture. For files that are
+    /// read in part they start when the overview is in memory.
     total_ms: f64,
 }
 
-/// What the views show.
+/// The scene of the views.
 enum Shown<'a> {
-    /// A scene that all of them share.
+    /// A scene that all views share.
     Whole(&'a Scene, Settings, Box<Renderer<&'a Scene, &'a Backend>>),
-    /// What each takes of files, which depends on nothing that another one takes.
+    /// Files that are read in part for each view.
     Parts {
         parts: Box<Parts>,
         settings: Settings,
         backend: &'a Backend,
-        /// The first one's notes have been told.
+        /// True once the notes of the first view are printed: the others' are not.
         told: bool,
-        /// Frames that there may be at once.
+        /// Number of frames in memory at once.
         frames: u64,
     },
 }
@@ -80,7 +86,7 @@ struct Shot {
     frame: Frame,
     report: Report,
     read: Option<Read>,
-    /// Why it is empty, if it is.
+    /// Reason why the frame is empty, if it is.
     unseen: Option<Unseen>,
 }
 
@@ -111,7 +117,7 @@ impl Shown<'_> {
     }
 }
 
-/// Renders a picture of each camera of the set at `path`.
+/// Renders a picture for each camera of the set at `path`.
 pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let maps = !arguments.options.maps.aov.is_empty();
     let format = arguments.camera.format.unwrap_or(if maps { Format::Exr } else { Format::Png });
@@ -142,7 +148,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     };
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
-    // The first empty picture and why it is, and how many are.
+    // The first empty picture with the reason, and the number of empty pictures.
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
         let made = shown.picture(arguments, view).map_err(|error| error.of_view(file))?;
@@ -171,7 +177,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     tell(arguments, pictures, writers, start)
 }
 
-/// Tells of all pictures, since the scene was there.
+/// Prints notes and the summary or JSON of all pictures. `start` is when the scene was in memory.
 fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start: Instant) -> Result<()> {
     views.iter().for_each(|view| note_overflows(&view.report));
     note_cut(views.iter().map(|view| &view.report), arguments.options.levels.splats);
@@ -191,7 +197,12 @@ fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start
     }
 }
 
-/// The files and views of all cameras, which the arguments do not contradict.
+/// Returns the output file and view of each camera.
+///
+/// # Errors
+///
+/// [`Error::Malformed`] if a lens is distorted, unless `--ignore-distortion` is given, or an error
+/// of a view that the arguments contradict.
 fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(PathBuf, View)>> {
     let cameras = cameras::read(path, arguments.camera.size.unwrap_or(DEFAULT_SIZE))?;
     let distorted = cameras.iter().filter(|camera| camera.distortion.is_some());
@@ -201,7 +212,7 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
             return Err(Error::malformed(
                 path,
                 format!(
-                    "the lens of {first} is distorted ({name} = {value}), which is not rendered: undistort the pictures, or say \
+                    "the lens of {first} is distorted ({name} = {value}), which is not rendered: undistort the pictures, or give \
                      --ignore-distortion"
                 ),
             ));
@@ -216,7 +227,7 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
     cameras.into_iter().map(view).collect()
 }
 
-/// Refuses pictures, before anything is rendered, that would overwrite something or could not be written.
+/// Fails, before anything is rendered, if a picture would overwrite an input or cannot be written.
 fn check_outputs(arguments: &Arguments, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
     check_folder(&arguments.output, cameras)?;
     let of_colmap = ["cameras.txt", "images.txt"].map(|name| cameras.join(name));
@@ -235,7 +246,9 @@ fn check_outputs(arguments: &Arguments, cameras: &Path, views: &[(PathBuf, View)
     folders.into_iter().try_for_each(atomic::try_folder)
 }
 
-/// The pictures must not take the place of the photographs that the cameras are named after.
+/// Fails if the output folder is the cameras' own or cannot be created.
+///
+/// Pictures are named after the cameras' photographs and would overwrite them there.
 fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
     if output.metadata().is_ok_and(|output| !output.is_dir()) {
         return Err(Error::write(output, std::io::ErrorKind::NotADirectory.into()));
@@ -247,15 +260,16 @@ fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
         && output == beside
     {
         return Err(Error::Usage(
-            "the pictures have the names of those that the cameras belong to: choose another folder than theirs".into(),
+            "the pictures would overwrite the cameras' photographs, which have the same names: choose another folder"
+                .into(),
         ));
     }
-    // A folder is made, but not the one that it is in.
+    // The output folder is created, its parent is not.
     let folder = or_current(output.parent().unwrap_or(Path::new("")));
     folder.metadata().map(drop).map_err(|error| Error::write(output, error))
 }
 
-/// How many threads write frames of so many pixels.
+/// Returns the number of threads that write frames of so many pixels: at least 1.
 fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let frame = pixels * pixel_bytes(maps);
@@ -263,12 +277,12 @@ fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
 }
 
-/// One line: how many, and how long a picture took.
+/// Returns one line: the number of pictures and the mean time of each.
 fn summary(reports: &Reports, output: &Path) -> String {
     let count = reports.views.len();
     let each = |ms: f64| ms / count.max(1) as f64;
     format!(
-        "{}: {count} pictures of {} surfels, {:.1} ms each (rendering {:.1}, beside it encoding and writing {:.1})",
+        "{}: {count} pictures of {} surfels, {:.1} ms each (rendering {:.1}, at the same time encoding and writing {:.1})",
         output.display(),
         reports.views.first().map_or(0, |view| view.report.surfels),
         each(reports.total_ms),

@@ -142,7 +142,10 @@ fn a_page_that_no_report_has_is_not_replaced() {
     let output = bench(&[file.to_str().unwrap(), "--quick", "--out", folder.path().to_str().unwrap()]);
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{stderr}");
-    assert!(stderr.contains("index.html is not part of a report") && stderr.contains("no results.csv beside it"), "{stderr}");
+    assert!(
+        stderr.contains("index.html is not part of a report") && stderr.contains("no results.csv beside it"),
+        "{stderr}"
+    );
     assert_eq!(std::fs::read_to_string(&page).unwrap(), "mine");
 }
 

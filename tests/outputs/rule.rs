@@ -151,7 +151,7 @@ fn two_outputs_are_two_files() {
         |json: &str| ["simplify", text(&folder.path("s.ply")), "-o", text(&made), "--json", json].map(str::to_owned);
     let refused = |json: &Path| {
         let line = simplify(text(json));
-        fails(&line.each_ref().map(String::as_str), 2, &["one file", "overwrite"]);
+        fails(&line.each_ref().map(String::as_str), 2, &["the same file", "overwrite"]);
     };
     // While it is not there yet, then when it is.
     std::os::unix::fs::symlink("made.ply", &linked).unwrap();
@@ -166,7 +166,7 @@ fn two_outputs_are_two_files() {
     let (cloud, cameras, views) = (folder.path("s.ply"), folder.path("transforms.json"), folder.path("views"));
     let json = views.join("p.png");
     let render = ["render", text(&cloud), "--cameras", text(&cameras), "-o", text(&views), "--json", text(&json)];
-    fails(&render, 2, &["one file"]);
+    fails(&render, 2, &["the same file"]);
     // What is no file is written to, by one command for two outputs too.
     // By a link of one's own: a program that replaces what it writes to would replace the machine's.
     let stdout = folder.path("stdout");

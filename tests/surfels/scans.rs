@@ -69,13 +69,13 @@ fn a_top_view_that_is_turned_is_told() {
     // Toward (sin 40, cos 40), a few tenths of a degree off.
     let turned = told("10.257,10.306,0", &["--up", "z"]);
     assert!(
-        turned.contains("warning: the view is 0.5 degrees off") && turned.contains("north (+y) lies 40 degrees"),
+        turned.contains("warning: the view is only 0.5 degrees off") && turned.contains("north (+y) is 40 degrees"),
         "{turned}"
     );
     assert!(turned.contains("view: --eye 10,10,50 --target 10.257,10.306,0 --up z (as asked for)"), "{turned}");
     // By the scene's own up it is the same; straight down, from aside and with north up nothing is
     // odd.
-    assert!(told("10.257,10.306,0", &[]).contains("lies 40 degrees"));
+    assert!(told("10.257,10.306,0", &[]).contains("is 40 degrees from its top"));
     for (target, up) in [("10,10,0", &[][..]), ("30,10,0", &["--up", "z"]), ("10.257,10.306,0", &["--up", "y"])] {
         let told = told(target, up);
         assert!(!told.contains("warning: the view"), "{told}");

@@ -189,7 +189,7 @@ fn a_cut_is_drawn() {
     let (coarser, told) = draw(&levels, "coarser.png", &["--lod", "1%", "--lod-measure", "area"]);
     assert!(drawn(&told) < 2500 && psnr(&coarser) < psnr(&coarse), "{told}");
     for (arguments, words) in [
-        (&["--lod", "4"][..], "no size"),
+        (&["--lod", "4"][..], "a level of detail is 0"),
         (&["--lod", "1px", "--facing", "sphere"], "face the camera"),
         (&["--lod", "1px", "--separate", &surfels], "--separate"),
         (&["--lod", "1px", "--aov", "index"], "index"),

@@ -119,14 +119,15 @@ fn usable(
     (unread, strict): (&mut Unread, bool),
 ) -> Result<(Vec<(String, PointCloud)>, u64), Fault> {
     let (mut usable, all) = (Vec::new(), scans.len() as u64);
+    let has_points = scans.iter().any(|scan| scan.records > 0);
     for (number, scan) in (1..).zip(scans) {
         let name = match scan.name.as_deref().map(str::trim).filter(|name| !name.is_empty()) {
             Some(name) => format!("scan {number} '{}'", shown(name.as_bytes())),
             None => format!("scan {number}"),
         };
         match check(&scan, left) {
-            // A single scan without points is an empty file, which is no fault.
-            Ok(_) if scan.records == 0 && all > 1 => {
+            // A file none of whose scans has points is empty, which is no fault.
+            Ok(_) if scan.records == 0 && has_points => {
                 let fault = Fault::Malformed(format!("its scan {number} has no points"));
                 unread.add(|_| format!("{name} has no points"), 0, fault, strict)?;
             }

@@ -7,8 +7,8 @@
 //!
 //! 1. A **counter** starts anywhere and grows by 1, or by a constant step of at most 256, in every
 //!    round, and the loop ends once it passes a limit that no round changes. The loop ends if the
-//!    counter cannot wrap before it passes the limit, that is, if the limit is at most 2^32 - 1 -
-//!    256. The limits are: constants; sides of the image, which have 15 bits
+//!    counter cannot wrap before it passes the limit, that is, if the limit is at most
+//!    2^32 - 1 - 256. The limits are: constants; sides of the image, which have 15 bits
 //!    ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
 //!    and lengths of lists. A list is a range within a binding (`column_of` keeps its start below
 //!    `arrayLength`, and its end is its start plus the number of entries that were placed), so it

@@ -6,10 +6,10 @@
 //! units of r:
 //!
 //! - The rows of N have lengths of at most r k/|s|, r k/|t| and 1, and relative errors of 24 e k.
-//! - (U, V, W) is N times a point of the ray, d pixels from the centre. The error of that point is
-//!   24 e k d (the rows), 5 e of a pixel (the stored centre), 3 e of the coefficients, and 4 e of
-//!   the terms that the evaluation sums. If the record is not anchored at the centre, the point is
-//!   the difference of two points, each with an error of 7 e.
+//! - (U, V, W) is N times a point of the ray, at a distance d from the centre. The error of that
+//!   point is 24 e k d (the rows), 5 e of a pixel (the stored centre), 3 e of the coefficients, and
+//!   4 e of the terms that the evaluation sums. If the record is not anchored at the centre, the
+//!   point is the difference of two points, each with an error of 7 e.
 //! - The step (U, V, W) r/z + D errs by r/z times the error of (U, V, W), by 24 e k of a row, and
 //!   by 4 e of itself.
 //! - The errors of the quadratic's coefficients follow from its derivatives, plus 12 e of the terms

@@ -11,8 +11,8 @@
 //! - excused pixels, where a fragment lies within
 //!   [`DECISION_MARGIN`](crate::metrics::DECISION_MARGIN) of a decision, or within its own derived
 //!   error of one: no more than the case allows;
-//! - the RMSE of `fixed`: at most that of f32 sums plus one rounding of the output, `2^-24
-//!   rms(values)`, for every map;
+//! - the RMSE of `fixed`: at most that of f32 sums plus one rounding of the output,
+//!   `2^-24 rms(values)`, for every map;
 //! - the part of the image that the reference covers, which shows that the scene is as intended.
 //!
 //! Images are unlit, because a light multiplies the errors of two maps that are judged separately.
@@ -46,7 +46,7 @@ use crate::scene::{Camera, Composite, Map, Maps, Samples, Scene};
 pub struct Expected {
     /// The accumulator.
     pub accumulator: Accumulator,
-    /// The reason, as a sentence for reports.
+    /// The reason, for reports.
     pub reason: &'static str,
 }
 

@@ -2,15 +2,15 @@
 //!
 //! The bounds follow, to first order, from the operations of `wgsl/camera_*.wgsl`, `wgsl/rows.wgsl`
 //! and `wgsl/footprint.wgsl`. With e = 2^-24 (half a unit in the last place of 1), camera-space p,
-//! s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera `|(s x t).z| /
-//! (|s| |t|)`):
+//! s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera
+//! `|(s x t).z| / (|s| |t|)`):
 //!
 //! - s and t are rotated by three products of rounded factors each, with an error of at most 6e of
 //!   their length. The rows `t x p`, `p x s`, `s x t` then err by 10e, 10e and 15e of the product
 //!   of their factors' lengths.
-//! - The determinant by which all rows are divided sums some twenty roundings of size e |p||s||t| /
-//!   sqrt(3). The root of the sum of their squares is 2.6e; 6e is allowed. The rows as a whole then
-//!   have a relative error of 6e / cosine.
+//! - The determinant by which all rows are divided sums some twenty roundings of size
+//!   `e |p||s||t| / sqrt(3)`. The root of the sum of their squares is 2.6e; 6e is allowed. The rows
+//!   as a whole then have a relative error of 6e / cosine.
 //! - Rows are relative to the splat's own pixel, so the coefficients of x and y act on the distance
 //!   from the splat's centre, in pixels. The centre is computed in doubled precision (2^-42 of the
 //!   image coordinate) and, unless the splat is thin, stored to 5e of a pixel.

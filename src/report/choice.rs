@@ -121,7 +121,7 @@ fn sentence<'a>(start: &str, answers: impl Iterator<Item = (Limit, &'a str, f64)
         })
         .collect();
     if clauses.is_empty() {
-        return "<p>No configuration ran in all cases, so the answer is one for each.</p>".into();
+        return "<p>No configuration ran in all cases, so each case has its own answer.</p>".into();
     }
     format!("<p>{start}:</p><ul class=\"answer\">{}</ul>", clauses.concat())
 }

@@ -79,8 +79,8 @@ fn images(sets: &[ImageSet]) -> Result<String> {
         .map(|(scene, figures)| format!("<h3>{}</h3>{legend}<div class=\"pictures\">{figures}</div>", escape(scene)))
         .collect();
     Ok(format!(
-        "<section><h2>Images</h2><p>Left the image, right where it differs from the f64 reference: the largest \
-         difference of a pixel's values, over linear RGBA. Black is no difference.</p>{scenes}</section>"
+        "<section><h2>Images</h2><p>Left is the image, right its difference from the f64 reference: the largest \
+         of a pixel's linear RGBA values. Black is no difference.</p>{scenes}</section>"
     ))
 }
 

@@ -86,8 +86,8 @@ pub(super) fn section(cases: &[Case<'_>], families: &Families) -> String {
     let legend = families.legend();
     format!(
         "<section><h2>What each speed costs</h2>\
-         <p>Faster is to the left, more exact is below; both scales are logarithmic. The line joins what no other \
-         configuration beats in both.</p>{legend}<div class=\"plots\">{plots}</div></section>"
+         <p>Faster is to the left, more exact is below; both scales are logarithmic. The line joins the \
+         configurations that no other beats in both.</p>{legend}<div class=\"plots\">{plots}</div></section>"
     )
 }
 

@@ -83,9 +83,9 @@ pub struct Measurement {
     pub device_bytes: u64,
     /// Error against the f64 reference with the same options; `None` if it was not compared.
     pub numeric: Option<Numeric>,
-    /// Further measures by name.
+    /// Further measures, by name.
     ///
-    /// Those against ground truth are `psnr_db`, `max_abs`, `percentile_99_9`, `ssim`,
+    /// Measures against ground truth are `psnr_db`, `max_abs`, `percentile_99_9`, `ssim`,
     /// `depth_relative_mean`, `normal_degrees_mean`, `hole_rate` and so on; without ground truth
     /// there are none. `apart_psnr_db` and `apart_rmse` are against the reference of the
     /// configuration that this one approximates, and `cut` is the number of surfels that are drawn

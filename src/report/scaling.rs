@@ -138,7 +138,7 @@ pub(super) fn section(measurements: &[Measurement], families: &Families) -> Stri
         return String::new();
     }
     format!(
-        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by a decade in a decade, \
+        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by one decade per decade, \
          time is proportional. Bars are one median absolute deviation.</p>{}<div class=\"plots\">{figures}</div></section>",
         families.legend()
     )
@@ -170,10 +170,10 @@ fn figure(measurements: &[Measurement], quantity: &Quantity, families: &Families
         );
     }
     // A name stands at the end of its curve. If a configuration has several curves, the value of
-    // the equal properties is added. Names are placed from the top down, so that they keep the
-    // order of their curves when they avoid each other.
+    // the equal properties is added.
     let named = |config: &str| curves.keys().filter(|(other, _)| *other == config).count();
-    // From the top down, so that names that make room for each other keep the order of their curves.
+    // Names are placed from the top down, so that they keep the order of their curves when they
+    // avoid each other.
     let end = |curve: &[(f64, &Measurement)]| {
         let (value, m) = curve[curve.len() - 1];
         (value, m.total_ms.median)
@@ -203,7 +203,7 @@ fn straight(((config, _), curve): (&(&str, String), &Vec<(f64, &Measurement)>)) 
     let points: Vec<_> = curve.iter().map(|(value, m)| (*value, m.total_ms.median)).collect();
     let Line { base, slope, departure } = line(&points);
     format!(
-        " {}: {} ms and {} ns a surfel, to {} %.",
+        " {}: {} ms and {} ns per surfel, to {} %.",
         escape(config),
         significant(base, 2),
         significant(slope * 1e6, 3),

@@ -1,53 +1,54 @@
-//! What an adapter is and can, as plain data.
+//! Capabilities of a graphics adapter, as plain data.
 
 use serde::Serialize;
 
 use super::layout::{TILE, TILE_WIDTH, WORKGROUP};
 use crate::error::Error;
 
-/// Invocations of the largest workgroup, that of `bin.wgsl`.
+/// Invocations of the largest workgroup, which is in `bin.wgsl`.
 const LARGEST_WORKGROUP: u32 = 256;
 
-/// What an adapter is and what of it matters here.
+/// Identity and capabilities of an adapter, as far as the renderer uses them.
 #[derive(Clone, Debug, Serialize)]
 pub struct AdapterDescription {
-    /// Its name, as `--adapter` matches it.
+    /// Name; `--adapter` matches a part of it.
     pub name: String,
-    /// vulkan, gl, metal, dx12, as `--adapter` matches it too.
+    /// API: vulkan, gl, metal or dx12; `--adapter` matches it too.
     pub api: String,
-    /// discrete, integrated, virtual, software or other.
+    /// Kind: discrete, integrated, virtual, software or other.
     pub kind: &'static str,
     /// Driver name and version.
     pub driver: String,
-    /// Bytes one binding may see: scenes and images are paged to it.
+    /// Largest binding of a storage buffer, bytes; scenes and images are paged to fit it.
     pub max_storage_buffer_binding_size: u64,
-    /// Bytes one buffer may have.
+    /// Largest buffer, bytes.
     pub max_buffer_size: u64,
-    /// Workgroups per dimension of a dispatch.
+    /// Most workgroups in each dimension of a dispatch.
     pub max_compute_workgroups_per_dimension: u32,
-    /// Storage buffers one kernel may use.
+    /// Most storage buffers that one kernel can bind.
     pub max_storage_buffers_per_shader_stage: u32,
-    /// Bytes a uniform may have.
+    /// Largest uniform, bytes.
     pub max_uniform_buffer_binding_size: u64,
-    /// Pixels along a side of a texture.
+    /// Longest side of a texture, pixels.
     pub max_texture_dimension_2d: u32,
-    /// Bytes a pixel of all blended targets together may have.
+    /// Most bytes per pixel of all blended targets together.
     pub max_color_attachment_bytes_per_sample: u32,
-    /// Per-pass GPU times can be measured.
+    /// Whether GPU times can be measured per pass.
     pub timestamps: bool,
-    /// u64 atomic min, max and add in storage buffers.
+    /// Whether storage buffers have u64 atomic min, max and add.
     pub atomics_u64: bool,
-    /// 64-bit integers.
+    /// Whether kernels have 64-bit integers.
     pub integers_u64: bool,
-    /// f32 atomic add in storage buffers.
+    /// Whether storage buffers have f32 atomic add.
     pub atomics_f32: bool,
-    /// Blending into targets of 32-bit floats.
+    /// Whether it blends into targets of 32-bit floats.
     pub blends_f32: bool,
-    /// Operations of subgroups that have at least [`TILE_WIDTH`] invocations each.
+    /// Whether it has subgroup operations, with at least [`TILE_WIDTH`] invocations per subgroup.
     pub subgroups: bool,
-    /// Vertex shaders read storage buffers, as the rasteriser's do.
+    /// Whether vertex shaders can read storage buffers, as those of the rasteriser do.
     pub vertex_storage: bool,
-    /// It has all that rendering needs.
+    /// Whether it meets the minimum for rendering: compute shaders, [`STORAGE_BUFFERS`], and the
+    /// workgroup sizes of the kernels.
     pub usable: bool,
 }
 
@@ -89,7 +90,7 @@ impl AdapterDescription {
         }
     }
 
-    /// An adapter that grants what every WebGPU implementation does, and nothing else.
+    /// An adapter with the limits of core WebGPU and no optional feature.
     pub fn core() -> Self {
         let limits = wgpu::Limits::default();
         Self {
@@ -115,28 +116,30 @@ impl AdapterDescription {
         }
     }
 
-    /// Bytes that one buffer and one binding of it may have.
+    /// Largest buffer that fits one binding, bytes.
     pub fn buffer_limit(&self) -> u64 {
         self.max_storage_buffer_binding_size.min(self.max_buffer_size)
     }
 
-    /// Elements of `stride` bytes that fit a page, for the largest of the strides that are paged together.
+    /// Elements of `stride` bytes that fit a page. If several buffers are paged together, `stride`
+    /// is the largest of theirs.
     pub fn page_len(&self, stride: usize) -> u64 {
         let invocations = u64::from(self.max_compute_workgroups_per_dimension).pow(2) * u64::from(WORKGROUP);
         (self.buffer_limit() / stride as u64).min(invocations).min(u64::from(u32::MAX))
     }
 
-    /// The processor draws, and not a card.
+    /// Whether it renders on the CPU.
     pub fn is_software(&self) -> bool {
         self.kind == "software"
     }
 
-    /// An error of this adapter.
+    /// Returns an error that names this adapter.
     pub fn error(&self, what: impl Into<String>) -> Error {
         Error::Gpu { adapter: self.name.clone(), what: what.into() }
     }
 
-    /// The order in which `auto` prefers adapters, best first: hardware, then software, then whatever GL reaches.
+    /// Rank by which `auto` prefers adapters, 0 first: hardware, then software, then GL, and last
+    /// those that are not usable.
     pub(super) fn rank(&self) -> u32 {
         let kind = match self.kind {
             "discrete" => 0,
@@ -148,8 +151,9 @@ impl AdapterDescription {
         kind + if self.api == "gl" { 10 } else { 0 } + if self.usable { 0 } else { 100 }
     }
 
-    /// Whether `--adapter name` means this one: an API's name is all adapters of that API and no others, so that `gl` is not
-    /// found in the middle of a word; any other name is a part of the adapter's own.
+    /// Whether `--adapter name` selects this adapter. The name of an API selects all adapters of
+    /// that API and no others, so that `gl` does not match the middle of a word. Any other name
+    /// selects adapters whose names contain it. Case does not matter.
     pub(super) fn is_meant_by(&self, name: &str) -> bool {
         let name = name.to_lowercase();
         match name.as_str() {
@@ -160,8 +164,9 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses, which is as many as core WebGPU grants (large splats' fragments: the queue, splats, surfels,
-/// their attributes, how many fragments have no place, where lists start, keys and records).
+/// The most storage buffers that a kernel binds; core WebGPU grants no more. The kernel that lists
+/// the fragments of large splats binds the queue, splats, surfels, attributes, the count of
+/// fragments that did not fit, list starts, keys and records.
 pub const STORAGE_BUFFERS: u32 = 8;
 
 #[cfg(test)]

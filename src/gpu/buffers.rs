@@ -1,4 +1,4 @@
-//! Device buffers: created against the limits, paged, uploaded and read back in bounded pieces.
+//! Device buffers: checked against the limits, written and read back in bounded pieces.
 
 use std::borrow::Cow;
 use std::marker::PhantomData;
@@ -10,50 +10,53 @@ use super::device::Gpu;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
-/// Bytes copied per submission, up and down: bounds the staging memory.
+/// Bytes copied per submission, in either direction; bounds the staging memory.
 const PIECE: u64 = 32 << 20;
 
-/// Bytes that are made at once to be written where a buffer lies, of which two pieces are in memory: what they take is taken again for the next ones.
+/// Bytes per piece if the host writes a mapped buffer directly. Two pieces are in host memory at a
+/// time, and the allocator reuses their memory for the next ones.
 const OPEN_PIECE: usize = 1 << 20;
 
-/// A buffer of `T`.
+/// A device buffer with elements of type `T`.
 pub struct Buffer<T> {
     pub(crate) raw: wgpu::Buffer,
-    /// Elements.
+    /// Number of elements.
     pub len: u64,
     element: PhantomData<T>,
 }
 
 impl<T: Pod> Buffer<T> {
-    /// `len` elements, zero; `what` names them in an error.
+    /// Creates a storage buffer of `len` zero elements. `what` names it in an error.
     pub fn storage(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE, gpu.buffer_limit())
     }
 
-    /// A storage buffer that the host reads where it lies, if the device can let it ([`Readback`]).
+    /// Creates a storage buffer that the host can map and read directly, if the device supports
+    /// that ([`Readback`]).
     pub(crate) fn readable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         Self::open(gpu, what, len, wgpu::BufferUsages::MAP_READ)
     }
 
-    /// A storage buffer that the host writes where it lies, if the device can let it ([`write`](Self::write)).
+    /// Creates a storage buffer that the host can map and write directly, if the device supports
+    /// that ([`write`](Self::write)).
     pub(crate) fn writable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         Self::open(gpu, what, len, wgpu::BufferUsages::MAP_WRITE)
     }
 
-    /// One that the host maps where it lies, if the device can let it.
+    /// Creates a storage buffer with the usages `maps`, if the device can map storage buffers.
     fn open(gpu: &Gpu, what: &str, len: u64, maps: wgpu::BufferUsages) -> Result<Self> {
         let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
         let maps = if lies_open { maps } else { wgpu::BufferUsages::empty() };
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | maps, gpu.buffer_limit())
     }
 
-    /// A storage buffer that may also hold the arguments of indirect dispatches.
+    /// Creates a storage buffer that can also hold the arguments of indirect dispatches.
     pub fn indirect(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Self::create(gpu, what, len, usage, gpu.buffer_limit())
     }
 
-    /// A uniform of one element.
+    /// Creates a uniform buffer of one element.
     pub fn uniform(gpu: &Gpu, what: &str, value: &T) -> Result<Self> {
         let limit = gpu.adapter.max_uniform_buffer_binding_size;
         let buffer = Self::create(gpu, what, 1, wgpu::BufferUsages::UNIFORM, limit)?;
@@ -61,24 +64,24 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// This buffer, as one of words of 32 bits.
+    /// Reinterprets this buffer as u32 words.
     pub(crate) fn words(self) -> Buffer<u32> {
         let len = self.raw.size() / 4;
         Buffer { raw: self.raw, len, element: PhantomData }
     }
 
-    /// All of it, as a binding.
+    /// Returns the whole buffer as a binding.
     pub(crate) fn bound(&self) -> wgpu::BindingResource<'_> {
         self.raw.as_entire_binding()
     }
 
-    /// Device memory that it takes, bytes.
+    /// Size in device memory, bytes.
     pub fn bytes(&self) -> u64 {
         self.raw.size()
     }
 
-    /// Makes it one of `len` elements, `what` in an error, of which the first are those that it has. Waits, so that two such
-    /// buffers are held no longer than need be.
+    /// Grows the buffer to `len` elements and keeps the contents. `what` names it in an error.
+    /// Waits for the copy, so that the old and the new buffer exist together only briefly.
     pub(crate) fn grow(&mut self, gpu: &Gpu, what: &str, len: u64) -> Result<()> {
         let new = Self::create(gpu, what, len, self.raw.usage(), gpu.buffer_limit())?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -94,10 +97,10 @@ impl<T: Pod> Buffer<T> {
     }
 
     fn create(gpu: &Gpu, what: &str, len: u64, usage: wgpu::BufferUsages, limit: u64) -> Result<Self> {
-        // An empty binding is not allowed.
+        // wgpu rejects empty bindings.
         let len = len.max(1);
         let size = len.saturating_mul(size_of::<T>() as u64);
-        // Whole numbers of 64 bits, by which words_long.wgsl reads.
+        // Rounds up to 8 bytes, because words_long.wgsl reads 64-bit words.
         let size = size.checked_next_multiple_of(8).unwrap_or(size);
         if size > limit {
             let storage = usage.contains(wgpu::BufferUsages::STORAGE);
@@ -131,7 +134,7 @@ impl<T: Pod> Buffer<T> {
         Ok(Self { raw, len, element: PhantomData })
     }
 
-    /// Overwrites the first `len` elements; `values` gives those of a range.
+    /// Overwrites the first `len` elements. `values` returns the elements of a range.
     pub fn write<'a>(
         &self,
         gpu: &Gpu,
@@ -157,7 +160,8 @@ impl<T: Pod> Buffer<T> {
         Ok(())
     }
 
-    /// While a piece is copied, which is slow where the device's memory is touched for the first time, the next one is made.
+    /// Writes through a mapping. The next piece is computed while one is copied, because the copy
+    /// is slow where it touches device memory for the first time.
     fn write_where_it_lies<'a>(
         &self,
         gpu: &Gpu,
@@ -192,7 +196,7 @@ impl<T: Pod> Buffer<T> {
         gpu.check()
     }
 
-    /// The first `len` elements.
+    /// Reads the first `len` elements.
     pub fn read(&self, gpu: &Gpu, len: u64) -> Result<Vec<T>> {
         let len = len.min(self.len);
         let mut values: Vec<T> = Vec::with_capacity(len as usize);
@@ -205,7 +209,7 @@ impl<T: Pod> Buffer<T> {
     }
 }
 
-/// Memory that both the device and the host see, through which a buffer is read back in pieces, unless the host can read the
+/// Reads a buffer back in pieces: through a staging buffer, or directly if the host can map the
 /// buffer itself.
 pub(crate) struct Readback {
     staging: Option<wgpu::Buffer>,
@@ -213,7 +217,8 @@ pub(crate) struct Readback {
 }
 
 impl Readback {
-    /// For reads of up to `bytes` of `buffer`, in pieces of whole records of `record` bytes.
+    /// Creates a readback of up to `bytes` of `buffer`, in pieces of whole records of `record`
+    /// bytes.
     pub(crate) fn new<T>(gpu: &Gpu, buffer: &Buffer<T>, bytes: u64, record: u64) -> Self {
         let step = bytes.min((PIECE / record).max(1) * record).next_multiple_of(4).max(4);
         let read = wgpu::BufferUsages::MAP_READ;
@@ -228,12 +233,12 @@ impl Readback {
         Self { staging, step }
     }
 
-    /// Memory that it takes, bytes.
+    /// Size of the staging memory, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Calls `piece` with the bytes of each piece of the first `bytes` of `buffer`, in their order.
+    /// Calls `piece` with the bytes of each piece of the first `bytes` of `buffer`, in order.
     pub(crate) fn visit<T>(
         &self,
         gpu: &Gpu,
@@ -266,13 +271,14 @@ impl Readback {
     }
 }
 
-/// The first two words of each of `buffers`, which have as many, by one trip to the device.
+/// Reads the first two words of each of `buffers`, which must have at least two, in one round trip
+/// to the device.
 pub(crate) fn counts(gpu: &Gpu, buffers: &[&Buffer<u32>]) -> Result<Vec<[u32; 2]>> {
     let starts: Vec<_> = buffers.iter().map(|buffer| (*buffer, 0)).collect();
     counts_at(gpu, &starts)
 }
 
-/// The two words that start with the one of a number of each of `buffers`.
+/// Reads two consecutive words of each of `buffers`, from the given word on, in one round trip.
 pub(crate) fn counts_at(gpu: &Gpu, buffers: &[(&Buffer<u32>, u64)]) -> Result<Vec<[u32; 2]>> {
     let all = Buffer::<[u32; 2]>::readable(gpu, "counts", buffers.len() as u64)?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -284,7 +290,7 @@ pub(crate) fn counts_at(gpu: &Gpu, buffers: &[(&Buffer<u32>, u64)]) -> Result<Ve
 }
 
 impl<T> Buffer<T> {
-    /// A buffer made elsewhere, of `len` elements.
+    /// Wraps a raw buffer of `len` elements.
     pub(crate) fn from_raw(raw: wgpu::Buffer, len: u64) -> Self {
         Self { raw, len, element: PhantomData }
     }

@@ -1,4 +1,4 @@
-//! Adapters and the device: the sole owner of wgpu's instance, limits and errors.
+//! The graphics device: owns wgpu's instance, limits and errors.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -6,7 +6,8 @@ use super::adapter::AdapterDescription;
 use super::program::Compiled;
 use crate::error::{Error, Result};
 
-/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.
+/// Features that are enabled where an adapter has them: timestamps, the 64-bit integers, f32
+/// atomics and subgroups of some kernels, and blending into 32-bit floats.
 const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
@@ -14,29 +15,35 @@ const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SUBGROUP)
     .union(wgpu::Features::FLOAT32_BLENDABLE);
 
-/// Kernels can be handed over in SPIR-V (`spirv.rs`); Vulkan alone takes it.
+/// The feature that accepts kernels in SPIR-V (`spirv.rs`), which only Vulkan has.
 fn of_spirv(adapter: &AdapterDescription) -> wgpu::Features {
     if adapter.api == "vulkan" { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
 }
 
-/// Of an adapter whose memory is the host's the host reads and writes buffers where they lie; a card's would then have them in slow memory.
+/// Features of software adapters only: the host maps their buffers directly. On a graphics card,
+/// such buffers would lie in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
-/// What to do about a missing adapter.
+/// Advice for a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
     apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
 
-/// Whether wgpu checks the counts of workgroups that a device tells itself: by a dispatch before each such one, which takes a fifth of the time of
-/// small cuts of levels of detail (1.9 ms and not 1.5). Here none is too large: all are grids of `rows_of` (`wgsl/project.wgsl`) for lists that are shorter than 2^30, thus have
-/// 65,535 groups a row and 2^14 rows at most, or have a row for each batch of a page, of which there are no more than
-/// [`MOST_GROUPS`](super::layout::MOST_GROUPS). Direct3D 12 tells kernels these counts only where they are checked.
+/// Whether wgpu validates the workgroup counts of indirect dispatches.
+///
+/// Validation adds a dispatch before each indirect one, which takes a fifth of the time of small
+/// cuts of levels of detail (1.9 ms instead of 1.5). No count here is too large. Most grids come
+/// from `rows_of` (`wgsl/project.wgsl`) for lists shorter than 2^30, so they have at most 65,535
+/// groups per row and 2^14 rows. The others have one row per batch of a page, and a page has at
+/// most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows it stays on: Direct3D 12
+/// passes these counts to kernels only if they are validated.
 fn counts_are_checked() -> bool {
     cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")
 }
 
-/// The adapters that OpenGL reaches, or those of all other interfaces.
+/// Returns the adapters of OpenGL, or those of all other APIs, best first.
 fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
-    // One instance for the whole run: NVIDIA's driver crashes where threads make and drop instances beside each other (gfx-rs/wgpu#5930).
+    // One instance for the whole run: NVIDIA's driver crashes if threads create and drop instances
+    // concurrently (gfx-rs/wgpu#5930).
     static INSTANCES: [OnceLock<wgpu::Instance>; 2] = [const { OnceLock::new() }; 2];
     let backends = if of_gl { wgpu::Backends::GL } else { wgpu::Backends::all() - wgpu::Backends::GL };
     let instance = INSTANCES[usize::from(of_gl)].get_or_init(|| {
@@ -53,18 +60,19 @@ fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
     described
 }
 
-/// All adapters, in the order in which `auto` prefers them. The environment variable `WGPU_BACKEND` (vulkan, gl, ...)
-/// narrows them down.
+/// All adapters, in the order in which `auto` prefers them. The environment variable `WGPU_BACKEND`
+/// (vulkan, gl, ...) restricts them.
 pub fn adapters() -> Vec<AdapterDescription> {
     let mut all: Vec<_> = [false, true].into_iter().flat_map(enumerate).map(|(description, _)| description).collect();
     all.sort_by_key(AdapterDescription::rank);
     all
 }
 
-/// The best adapter of this name; see [`Gpu::open`].
+/// Returns the best adapter of this name; see [`Gpu::open`].
 fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     let wanted = |d: &AdapterDescription| d.usable && name.is_none_or(|name| d.is_meant_by(name));
-    // GL is asked last and only if it must be: its libraries complain on stderr where there is no display.
+    // OpenGL is tried last and only if needed: its libraries complain on stderr where there is no
+    // display.
     let mut all = enumerate(false);
     if !all.iter().any(|(d, _)| wanted(d)) {
         all.extend(enumerate(true));
@@ -81,10 +89,11 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     })
 }
 
-/// An open device. A clone is the same one: what was compiled for either serves both, and of what the device reports, or if it is lost, whoever asks first is told.
+/// An open device. Clones share the device and the cache of compiled kernels. They also share its
+/// reported error and its loss: the first caller that checks gets the error.
 #[derive(Clone)]
 pub struct Gpu {
-    /// The adapter behind it.
+    /// The adapter of the device.
     pub adapter: AdapterDescription,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
@@ -93,8 +102,13 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the best adapter; or the best of the API that is called `name` (vulkan, gl or opengl, metal, dx12); or, if none
-    /// is, the best whose own name contains `name`. Case does not matter.
+    /// Opens the best adapter. With a `name`, opens the best adapter of the API of that name
+    /// (vulkan, gl or opengl, metal, dx12), or, for any other name, the best adapter whose own name
+    /// contains it. Case does not matter.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] if no usable adapter matches, or [`Error::Gpu`] if the device cannot be
+    /// opened.
     pub fn open(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let software = if adapter.is_software() { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
@@ -103,8 +117,9 @@ impl Gpu {
         Self::of(adapter, &handle, features, limits)
     }
 
-    /// The adapter that [`open`](Self::open) chooses, as a device that can do what every WebGPU implementation can, a browser's or a
-    /// phone's too, and no more: core limits, and no optional feature but that of SPIR-V, so that kernels come to it on the same way.
+    /// Opens the adapter that [`open`](Self::open) chooses with the capabilities of core WebGPU
+    /// only, like a browser or a phone: core limits, and no optional feature except SPIR-V, so that
+    /// kernels are compiled in the same way.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
@@ -123,11 +138,12 @@ impl Gpu {
             label: Some("epsplat"),
             required_features,
             required_limits,
-            // Few large buffers: no pooling, so that a scene costs what its buffers cost.
+            // There are few, large buffers: without pooling, a scene uses only the memory of its
+            // buffers.
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         };
-        // NVIDIA's driver is in doubt where threads make devices beside each other, too (kvark/blade#336).
+        // NVIDIA's driver may also fail if threads create devices concurrently (kvark/blade#336).
         static OPENING: Mutex<()> = Mutex::new(());
         let opening = OPENING.lock();
         let (device, queue) = pollster::block_on(handle.request_device(&descriptor))
@@ -151,15 +167,16 @@ impl Gpu {
         Ok(Self { adapter, device, queue, compiled: Arc::default(), failure })
     }
 
-    /// This device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands
-    /// than the adapter asks for. It bounds memory, and lets tests cross page borders with small scenes.
+    /// Limits the buffers of this device to `bytes` each, so that scenes and images are cut into
+    /// more pages and bands than the adapter requires. This bounds memory, and lets tests cross
+    /// page borders with small scenes.
     pub fn with_buffer_limit(mut self, bytes: u64) -> Self {
         let limit = &mut self.adapter.max_storage_buffer_binding_size;
         *limit = bytes.min(*limit);
         self
     }
 
-    /// An error of this device.
+    /// Returns an error that names this device's adapter.
     pub(crate) fn error(&self, what: impl Into<String>) -> Error {
         self.adapter.error(what)
     }
@@ -170,7 +187,8 @@ impl Gpu {
         match report {
             None => Ok(()),
             Some(text) => {
-                // wgpu's reports run over many lines; the first and the innermost cause say it.
+                // wgpu's reports have many lines; the first and the last, which is the innermost
+                // cause, are enough.
                 let lines: Vec<_> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
                 let (first, last) = (lines.first().unwrap_or(&""), lines.last().unwrap_or(&""));
                 Err(self.error(if first == last { (*first).to_owned() } else { format!("{first}: {last}") }))
@@ -178,7 +196,7 @@ impl Gpu {
         }
     }
 
-    /// Waits until the device has done all that was submitted.
+    /// Waits until the device has finished all submitted work.
     pub(crate) fn wait(&self) -> Result<()> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
@@ -186,12 +204,13 @@ impl Gpu {
         self.check()
     }
 
-    /// Whether kernels are handed to it in SPIR-V: whether its operations are rounded as they stand (`spirv.rs`).
+    /// Whether the device takes kernels in SPIR-V, and so rounds every operation separately
+    /// (`spirv.rs`).
     pub(super) fn takes_spirv(&self) -> bool {
         self.device.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
     }
 
-    /// Bytes that one buffer and one binding of it may have.
+    /// Largest buffer that fits one binding, bytes.
     pub fn buffer_limit(&self) -> u64 {
         self.adapter.buffer_limit()
     }

@@ -1,21 +1,26 @@
-//! What kernels bind: the variables of each entry point, by name, and the layout that tells wgpu of them.
+//! Reflection of WGSL modules: the variables that each entry point binds, and their wgpu layout.
 
 use std::collections::BTreeMap;
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess, TypeInner};
 
-/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers, in the text or, of a compiled program, in its pipelines.
+/// The bindings of each entry point: the names of its variables and their numbers. The numbers are
+/// those of the WGSL source, or, in a compiled [`Program`](super::program::Program), those of its
+/// pipelines.
 pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
 
-/// A module as it was parsed.
+/// A parsed and validated module.
 pub(super) struct Interface {
     pub module: Module,
     pub info: ModuleInfo,
 }
 
 impl Interface {
-    /// Parses and validates `text`, which may use these capabilities; what is wrong with it in words.
+    /// Parses and validates `text`, which may use `capabilities`.
+    ///
+    /// # Errors
+    /// The parser's or validator's message.
     pub fn of(text: &str, capabilities: Capabilities) -> Result<Self, String> {
         let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
         let info = Validator::new(ValidationFlags::all(), capabilities)
@@ -41,7 +46,7 @@ impl Interface {
         self.module.entry_points.iter().enumerate().map(of).collect()
     }
 
-    /// The variables with a binding that an entry point uses.
+    /// The variables with a binding that the entry point of index `entry` uses.
     fn bound(&self, entry: usize) -> impl Iterator<Item = Handle<naga::GlobalVariable>> + '_ {
         let uses = self.info.get_entry_point(entry);
         let bound = |(handle, variable): &(Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
@@ -50,8 +55,12 @@ impl Interface {
         self.module.global_variables.iter().filter(bound).map(|(handle, _)| handle)
     }
 
-    /// What the entry points `entries` of one pipeline bind together, each with the stage it is of: names and layout, in the order of
-    /// their numbers.
+    /// Returns the variables that one pipeline binds, with names and layout, in the order of their
+    /// binding numbers. `entries` are its entry points, each with its stage.
+    ///
+    /// # Errors
+    /// A message if an entry point is missing, two variables have the same number, or a variable
+    /// cannot be bound.
     pub fn layout(
         &self,
         entries: &[(wgpu::ShaderStages, &str)],
@@ -69,7 +78,7 @@ impl Interface {
                     wgpu::BindGroupLayoutEntry { binding, visibility: stage, ty: self.kind(handle)?, count: None };
                 let known = layout.entry(binding).or_insert_with(|| (name.clone(), new));
                 if known.0 != *name {
-                    return Err(format!("{} and {name} have one number", known.0));
+                    return Err(format!("{} and {name} have the same binding number", known.0));
                 }
                 known.1.visibility |= stage;
             }
@@ -77,7 +86,11 @@ impl Interface {
         Ok(layout.into_values().collect())
     }
 
-    /// Fails unless the fragment shader takes only what the vertex shader hands on, and its results are those of `targets`.
+    /// Checks that the fragment shader reads only what the vertex shader writes, and that its
+    /// outputs match `targets`.
+    ///
+    /// # Errors
+    /// A message that says which does not fit.
     pub fn check_stages(
         &self,
         [vertex, fragment]: [&str; 2],
@@ -99,7 +112,7 @@ impl Interface {
         for taken in fragment.arguments.iter().flat_map(|given| self.places(given.ty, given.binding.as_ref())) {
             if !handed.contains(&taken) {
                 return Err(format!(
-                    "the fragment shader takes place {}, and the vertex shader does not hand it on",
+                    "the fragment shader reads location {}, which the vertex shader does not write",
                     taken.0
                 ));
             }
@@ -113,10 +126,11 @@ impl Interface {
         let scalar = |ty: Handle<naga::Type>| self.module.types[ty].inner.scalar_kind();
         let mut made: Vec<_> = results(fragment).into_iter().map(|(place, ty)| (place, scalar(ty))).collect();
         made.sort_by_key(|(place, _)| *place);
-        if made == wanted { Ok(()) } else { Err("the fragment shader's results are not those of the targets".into()) }
+        if made == wanted { Ok(()) } else { Err("the fragment shader's outputs do not match the targets".into()) }
     }
 
-    /// The locations and types of what is handed from stage to stage, of a value or the members of a structure.
+    /// The locations and types of the values that a result or an argument passes between stages: of
+    /// the value itself or of the members of a struct.
     fn places(&self, ty: Handle<naga::Type>, binding: Option<&naga::Binding>) -> Vec<(u32, Handle<naga::Type>)> {
         let place = |binding: Option<&naga::Binding>| match binding {
             Some(naga::Binding::Location { location, .. }) => Some(*location),
@@ -130,7 +144,7 @@ impl Interface {
         }
     }
 
-    /// What a variable binds.
+    /// Returns the binding type of a variable.
     fn kind(&self, handle: Handle<naga::GlobalVariable>) -> Result<wgpu::BindingType, String> {
         let variable = &self.module.global_variables[handle];
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
@@ -160,7 +174,8 @@ impl Interface {
     }
 }
 
-/// Parses and validates a module; the names of its overrides and the bindings of its entry points.
+/// Parses and validates a module. Returns it, the bindings of its entry points and the names of its
+/// overrides.
 pub fn reflect(text: &str) -> Result<(Module, Bindings, Vec<String>), String> {
     let interface = Interface::of(text, Capabilities::all())?;
     let (bindings, overrides) = (interface.bindings(), interface.overrides());

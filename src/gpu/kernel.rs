@@ -1,4 +1,4 @@
-//! Pipelines of kernels: they are compiled, and dispatched with what they bind, by name.
+//! Pipelines of kernels: compiled in parallel, and dispatched by name with what they bind.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,7 +13,8 @@ use super::sources::{Sources, Text};
 use crate::error::{Error, Result};
 
 impl Compiled {
-    /// The entry points `stages` of the module of `files`, and `draws`.
+    /// Returns the program of the module of `files` with the entry points `stages` and with
+    /// `draws`, compiled or from the cache.
     pub(crate) fn get(
         &self,
         gpu: &Gpu,
@@ -24,18 +25,20 @@ impl Compiled {
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
         let key = (sources.join(files), bits, format!("{stages:?} {draws:?} {}", sources.all_end(files)));
-        // A poisoned lock means that another thread panicked while it looked; the list itself is whole.
+        // A poisoned lock means that another thread panicked while it held it; the cache itself is
+        // whole.
         let programs = || self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs().get(&key) {
             return Ok(program);
         }
-        // Others compile meanwhile, at worst the same.
+        // Other threads can compile meanwhile; at worst, two compile the same program.
         let program = Arc::new(Program::compile(gpu, sources.text(files), stages, draws, constants)?);
         programs().insert(key, Arc::clone(&program));
         Ok(program)
     }
 
-    /// The pipeline of this key, or what `make` makes.
+    /// Returns the cached pipeline of `key`, or makes one and caches it. Without a key, nothing is
+    /// cached.
     fn pipeline(
         &self,
         key: Option<PipelineKey>,
@@ -51,11 +54,14 @@ impl Compiled {
     }
 }
 
-/// The stack of a thread that compiles: that of a process's first thread, which compilers of drivers are tried on.
+/// Stack size of a thread that compiles: that of a process's first thread, on which compilers of
+/// drivers are usually tested.
 const COMPILER_STACK: usize = 8 << 20;
 
-/// What `make` makes of each of `things`, in their order, on threads of their own. A thread of a pool would take up other work while it waits, on top of a driver's on a stack of
-/// 2 MiB, and some that waits for these very kernels.
+/// Returns the result of `make` for each of `things`, in order, computed on several new threads.
+///
+/// Threads of a pool would not do: while one waits it takes up other work, on top of the driver's
+/// and on a stack of 2 MiB, and that work may wait for these very kernels.
 fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -> Vec<M> {
     let (next, made) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -70,11 +76,12 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     thread::scope(|scope| {
         let spawned = |_| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, work).ok();
         let spawned: Vec<_> = (0..threads).filter_map(spawned).collect();
-        // Where there can be no thread more, this one does it all.
+        // If no thread can be started, this one does all the work.
         if spawned.is_empty() {
             work();
         }
-        // A scope does not wait for what threads drop at their ends, which may be the driver's; joining does.
+        // Joins each thread, as a scope does not wait for the destructors of thread-local values,
+        // which may be the driver's.
         for thread in spawned {
             if let Err(panic) = thread.join() {
                 std::panic::resume_unwind(panic);
@@ -84,9 +91,11 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
-/// What `compile` makes on a thread of its own, and what `other` does with the device meanwhile; `compile` first where there can be no thread more.
+/// Runs `compile` on a new thread while this one runs `other`, which uses the device. If no thread
+/// can be started, `compile` runs first.
 pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
-    // The context of OpenGL is one thread's as long as it compiles a kernel, and others do not wait for it for long.
+    // In OpenGL, a thread that compiles holds the context, and other threads give up waiting for it
+    // after a short time.
     if gpu.adapter.api == "gl" {
         return (compile(), other());
     }
@@ -99,7 +108,8 @@ pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, othe
 }
 
 impl Draw {
-    /// The pipeline of `module`, with `constants` and its own, and what it binds.
+    /// Compiles this draw from `module`, with `constants` and its own. Returns the pipeline, and
+    /// the names and binding numbers of its variables.
     fn pipeline(
         &self,
         gpu: &Gpu,
@@ -138,7 +148,8 @@ impl Draw {
     }
 }
 
-/// What `make` makes, or what the device says against it: errors are told to the thread that made them.
+/// Returns the result of `make`, or the first error that the device reports for it. Error scopes
+/// are per thread, so the error reaches the thread that caused it.
 fn watched<T>(gpu: &Gpu, make: impl FnOnce() -> Result<T>) -> Result<T> {
     let kinds = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal];
     let scopes = kinds.map(|kind| gpu.device.push_error_scope(kind));
@@ -150,7 +161,8 @@ fn watched<T>(gpu: &Gpu, make: impl FnOnce() -> Result<T>) -> Result<T> {
     }
 }
 
-/// The pipeline of one of a module's kernels, and what it binds.
+/// Compiles the entry point `stage` of a module. Returns the pipeline, and the names and binding
+/// numbers of its variables.
 fn compute(
     gpu: &Gpu,
     module: &Module,
@@ -174,7 +186,8 @@ fn compute(
 }
 
 impl Program {
-    /// Compiles the entry points `stages` of a module, and `draws`. Of `constants` those are set that it declares.
+    /// Compiles the entry points `stages` of a module, and `draws`. Sets those of `constants` that
+    /// the module declares.
     pub(crate) fn compile(
         gpu: &Gpu,
         text: Text,
@@ -184,7 +197,7 @@ impl Program {
     ) -> Result<Self> {
         let mut program = Self { counts_loops: text.counts_loops, ..Self::default() };
         let module = watched(gpu, || Module::of(gpu, text))?;
-        // Half of a first frame's time would else go by here.
+        // Compiles in parallel; sequentially, this would be half the time of a first frame.
         let compiled = side_by_side(stages, |&stage| watched(gpu, || compute(gpu, &module, stage, constants)));
         for (&stage, compiled) in stages.iter().zip(compiled) {
             let (pipeline, variables) = compiled?;
@@ -200,7 +213,8 @@ impl Program {
         Ok(program)
     }
 
-    /// What `stage` binds: each of its variables as `binding` says.
+    /// Creates the bind group of `stage`; `binding` returns the resource of each variable by its
+    /// name.
     fn group<'a>(
         &self,
         gpu: &Gpu,
@@ -217,7 +231,7 @@ impl Program {
         Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(stage), layout, entries: &entries }))
     }
 
-    /// Dispatches `stage` over `grid`.
+    /// Dispatches `stage` over `grid`; `binding` returns the resource of each variable by its name.
     pub(crate) fn dispatch<'a>(
         &self,
         gpu: &Gpu,
@@ -241,7 +255,7 @@ impl Program {
 }
 
 impl Program {
-    /// Draws the triangles of `vertices` vertices by the pipeline `name`.
+    /// Draws `vertices` vertices as triangles with the pipeline `name`.
     pub(crate) fn draw<'a>(
         &self,
         gpu: &Gpu,
@@ -263,18 +277,25 @@ impl Program {
 
 /// The workgroups of a dispatch.
 pub(crate) enum Grid<'a> {
-    /// In x and y.
+    /// Their number in x and y.
     Of((u32, u32)),
-    /// As the device wrote them at this byte of a buffer.
+    /// Written by the device, at this byte offset of a buffer.
     In(&'a wgpu::Buffer, u64),
 }
 
-/// The 2-D grid of workgroups for `invocations`, within the adapter's limit per dimension.
+/// Returns a 2-D grid of workgroups with at least `invocations` invocations, within the adapter's
+/// limit per dimension.
+///
+/// # Errors
+/// [`Error::Limit`] if two dimensions are not enough.
 pub fn grid(gpu: &Gpu, invocations: u64) -> Result<(u32, u32)> {
     workgroup_grid(gpu, invocations.div_ceil(u64::from(WORKGROUP)))
 }
 
-/// A 2-D grid of at least `groups` workgroups, within the adapter's limit per dimension.
+/// Returns a 2-D grid of at least `groups` workgroups, within the adapter's limit per dimension.
+///
+/// # Errors
+/// [`Error::Limit`] if two dimensions are not enough.
 pub fn workgroup_grid(gpu: &Gpu, groups: u64) -> Result<(u32, u32)> {
     let limit = u64::from(gpu.adapter.max_compute_workgroups_per_dimension);
     let rows = groups.div_ceil(limit).max(1);

@@ -1,43 +1,48 @@
-//! Every struct and constant that host and device share, and nothing else. `wgsl/layout.wgsl` states the layout; the
-//! test in `tests/layout` compares it with this mirror field by field.
+//! The structs and constants that host and device share, and nothing else.
+//!
+//! `wgsl/layout.wgsl` defines the layout; `tests/layout` compares it with this mirror field by
+//! field.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::scene::light::MAX_LIGHTS;
 
-/// Invocations of a workgroup, in every kernel.
+/// Invocations of a workgroup in most kernels that number them in one dimension.
 pub const WORKGROUP: u32 = 64;
 
-/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and two grids of
-/// workgroups.
+/// Words at the start of a page's queue of large splats: the number of large splats, the number of
+/// splats out of view, and two grids of workgroups.
 pub const QUEUE_START: u32 = 8;
 
-/// Word of the queue at which the grid starts that has a workgroup for each large splat.
+/// First word of the queue's grid with one workgroup per large splat.
 pub const QUEUE_GRID: u32 = 2;
 
-/// Word of the queue at which the grid starts that lists the large splats in tiles, some a workgroup.
+/// First word of the queue's grid for listing large splats in tiles, with several splats per
+/// workgroup.
 pub const QUEUE_LISTING: u32 = 5;
 
-/// Pixels of a tile across (`wgsl/covered.wgsl`).
+/// Width of a tile, pixels (`wgsl/covered.wgsl`).
 pub const TILE_WIDTH: u32 = 8;
 
-/// Pixels of a tile down, where its invocations share what they fetch (`wgsl/splat_shared.wgsl`): the more, the fewer tiles fetch the
-/// same splat.
+/// Height of a tile, pixels, if its invocations share the splats that they fetch
+/// (`wgsl/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same splat.
 pub const TILE_ROWS_SHARED: u32 = 16;
 
-/// Pixels of a tile down elsewhere.
+/// Height of a tile, pixels, if its invocations do not share splats.
 pub const TILE_ROWS_PLAIN: u32 = 8;
 
-/// Words at the start of the list of covered tiles: how many there are, and two grids of workgroups (`wgsl/covered.wgsl`).
+/// Words at the start of the list of covered tiles: the number of tiles, and two grids of
+/// workgroups (`wgsl/covered.wgsl`).
 pub const COVERED_LIST: u32 = 8;
 
-/// Word of that list at which the grid starts that has a workgroup for each tile.
+/// First word of that list's grid with one workgroup per tile.
 pub const COVERED_GRID: u32 = 1;
 
-/// Word of that list at which the grid starts that has one for eight tiles.
+/// First word of that list's grid with one workgroup per eight tiles.
 pub const COVERED_GRID_OF_EIGHTS: u32 = 4;
 
-/// Words at the start of the lists of tiles: what they needed.
+/// Words at the start of the tile lists: the greatest length so far of all lists together, and of
+/// one list (`wgsl/bin.wgsl`).
 pub const LIST_ENDS: u32 = 2;
 
 /// Side of the blocks of tiles that share a list of large splats, pixels.
@@ -46,60 +51,64 @@ pub const BLOCK_SIDE: u32 = 16;
 /// The most workgroups per dimension that every adapter grants.
 pub const MOST_GROUPS: u32 = 65_535;
 
-/// The most pixels that one invocation may visit for one splat: llvmpipe ends loops after 65,535 rounds.
+/// The most pixels that one invocation may visit for one splat: llvmpipe ends loops after 65,535
+/// rounds.
 pub const MOST_ROUNDS: u32 = 32_768;
 
-/// Invocations of a workgroup that draws a large splat: a square of 16.
+/// Side of the square workgroup that draws a large splat, in invocations.
 pub const TILE: u32 = 16;
 
-/// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
+/// Surfels of a batch: consecutive in memory, and culled together (`wgsl/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
-/// Surfels of a run, which are dealt out together: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
+/// Surfels of a run, a number of whole batches that are dealt out together. Of 64, 512 and 4096,
+/// this gave the shortest frames on a software adapter.
 pub const RUN: u32 = 512;
 
-/// Words of the state of a cut (`wgsl/select.wgsl`): where the grids of nodes that are judged and of nodes that are spread start, of which the latter
-/// is last.
+/// First word of the grid over the nodes to judge, in the state of a cut (`wgsl/select.wgsl`).
 pub const JUDGE_GRID: u32 = 4;
-/// See [`JUDGE_GRID`].
+/// First word of the grid over the nodes to spread, the last in that state; see [`JUDGE_GRID`].
 pub const SPREAD_GRID: u32 = 7;
 
-/// Nodes that one invocation judges (`wgsl/select.wgsl`). Cuts of 15,000 and of 330,000 nodes were made in the shortest time by 8 and 16 of 1, 4, 8, 16
-/// and 32 on a software adapter.
+/// Nodes that one invocation judges (`wgsl/select.wgsl`). Of 1, 4, 8, 16 and 32 on a software
+/// adapter, 8 was fastest for cuts of 15,000 nodes and 16 for cuts of 330,000.
 pub const JUDGED: u32 = 8;
 
-/// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
+/// Lowest bit of the node's kind in [`TreeNode::below`].
 pub const KIND_SHIFT: u32 = 30;
 
-/// A node with children.
+/// Kind of a node with children.
 pub const INNER: u32 = 0;
 
-/// A node with surfels.
+/// Kind of a node with surfels.
 pub const LEAF: u32 = 1;
 
-/// A node that leads to a root of another branch.
+/// Kind of a node that leads to a root of another branch.
 pub const OTHER_BRANCH: u32 = 2;
 
-/// One that has some surfels of a leaf.
+/// Kind of a node that has a part of a leaf's surfels.
 pub const PART_OF_LEAF: u32 = 3;
 
-/// Words at the start of a list of batches: a grid of workgroups that draws all of them, and one that draws the far ones.
+/// Words at the start of a list of batches: a grid of workgroups over all batches, and one over the
+/// far batches (`wgsl/cull.wgsl`).
 pub const LIST_START: u32 = 6;
 
-/// Word of that list at which the grid of the far ones starts.
+/// First word of that list's grid over the far batches.
 pub const LIST_FAR: u32 = 3;
 
-/// Side of the tiles by which hidden splats are told, pixels.
+/// Side of the tiles of the occlusion test, pixels (`wgsl/occlusion.wgsl`).
 pub const OCCLUSION_TILE: u32 = 8;
 
-/// Units of a weight of 1 in the sums of the accumulator `fixed`: as many as a word holds, of which f32 and the least
-/// weight keep every digit.
+/// Units of a weight of 1 in the sums of the accumulator `fixed`: 2^32 - 2^10. It fits one word, is
+/// exact in f32, and its product with [`LEAST_AT_RIM`](crate::scene::kernel::LEAST_AT_RIM), 2^-10,
+/// is an integer.
 pub const ONE: u32 = u32::MAX - 1023;
 
-/// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
+/// Bit of [`Splat::bounds_last`] that is set if s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
 
-/// The camera, options and facts of one render, as the kernels see them. See the WGSL for the meaning of each field.
+/// Camera, options and facts of one render, for the kernels; `wgsl/layout.wgsl` explains the
+/// fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -142,7 +151,7 @@ pub struct View {
 pub struct Band {
     /// Row of the image that is row 0 of the buffers.
     pub first_row: u32,
-    /// Rows held.
+    /// Number of rows.
     pub rows: u32,
     /// Always 0.
     pub padding_0: u32,
@@ -150,7 +159,7 @@ pub struct Band {
     pub padding_1: u32,
 }
 
-/// A projected surfel; see the WGSL.
+/// A projected surfel; `wgsl/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -165,7 +174,7 @@ pub struct Splat {
     pub a_low: [f32; 3],
 }
 
-/// A page of surfels; see the WGSL.
+/// A page of surfels; `wgsl/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -180,7 +189,7 @@ pub struct Page {
     pub padding_2: u32,
 }
 
-/// A node of a tree; see the WGSL.
+/// A node of a tree; `wgsl/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -193,7 +202,7 @@ pub struct TreeNode {
     pub cone: f32,
 }
 
-/// Neighbouring subtrees of a tree; see the WGSL.
+/// A branch, neighbouring subtrees of a tree; `wgsl/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -208,7 +217,7 @@ pub struct Branch {
     pub padding_1: u32,
 }
 
-/// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.
+/// Input of the low-pass for one splat; `wgsl/filter.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]

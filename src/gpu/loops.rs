@@ -1,52 +1,62 @@
-//! Which kernels' loops are known to end, and modules of them.
+//! Decides which modules need loop counters: those with a loop that is not proven to end.
 //!
-//! wgpu gives every loop a counter that ends it, as a loop without an end is undefined behaviour on most devices. Counting takes
-//! time in every round: on Mesa's llvmpipe 1.02 to 1.12 of a frame's (`benches/optimisations.toml`).
-//! The counters are left out of modules all of whose loops end by the following proof; every other check of wgpu stays.
+//! wgpu adds to every loop a counter that ends it, because a loop without an end is undefined
+//! behaviour on most devices. Counting costs time in every round: on Mesa's llvmpipe a frame takes
+//! 1.02 to 1.12 times as long (`benches/optimisations.toml`). A module has no counters if all its
+//! loops end by the proof below; every other check of wgpu stays.
 //!
-//! 1. A **counter** starts somewhere, grows by 1 or by a constant step of at most 256 in each round whatever happens in it, and
-//!    the loop ends once it passes a limit that no round changes. It ends if the counter cannot wrap on its way past the limit,
-//!    thus if the limit is at most 2^32 - 1 - 256. Limits are: constants; sides of the image, which have 15 bits
-//!    ([`Camera`](crate::scene::Camera) refuses larger ones), and cells and tiles of it; and lengths of lists, of which each is a
-//!    range within a binding (`column_of` holds it below `arrayLength`, and its end is its start plus what was placed), thus
-//!    shorter than 2^30 words, and a tile has two.
-//!    Where it grows by 1 as long as it is below its limit any limit will do: it comes there before it wraps.
-//! 2. A **rectangle** is passed in rows by a pixel that grows by a step in each round: `at.x` grows, and where it passes the last
-//!    column it starts again with `at.y` grown. Columns and rows come from a splat's bounds, whose numbers have 15 and 16 bits, so
-//!    each of at most 2^16 rows has at most 2^16 rounds.
-//! 3. A set of **bits** in a word loses one in each round, and the loop ends when none is left: at most 32 rounds.
-//! 4. The outer loops of `accumulate_splat` and `list_splat` go on only if the inner one moved on in its rectangle (2).
-//! 5. A counter **shrinks** by 1 in each round, and the loop ends at 0 or at a limit that no round changes, which is not below 0; or it
-//!    grows to more than twice itself (`sink`) and the loop ends past the length of a list, which is shorter than 2^30.
-//! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, or tells the fragment at `first`, as its surface reaches at least as deep,
-//!    or is the last; and the inner loop moves `first`, which is a counter (1), past all that is told.
+//! 1. A **counter** starts anywhere and grows by 1, or by a constant step of at most 256, in every
+//!    round, and the loop ends once it passes a limit that no round changes. The loop ends if the
+//!    counter cannot wrap before it passes the limit, that is, if the limit is at most
+//!    2^32 - 1 - 256. The limits are: constants; sides of the image, which have 15 bits
+//!    ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
+//!    and lengths of lists. A list is a range within a binding (`column_of` keeps its start below
+//!    `arrayLength`, and its end is its start plus the number of entries that were placed), so it
+//!    is shorter than 2^30 words; a tile has two lists. If the counter grows by 1 while it is below
+//!    its limit, any limit will do: the counter reaches it before it wraps.
+//! 2. A **rectangle** is traversed row by row by a pixel that moves by a step in every round:
+//!    `at.x` grows, and when it passes the last column it restarts with `at.y` grown. Columns and
+//!    rows come from a splat's bounds, whose numbers have 15 and 16 bits, so each of at most 2^16
+//!    rows has at most 2^16 rounds.
+//! 3. A set of **bits** in a word loses one bit in every round, and the loop ends when none is
+//!    left: at most 32 rounds.
+//! 4. The outer loops of `accumulate_splat` and `list_splat` continue only if the inner loop
+//!    advanced in its rectangle (2).
+//! 5. A counter **shrinks** by 1 in every round, and the loop ends at 0 or at a limit, not below 0,
+//!    that no round changes; or it grows to more than twice its value (`sink`), and the loop ends
+//!    past the length of a list, which is shorter than 2^30.
+//! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, or consumes the fragment at
+//!    `first`, as its surface reaches at least that deep, or is the last round. The inner loop
+//!    moves `first`, which is a counter (1), past all consumed fragments.
 //!
-//! A file of loops that end says so in a comment: by which of these, and the [`code_hash`] of what was proven. Whoever changes its
-//! code proves it again. The compare and exchange of `accumulator_cas.wgsl` is left out: a weak exchange may fail any number of times
-//! by the letter of WGSL. So are texts that are not the built-in ones.
+//! A file whose loops end says so in a comment, which names the rules above and the [`code_hash`]
+//! of the code that was proven. Whoever changes the code must prove it again. Two kinds of text are
+//! excluded: the compare-exchange loop of `accumulator_cas.wgsl`, because by the letter of WGSL a
+//! weak exchange may fail any number of times, and texts that are not the built-in ones.
 
-/// Loops in a kernel's text, each of which starts a line.
+/// Number of loops in a kernel's text. Each loop must start a line.
 fn loops(text: &str) -> usize {
     let starts =
         |line: &str| ["for (", "while (", "loop {"].iter().any(|keyword| line.trim_start().starts_with(keyword));
     text.lines().filter(|line| starts(line)).count()
 }
 
-/// The 64-bit FNV-1a hash (Fowler, Noll, Vo) of a kernel's code: of its lines without comments and the space around them.
+/// 64-bit FNV-1a hash (Fowler, Noll, Vo) of a kernel's code: its lines without comments and
+/// surrounding space.
 fn code_hash(text: &str) -> u64 {
     let code = text.lines().map(|line| line.split("//").next().unwrap_or(line).trim()).filter(|code| !code.is_empty());
     code.flat_map(|code| code.bytes().chain([b'\n']))
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
-/// The hash of the code whose loops a kernel's comment says to end.
+/// The hash in a kernel's comment that claims that all loops end.
 fn proven(text: &str) -> Option<u64> {
     let claim = text.lines().find_map(|line| line.strip_prefix("// All loops end, by "))?;
     let (_, hash) = claim.split_once(" of src/gpu/loops.rs: 0x")?;
     u64::from_str_radix(hash, 16).ok()
 }
 
-/// Whether all loops of a built-in kernel end.
+/// Whether all loops of a built-in kernel are proven to end, or it has none.
 pub(super) fn all_end(text: &str) -> bool {
     proven(text).map_or_else(|| loops(text) == 0, |hash| code_hash(text) == hash)
 }
@@ -66,7 +76,7 @@ mod tests {
             assert_eq!(code_hash(text), hash, "{file} is 0x{:016x} now: prove that its loops end", code_hash(text));
             assert!(loops(text) > 0, "{file} has no loop to prove anything of");
         }
-        // A comment is no code; a limit is.
+        // Comments do not change the hash; limits do.
         let (_, text) = FILES.iter().find(|(name, _)| *name == "bin.wgsl").unwrap();
         assert!(all_end(&format!("// Read me.\n{text}")));
         assert!(!all_end(&text.replacen("+= ", "-= ", 1)) && text.contains("+= "));
@@ -89,7 +99,7 @@ mod tests {
         let changed = built_in.replace("visibility.wgsl", "at.x++;", "at.x--;").unwrap();
         assert!(!changed.all_end(&["layout.wgsl", "visibility.wgsl"]));
         assert!(changed.all_end(&["layout.wgsl"]));
-        // Whoever leaves the optimisation out has every loop counted.
+        // With the optimisation off, every loop is counted.
         assert!(!Sources::default().with_counted_loops().all_end(&["layout.wgsl", "visibility.wgsl"]));
     }
 }

@@ -1,4 +1,5 @@
-//! The device: adapter and limits, paged buffers, joined kernels, timing, and the layout shared with WGSL.
+//! The graphics device: adapters and limits, paged buffers, kernels, timing, and the layout shared
+//! with WGSL.
 
 pub mod adapter;
 pub mod buffers;

@@ -1,4 +1,4 @@
-//! Modules of WGSL, and their entry points as a device takes them.
+//! WGSL modules, and their entry points in the form that the device takes: SPIR-V or WGSL.
 
 use naga::valid::Capabilities;
 
@@ -9,39 +9,39 @@ use super::sources::Text;
 use super::spirv;
 use crate::error::Result;
 
-/// A module of kernels.
+/// A parsed module of kernels.
 pub(super) struct Module {
     interface: Interface,
     counts_loops: bool,
-    /// Where the device takes no SPIR-V: the text, which wgpu translates.
+    /// The module for wgpu to translate, if the device does not take SPIR-V.
     text: Option<wgpu::ShaderModule>,
 }
 
-/// What a pipeline binds.
+/// The bindings of a pipeline.
 pub(super) struct Bound {
-    /// Its variables' names and numbers.
+    /// Names and binding numbers of its variables.
     pub variables: Vec<(String, u32)>,
     pub layout: wgpu::PipelineLayout,
     entries: Vec<wgpu::BindGroupLayoutEntry>,
-    /// The number that each has in the text.
+    /// The binding number of each variable in the WGSL source.
     of_text: Vec<u32>,
 }
 
-/// An entry point to compile.
+/// An entry point, ready to be compiled to a pipeline.
 pub(super) struct Entry<'a> {
     name: &'a str,
     told: Told,
     constants: Vec<(&'a str, f64)>,
 }
 
-/// What the device is told of an entry point.
+/// The shader code that the device gets.
 enum Told {
     Words(Vec<u32>),
     Text(wgpu::ShaderModule),
 }
 
 impl Entry<'_> {
-    /// What tells its pipeline from others, as far as it is known here.
+    /// Returns the key of the pipeline in the cache; `None` for WGSL, which is not cached.
     pub fn key(&self, bound: &Bound) -> Option<PipelineKey> {
         match &self.told {
             Told::Words(words) => Some((words.clone(), bound.entries.clone())),
@@ -49,7 +49,7 @@ impl Entry<'_> {
         }
     }
 
-    /// The module that has it.
+    /// Returns the shader module that contains the entry point.
     pub fn module(&self, gpu: &Gpu) -> wgpu::ShaderModule {
         match &self.told {
             Told::Words(words) => translated_here(gpu, self.name, words),
@@ -57,14 +57,14 @@ impl Entry<'_> {
         }
     }
 
-    /// What remains to be set.
+    /// Returns the override constants that remain to be set.
     pub fn options(&self) -> wgpu::PipelineCompilationOptions<'_> {
         wgpu::PipelineCompilationOptions { constants: &self.constants, ..Default::default() }
     }
 }
 
 impl Module {
-    /// The module of a text.
+    /// Parses and validates a module.
     pub fn of(gpu: &Gpu, text: Text) -> Result<Self> {
         let Text { joined, counts_loops } = text;
         let spirv = gpu.takes_spirv();
@@ -75,20 +75,21 @@ impl Module {
         Ok(Self { interface, counts_loops, text })
     }
 
-    /// Fails unless a pipeline's stages and targets fit each other.
+    /// Checks that a draw's two stages and its targets match.
     pub fn check_stages(&self, gpu: &Gpu, stages: [&str; 2], targets: &[wgpu::ColorTargetState]) -> Result<()> {
         let fits = self.interface.check_stages(stages, targets);
-        fits.map_err(|e| gpu.error(format!("what is drawn does not fit: {e}")))
+        fits.map_err(|e| gpu.error(format!("the stages of a draw do not match: {e}")))
     }
 
-    /// What a pipeline of `entries` binds, each with the stage it is of.
+    /// Returns the bindings of a pipeline of `entries`, each with its stage.
     pub fn bind(&self, gpu: &Gpu, entries: &[(wgpu::ShaderStages, &str)]) -> Result<Bound> {
         let layout = self.interface.layout(entries).map_err(|e| gpu.error(format!("a kernel cannot be bound: {e}")))?;
         let of_text = layout.iter().map(|(_, entry)| entry.binding).collect();
         let (mut variables, mut entries) = (Vec::new(), Vec::new());
         for (place, (name, mut entry)) in layout.into_iter().enumerate() {
             if self.text.is_none() {
-                // Numbers without gaps are those that Vulkan is told, whether wgpu numbers anew or not.
+                // Vulkan binding numbers must have no gaps; so they are the same whether or not
+                // wgpu renumbers them.
                 entry.binding = place as u32;
             }
             variables.push((name, entry.binding));
@@ -104,7 +105,8 @@ impl Module {
         Ok(Bound { variables, layout, entries, of_text })
     }
 
-    /// The entry point `name` of a pipeline that binds `bound`. Of `constants` those are set that the module declares.
+    /// Prepares the entry point `name` of a pipeline that binds `bound`. Sets those of `constants`
+    /// that the module declares.
     pub fn entry<'a>(
         &self,
         gpu: &Gpu,
@@ -131,7 +133,8 @@ fn translated_by_wgpu(gpu: &Gpu, text: String, counts_loops: bool) -> wgpu::Shad
         wgpu::ShaderModuleDescriptor { label: Some("epsplat"), source: wgpu::ShaderSource::Wgsl(text.into()) };
     let checks =
         wgpu::ShaderRuntimeChecks { force_loop_bounding: counts_loops, ..wgpu::ShaderRuntimeChecks::checked() };
-    // SAFETY: of all run-time checks the bounds of loops alone are left out, and only where each loop ends (src/gpu/loops.rs).
+    // SAFETY: of all run-time checks the bounds of loops alone are left out, and only where each
+    // loop ends (src/gpu/loops.rs).
     #[allow(unsafe_code)]
     unsafe {
         gpu.device.create_shader_module_trusted(descriptor, checks)
@@ -139,7 +142,7 @@ fn translated_by_wgpu(gpu: &Gpu, text: String, counts_loops: bool) -> wgpu::Shad
 }
 
 fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
-    // Metal alone asks for the workgroup's size.
+    // Only Metal reads the workgroup's size.
     let entry = [wgpu::PassthroughShaderEntryPoint { name: name.into(), workgroup_size: (1, 1, 1) }];
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
         label: Some(name),
@@ -148,17 +151,22 @@ fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
         ..Default::default()
     };
     // SAFETY: what wgpu checks of WGSL and not of SPIR-V holds without it.
-    // - The words are valid: `naga` wrote them, as it does for wgpu, of a module that it found valid for what the device's features
-    //   allow and nothing else; the decorations beside them are of results of the kind that may have it.
-    // - They bind what the pipeline's layout says: both are made of the same module's variables (`Interface::layout`), and other variables that
-    //   the host sets are refused.
-    // - No access leaves its variable: indices are restricted, but for those of buffers, which wgpu has the device itself bound (`robustBufferAccess`,
-    //   which all of Vulkan has and wgpu asks for). What lies outside reads or writes another part of that buffer at worst, where wgpu's own translation holds the
-    //   index within it on devices without `robustBufferAccess2`.
-    // - Memory is defined: workgroups' starts at zero, and buffers' is wgpu's.
-    // - Loops end: they are counted, but for those that are known to (src/gpu/loops.rs). Integers are not divided by zero: checked.
-    // - Workgroups and their memory are within the device's limits: looked at (`spirv::translate`).
-    // - What is drawn hands on what the next stage takes, and fills the targets: looked at (`check_stages`).
+    // - The words are valid: `naga` wrote them, as it does for wgpu, from a module that it
+    //   validated for exactly what the device's features allow. The decorations that are added here
+    //   are on results that may have them.
+    // - The bindings match the pipeline's layout: both come from the variables of the same module
+    //   (`Interface::layout`), and other variables that the host sets are refused.
+    // - No access leaves its variable: indices are restricted, except those of buffers, which the
+    //   device itself bounds (`robustBufferAccess`: all of Vulkan has it, and wgpu asks for it). An
+    //   index outside reads or writes another part of the same buffer at worst; wgpu's own
+    //   translation would clamp it on devices without `robustBufferAccess2`.
+    // - Memory is initialised: workgroup memory is zeroed in the kernel, and wgpu initialises
+    //   buffers.
+    // - Loops end: they have counters, unless they are proven to end (src/gpu/loops.rs). Integer
+    //   division by zero is checked.
+    // - Workgroups and their memory are within the device's limits: `spirv::translate` checks that.
+    // - The fragment shader reads only what the vertex shader writes, and fills the targets:
+    //   `check_stages` checks that.
     #[allow(unsafe_code)]
     unsafe {
         gpu.device.create_shader_module_passthrough(descriptor)

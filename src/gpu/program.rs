@@ -1,4 +1,4 @@
-//! Compiled kernels, and those that a device keeps.
+//! Compiled kernels, and the cache of them on a device.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -6,39 +6,40 @@ use std::sync::{Arc, Mutex};
 use super::interface::Bindings;
 use super::recent::Recent;
 
-/// The compiled kernels of a render.
+/// The compiled kernels of a module, by entry point.
 #[derive(Default)]
 pub struct Program {
     pub(super) pipelines: BTreeMap<String, wgpu::ComputePipeline>,
     pub(super) draws: BTreeMap<String, wgpu::RenderPipeline>,
     pub(super) bindings: Bindings,
-    /// Every loop has a counter that ends it (`src/gpu/loops.rs`).
+    /// Whether every loop has a counter that ends it (`src/gpu/loops.rs`).
     pub(super) counts_loops: bool,
 }
 
 impl Program {
-    /// Whether every loop has a counter that ends it, rather than a proof that it does.
+    /// Whether every loop has a counter that ends it, instead of a proof that it ends.
     pub fn counts_loops(&self) -> bool {
         self.counts_loops
     }
 
-    /// The variables that an entry point or a draw binds: their names and numbers.
+    /// The names and binding numbers of the variables that an entry point or a draw uses.
     pub fn variables(&self, stage: &str) -> &[(String, u32)] {
         self.bindings.get(stage).map_or(&[], Vec::as_slice)
     }
 }
 
-/// Programs that are kept, with their pipelines, of which each has up to about 15: a study has a few at a time.
+/// Programs in the cache. Each has up to about 15 pipelines, and a study uses a few programs at a
+/// time.
 const MOST_PROGRAMS: usize = 16;
 
-/// Pipelines that are kept beside them. Mesa takes about 3 MB for each where processors draw.
+/// Pipelines in the cache. On a CPU, Mesa needs about 3 MB for each.
 const MOST_PIPELINES: usize = 128;
 
-/// What was compiled for a device is not compiled again, as long as it is asked for now and then.
+/// The least recently used caches of what was compiled for a device.
 pub(crate) struct Compiled {
-    /// By their text and constants.
+    /// Programs by source and constants.
     pub(super) programs: Mutex<Recent<ProgramKey, Arc<Program>>>,
-    /// Those of programs by what the device was told: many are the same in different programs.
+    /// Compute pipelines by SPIR-V and bindings. Different programs share many of them.
     pub(super) pipelines: Mutex<Recent<PipelineKey, wgpu::ComputePipeline>>,
 }
 
@@ -49,13 +50,13 @@ impl Default for Compiled {
 }
 
 impl Compiled {
-    /// Pipelines that are kept by what the device was told.
+    /// Number of pipelines in the cache.
     #[cfg(test)]
     pub(crate) fn count_pipelines(&self) -> usize {
         self.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values().count()
     }
 
-    /// Whether each program that was compiled counts its loops.
+    /// For each program in the cache, whether its loops have counters.
     #[cfg(test)]
     pub(crate) fn count_loops(&self) -> Vec<bool> {
         let programs = self.programs.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -63,25 +64,26 @@ impl Compiled {
     }
 }
 
-/// A module's text, its constants by name as bits, and in words its entry points, draws and whether its loops end.
+/// Key of a program: its source; its constants, by name, as bits; and a text of its entry points,
+/// draws and whether its loops are proven to end.
 pub(super) type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
-/// A kernel in SPIR-V, and what it binds.
+/// Key of a pipeline: its SPIR-V and the layout of its bindings.
 pub(super) type PipelineKey = (Vec<u32>, Vec<wgpu::BindGroupLayoutEntry>);
 
 /// A render pipeline to compile: the rasteriser's part of a program.
 #[derive(Debug)]
 pub struct Draw {
-    /// Its name.
+    /// Name of the pipeline.
     pub name: &'static str,
-    /// The vertex shader.
+    /// Entry point of the vertex shader.
     pub vertex: &'static str,
-    /// The fragment shader.
+    /// Entry point of the fragment shader.
     pub fragment: &'static str,
-    /// What is blended into.
+    /// Formats and blending of the targets.
     pub targets: Vec<wgpu::ColorTargetState>,
-    /// How depths are compared.
+    /// Depth test, if any.
     pub depth: Option<wgpu::DepthStencilState>,
-    /// Set beside the program's constants.
+    /// An override constant to set besides those of the program.
     pub constant: Option<(&'static str, f64)>,
 }

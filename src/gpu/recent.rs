@@ -1,23 +1,24 @@
-//! What was asked for last, of what is dear to make and to keep.
+//! A cache of recently used values that are expensive to compute and to keep.
 
 use std::collections::HashMap;
 use std::hash::Hash;
 
-/// So many values at most, by their keys: where one more comes, the one goes that was not asked for the longest.
+/// A cache of at most `most` values. When it is full, a new value replaces the least recently used
+/// one.
 pub(super) struct Recent<K, V> {
     most: usize,
-    /// Each with the number of the question that it was the last answer to.
+    /// Each value with the number of the query that last returned or inserted it.
     kept: HashMap<K, (u64, V)>,
     questions: u64,
 }
 
 impl<K: Eq + Hash, V: Clone> Recent<K, V> {
-    /// None yet.
+    /// Creates an empty cache of at most `most` values.
     pub fn of(most: usize) -> Self {
         Self { most, kept: HashMap::new(), questions: 0 }
     }
 
-    /// The value of a key, if it is kept.
+    /// Returns the value of `key` if the cache has it, and marks it as used.
     pub fn get(&mut self, key: &K) -> Option<V> {
         self.questions += 1;
         let (last, value) = self.kept.get_mut(key)?;
@@ -25,7 +26,7 @@ impl<K: Eq + Hash, V: Clone> Recent<K, V> {
         Some(value.clone())
     }
 
-    /// Keeps a value.
+    /// Inserts a value, and removes the least recently used one if there are too many.
     pub fn insert(&mut self, key: K, value: V) {
         self.questions += 1;
         self.kept.insert(key, (self.questions, value));
@@ -35,7 +36,7 @@ impl<K: Eq + Hash, V: Clone> Recent<K, V> {
         }
     }
 
-    /// All that are kept.
+    /// All values in the cache.
     #[cfg(test)]
     pub fn values(&self) -> impl Iterator<Item = &V> {
         self.kept.values().map(|(_, value)| value)

@@ -1,11 +1,13 @@
-//! SPIR-V in which every operation is rounded by itself.
+//! Translates kernels to SPIR-V in which every operation is rounded separately.
 //!
-//! Vulkan lets a driver compute `a * b + c` with one rounding, and put `b` in place of `(a + b) - a`, and which it does depends on what
-//! stands around: the same lines give other bits in the tiles' kernel than in the one that scatters, and pages other ones than one buffer. NVIDIA's
-//! does both. The decoration `NoContraction` forbids it, and WGSL has no word for that; so kernels
-//! are translated here, by the translator that wgpu itself uses, and decorated. Then sums, differences and products are those of IEEE 754 on
-//! every adapter of Vulkan that rounds to nearest, but for numbers below the smallest normal one, which may be 0; quotients, roots, powers and exponentials are as
-//! exact as the driver makes them.
+//! Vulkan lets a driver compute `a * b + c` with one rounding, and replace `(a + b) - a` by `b`.
+//! Whether it does depends on the surrounding code: the same lines give different bits in the tile
+//! kernel and in the scatter kernel, and with pages and with one buffer. NVIDIA's driver does both.
+//! The decoration `NoContraction` forbids it, but WGSL has no word for it. So kernels are
+//! translated here, by the translator that wgpu itself uses, and decorated. Sums, differences and
+//! products are then those of IEEE 754 on every Vulkan adapter that rounds to nearest, except that
+//! numbers below the smallest normal one may become 0. Quotients, roots, powers and exponentials
+//! are as exact as the driver makes them.
 
 use std::ops::RangeInclusive;
 
@@ -15,22 +17,28 @@ use naga::valid::Capabilities;
 
 use super::interface::Interface;
 
-/// The words before the first instruction.
+/// Number of words before the first instruction.
 const HEADER: usize = 5;
-/// OpDecorate.
+/// Opcode of OpDecorate.
 const DECORATE: u32 = 71;
-/// The first and last opcode of types, of which every module has one; annotations come before them.
+/// First and last opcode of types. Every module has one, and annotations come before them.
 const TYPES: RangeInclusive<u32> = 19..=39;
-/// The decoration's number.
+/// Number of the decoration NoContraction.
 const NO_CONTRACTION: u32 = 42;
 
-/// Whether an instruction computes with floating-point numbers: its result is its third word. FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod,
-/// and products of vectors and matrices up to Dot.
+/// Whether an instruction does floating-point arithmetic; its result is then its third word.
+///
+/// These are FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod, and the products of vectors and matrices
+/// up to Dot.
 fn is_arithmetic(opcode: u32) -> bool {
     matches!(opcode, 127 | 129 | 131 | 133 | 136 | 140 | 141..=148)
 }
 
-/// The entry point `entry` of a module as SPIR-V, with `constants` and without what other entry points use.
+/// Translates one entry point of a module to SPIR-V, with `constants` set and without what only
+/// other entry points use.
+///
+/// # Errors
+/// A message if the translator refuses the module, or its workgroup is too large for `limits`.
 pub(super) fn translate(
     interface: &Interface,
     entry: (naga::ShaderStage, &str),
@@ -48,7 +56,8 @@ pub(super) fn translate(
     uncontracted(&words)
 }
 
-/// Fails if an entry point's workgroup, or the memory that one has, is larger than the device allows. Only what the entry point uses is left in `module`.
+/// Checks the workgroup size and the workgroup memory against the device's limits. `module` must
+/// contain only what its entry point uses.
 fn check_workgroup(module: &naga::Module, limits: &wgpu::Limits) -> Result<(), String> {
     let mut layouter = naga::proc::Layouter::default();
     layouter.update(module.to_ctx()).map_err(|e| e.to_string())?;
@@ -74,7 +83,7 @@ fn check_workgroup(module: &naga::Module, limits: &wgpu::Limits) -> Result<(), S
     Ok(())
 }
 
-/// What a text may use on a device with `features`.
+/// The capabilities that WGSL may use on a device with `features`.
 pub(super) fn capabilities(features: wgpu::Features) -> Capabilities {
     let granted = [
         (wgpu::Features::SHADER_INT64, Capabilities::SHADER_INT64),
@@ -88,8 +97,11 @@ pub(super) fn capabilities(features: wgpu::Features) -> Capabilities {
     granted.iter().filter(|(feature, _)| features.contains(*feature)).map(|(_, granted)| *granted).collect()
 }
 
-/// How to translate for a device with `features`: what is allowed are its features, and all checks are on but those of buffers, and
-/// of loops unless `counts_loops`. `numbers` are those of variables in the text, and what they are bound by.
+/// Returns the translator's options for a device with `features`.
+///
+/// The module may use what these features grant. All checks are on, except those of buffer accesses
+/// and, unless `counts_loops`, of loops. `numbers` maps binding numbers of the source to those of
+/// the pipeline.
 pub(super) fn options(
     features: wgpu::Features,
     numbers: impl Iterator<Item = (u32, u32)>,
@@ -120,7 +132,7 @@ pub(super) fn options(
         (naga::ResourceBinding { group: 0, binding: of_text }, number)
     });
     spv::Options {
-        // Subgroups are of 1.3, and a feature of devices that read it.
+        // Subgroups need SPIR-V 1.3, which devices with that feature can read.
         lang_version: if features.contains(wgpu::Features::SUBGROUP) { (1, 3) } else { (1, 0) },
         flags: spv::WriterFlags::empty(),
         fake_missing_bindings: false,
@@ -137,7 +149,7 @@ pub(super) fn options(
     }
 }
 
-/// Decorates every arithmetic instruction's result.
+/// Adds the decoration NoContraction to the result of every arithmetic instruction.
 fn uncontracted(words: &[u32]) -> Result<Vec<u32>, String> {
     let (mut arithmetic, mut types) = (Vec::new(), None);
     let mut at = HEADER;
@@ -171,10 +183,10 @@ mod tests {
             numbers[id.x] = -own / by.xy + own * TWICE - own * by.z + vec2<f32>(f32(id.x + 1u));
         }";
 
-    /// OpStore.
+    /// Opcode of OpStore.
     const STORE: u32 = 62;
 
-    /// Instructions: their opcodes and operands.
+    /// Splits a module into instructions: opcode and operands.
     fn instructions(words: &[u32]) -> Vec<(u32, &[u32])> {
         let (mut all, mut rest) = (Vec::new(), &words[HEADER..]);
         while let Some(&word) = rest.first() {
@@ -204,14 +216,14 @@ mod tests {
             .filter(|(_, of)| of.get(1).is_some_and(|id| decorated.contains(id)))
             .map(|(op, _)| *op)
             .collect();
-        // What stores a result names it at the same place.
+        // A store has the result at the same operand.
         opcodes.retain(|op| ![DECORATE, STORE].contains(op));
         opcodes.sort_unstable();
         assert_eq!(opcodes, [127, 129, 129, 131, 136, 142, 142]);
-        // Before the types, as the order of sections has it.
+        // Decorations come before types, as SPIR-V orders its sections.
         let first_type = all.iter().position(|(op, _)| (19..=33).contains(op)).unwrap();
         assert!(all.iter().rposition(|instruction| is_ours(&instruction)).unwrap() < first_type);
-        // Without them it is what the translator wrote.
+        // Without the decorations, the module is what the translator wrote.
         let pipeline =
             spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: "double".to_owned() };
         let constants = [("TWICE".to_owned(), 2.0)].into_iter().collect();
@@ -226,7 +238,7 @@ mod tests {
         let rest: Vec<_> = all.iter().filter(|instruction| !is_ours(instruction)).copied().collect();
         assert_eq!(rest, instructions(&plain));
         assert!(!instructions(&plain).iter().any(|instruction| is_ours(&instruction)), "the control");
-        // The numbers it is told.
+        // The bindings have the pipeline's numbers.
         let bindings = all.iter().filter(|(op, of)| *op == DECORATE && of[1] == 33).map(|(_, of)| of[2]);
         assert_eq!(bindings.collect::<std::collections::BTreeSet<_>>(), [0, 1].into());
     }
@@ -237,7 +249,7 @@ mod tests {
         translate(&interface, (naga::ShaderStage::Compute, "go"), &[], (&options, limits))
     }
 
-    /// Kernels that need what the device does not grant are refused, and not handed over.
+    /// Kernels that need more than the device grants are refused before the driver sees them.
     #[test]
     fn what_is_not_granted_is_refused() {
         let (core, limits) = (wgpu::Features::empty(), wgpu::Limits::default());
@@ -260,7 +272,7 @@ mod tests {
         assert!(translated(immediate, core, &limits).is_err());
     }
 
-    /// Of a kernel that binds nothing, too, decorations come before types.
+    /// Decorations come before types even if a kernel binds nothing.
     #[test]
     fn a_kernel_without_annotations_gets_them_in_their_place() {
         let text = "@compute @workgroup_size(1) fn go() { var x = 1.0; x = x * x; }";

@@ -7,33 +7,34 @@ use super::buffers::Buffer;
 use super::device::Gpu;
 use crate::error::Result;
 
-/// Passes that a query set has room for.
+/// Passes per query set.
 const PASSES: usize = 256;
 
-/// Collects the time of each recorded stage.
+/// Measures the time of each recorded stage.
 pub struct Timing {
-    /// Two queries for each stage so far, if the device's own clock is read.
+    /// Two queries per stage so far; `None` if wall time is measured.
     queries: Option<Vec<wgpu::QuerySet>>,
     stages: Vec<&'static str>,
-    /// What is recorded and not submitted: a card takes the passes up to the next look at its memory at once.
+    /// Recorded but not yet submitted command buffers. They are submitted together when the host
+    /// next reads device memory.
     pending: Vec<wgpu::CommandBuffer>,
     wall: BTreeMap<&'static str, f64>,
 }
 
 impl Timing {
-    /// Of no stage yet.
+    /// Creates a timing without stages.
     pub fn new(gpu: &Gpu) -> Self {
-        // A software adapter does one thing at a time, so wall time is as good; and Mesa's, once it has drawn triangles,
-        // stamps compute passes before they run.
+        // A software adapter runs one pass at a time, so wall time is as good; and Mesa's, once it
+        // has drawn triangles, writes the timestamps of compute passes before they run.
         Self::by(gpu.adapter.timestamps && gpu.adapter.kind != "software")
     }
 
-    /// By the device's clock, or not.
+    /// Creates a timing that uses timestamps of the device, or wall time.
     fn by(on_device: bool) -> Self {
         Self { queries: on_device.then(Vec::new), stages: Vec::new(), pending: Vec::new(), wall: BTreeMap::new() }
     }
 
-    /// The queries of the next stage: a set, and the first of two in it.
+    /// Returns the queries of the next stage: a set, and the first of two queries in it.
     fn next(&mut self, gpu: &Gpu) -> Option<(&wgpu::QuerySet, u32)> {
         let sets = self.queries.as_mut()?;
         if self.stages.len() == sets.len() * PASSES {
@@ -46,12 +47,12 @@ impl Timing {
         Some((sets.last()?, 2 * (self.stages.len() % PASSES) as u32))
     }
 
-    /// Whether times come from the device's own clock.
+    /// Whether times are the device's own timestamps.
     pub fn on_device(&self) -> bool {
         self.queries.is_some()
     }
 
-    /// Records a compute pass that counts as `stage`.
+    /// Records a compute pass that counts as `stage`; `before` records what precedes it.
     pub(crate) fn pass(
         &mut self,
         gpu: &Gpu,
@@ -102,7 +103,8 @@ impl Timing {
         self.submit(gpu, stage, encoder)
     }
 
-    /// Records what is in no pass, as copies are, and counts it as `stage`: from the end of an empty pass to the start of another.
+    /// Records commands outside passes, such as copies, that count as `stage`. They are timed from
+    /// the end of an empty pass to the start of another.
     #[cfg(any(test, feature = "bench"))]
     pub(crate) fn around(
         &mut self,
@@ -142,7 +144,8 @@ impl Timing {
         gpu.check()
     }
 
-    /// Submits all that is recorded: whoever reads from the device or copies on it does this first.
+    /// Submits all recorded commands. Callers must do this before they read from the device or
+    /// submit copies of their own.
     pub(crate) fn flush(&mut self, gpu: &Gpu) -> Result<()> {
         if !self.pending.is_empty() {
             gpu.queue.submit(self.pending.drain(..));
@@ -150,7 +153,7 @@ impl Timing {
         gpu.check()
     }
 
-    /// Milliseconds by stage.
+    /// Returns the milliseconds of each stage.
     pub fn finish(mut self, gpu: &Gpu) -> Result<BTreeMap<&'static str, f64>> {
         self.flush(gpu)?;
         let Some(sets) = self.queries else { return Ok(self.wall) };

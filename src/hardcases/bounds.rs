@@ -1,22 +1,30 @@
-//! The bound on each pixel's error, derived from the pixel's own fragments: no number here was fitted to a result.
+//! Bounds on each pixel's error, derived from the pixel's own fragments. No number is fitted to a
+//! result.
 //!
-//! With u = 2^-24, and for each fragment that [`Precision`](super::precision::Precision) lets the device take for accepted:
+//! With u = 2^-24, for the fragments that the device may accept by
+//! [`Precision`](super::precision::Precision):
 //!
-//! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls with rho), and by what
-//!   WGSL allows its functions: exp(-x) errs by 3 + 2 x units in the last place, a square root by 4.5, a division by 2.5.
-//! - **Mean of an attribute** a: `sum dw (a - mean) / sum w` for wrong weights, at most the spread of the pixel's
-//!   attributes times `sum |dw| / sum w`; `sum w da / sum w` for wrong attributes; and the accumulator's own bound times
-//!   the range that it maps to [0, 1] (the scene's colours, 2 for normals, the accepted interval of depths).
-//! - **Colour** is then unpremultiplied and put over nothing: three more divisions and products of itself.
-//! - **Samples**: the colour of a pixel of several is the mean of theirs, and so is its bound.
-//! - **Lines** at which a disk ends: how far inside (u, v) is errs by the line's length times what (u, v) does, and 10 u of it.
-//! - **Caps** turn the normal by what their slopes do over the error of (u, v), and 30 u of it.
-//! - **Points** that face the camera come nearer by heights, which err by what they change by over the error of rho.
-//! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
-//!   divided by the mean's length.
+//! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls
+//!   with rho), and by the errors that WGSL allows its functions: 3 + 2 x units in the last place
+//!   for exp(-x), 4.5 for a square root, 2.5 for a division.
+//! - **Mean of an attribute** a: wrong weights add `sum dw (a - mean) / sum w`, at most the spread
+//!   of the pixel's attributes times `sum |dw| / sum w`. Wrong attributes add `sum w da / sum w`.
+//!   The accumulator adds its own bound times the range that it maps to [0, 1]: the scene's
+//!   colours, 2 for normals, the accepted interval of depths.
+//! - **Colour** is then unpremultiplied and put over nothing: three more relative errors of
+//!   divisions and products.
+//! - **Samples**: the colour of a pixel with several samples is the mean of theirs, and so is its
+//!   bound.
+//! - **Lines** at which a disk ends: the distance inside a line errs by the line's length times the
+//!   error of (u, v), and by 10 u of itself.
+//! - **Caps** turn the normal by the slopes times the error of (u, v), and by 30 u of the slopes.
+//! - **Points** that face the camera come nearer by their heights, which err by their change over
+//!   the error of rho.
+//! - **Normal**: s x t errs by 6 u |s||t|; normalising and mapping it and normalising the mean add
+//!   12 u. The error of the mean is divided by the mean's length.
 //!
-//! A pixel is **open** if these bounds leave it undecided whether some fragment belongs to it, or which side is nearest: there f32 may rightly
-//! decide otherwise, and the pixel is excused.
+//! A pixel is **open** if these errors leave undecided whether some fragment belongs to it, or
+//! which side is nearest. There f32 may rightly decide otherwise, and the pixel is excused.
 
 use glam::{DVec3, Vec3};
 
@@ -28,15 +36,15 @@ use crate::passes::visibility::Nearest;
 use crate::plan::{AccumulatorRow, Facts, RenderOptions, Sides};
 use crate::scene::{Camera, Epsilon, Kernel, Scene};
 
-/// What a division may err by, relative: WGSL grants 2.5 units in the last place.
+/// Relative error of a division: WGSL allows 2.5 units in the last place.
 pub(super) const DIVISION: f64 = 5.0 * U;
 
-/// What is known of a pixel's fragments before an accumulator is chosen. Sums are over accepted fragments.
+/// Error terms of a pixel, independent of the accumulator. Sums are over accepted fragments.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
-    /// Some fragment may rightly be decided otherwise.
+    /// Whether some fragment may rightly be decided otherwise.
     pub open: bool,
-    /// Accepted fragments.
+    /// Number of accepted fragments.
     pub count: u32,
     /// Sum of weights.
     pub weight: f64,
@@ -52,11 +60,11 @@ pub struct Pixel {
     normal: DVec3,
     /// Smallest and largest premultiplied colour.
     colors: [[f64; 4]; 2],
-    /// Smallest and largest normal.
+    /// Smallest and largest normal, by component.
     normals: [DVec3; 2],
     /// Smallest and largest depth, world units.
     depths: [f64; 2],
-    /// Length of the interval that depths are summed in, world units.
+    /// Length of the interval of depths that the accumulator maps to [0, 1], world units.
     interval: f64,
 }
 
@@ -78,27 +86,27 @@ pub(super) const NOTHING: Pixel = Pixel {
 /// Bounds on the absolute errors of one pixel's maps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PixelBound {
-    /// Linear RGB, straight, and alpha.
+    /// Straight linear RGB, and alpha.
     pub color: [f64; 4],
-    /// World units.
+    /// Depth, world units.
     pub depth: f64,
-    /// Of each component.
+    /// Each component of the normal.
     pub normal: f64,
-    /// Of the sum of weights.
+    /// Sum of weights.
     pub weight: f64,
 }
 
 /// The range of the scene's premultiplied colours, which accumulators map to [0, 1].
 #[derive(Clone, Copy, Debug)]
 pub struct ColorRange {
-    /// Largest minus smallest, by channel.
+    /// Largest minus smallest value of each channel.
     pub span: [f64; 4],
-    /// Largest magnitude, by channel.
+    /// Largest magnitude of each channel.
     pub magnitude: [f64; 4],
 }
 
 impl ColorRange {
-    /// Of `scene`.
+    /// Returns the range of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let (low, high) = scene.color_range();
         let pair = |k: usize| (f64::from(low[k]), f64::from(high[k]));
@@ -110,7 +118,7 @@ impl ColorRange {
 }
 
 impl Pixel {
-    /// The bounds for sums by `accumulator` with `bits` fraction bits.
+    /// Returns the bounds for sums by `accumulator` with `bits` fraction bits.
     pub fn bound(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> PixelBound {
         if self.count == 0 {
             return PixelBound::default();
@@ -130,7 +138,7 @@ impl Pixel {
         PixelBound {
             color,
             depth,
-            // Where the mean is no longer than its error, it may point anywhere.
+            // If the mean is no longer than its error, it can have any direction.
             normal: if normal_length > 0.0 { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
             weight: self.weight_error + self.weight * (sums + 4.0 * U),
         }
@@ -156,12 +164,12 @@ impl Pixel {
         }
     }
 
-    /// What accumulator and division add to a mean, of its range.
+    /// Error that the accumulator and the division add to a mean, as a fraction of the range.
     fn sums(&self, accumulator: &AccumulatorRow, bits: u32) -> f64 {
         (accumulator.error_bound)(f64::from(self.count), self.weight, bits) + DIVISION
     }
 
-    /// The premultiplied colour and its error; nothing where there is no fragment.
+    /// Returns the premultiplied colour and its error; zeros if there is no fragment.
     pub(super) fn premultiplied(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [[f64; 4]; 2] {
         if self.count == 0 {
             return [[0.0; 4]; 2];
@@ -178,7 +186,7 @@ impl Pixel {
     }
 }
 
-/// The bound on straight colour and alpha of a premultiplied mean and its error.
+/// Returns the bound on straight colour and alpha of a premultiplied mean with an error.
 pub(super) fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
     let alpha = mean[3] - error[3];
     std::array::from_fn(|k| {
@@ -186,14 +194,17 @@ pub(super) fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
             return error[3] + 2.0 * U * mean[3];
         }
         let straight = (mean[k] / mean[3]).abs();
-        // Where alpha may be nothing, nothing is known of the colour.
+        // If alpha may be 0, the colour can be anything.
         let of_alpha = if alpha > 0.0 { (error[k] + straight * error[3]) / alpha } else { f64::INFINITY };
         of_alpha + straight * (2.0 * DIVISION + 4.0 * U)
     })
 }
 
-/// The bound on straight colour and alpha of a pixel of several samples: the mean of theirs. Each is unpremultiplied and premultiplied
-/// again before it is added, by two divisions and products of itself, and the sum of n errs by n roundings of itself.
+/// Returns the bound on straight colour and alpha of a pixel with several samples: the mean of
+/// theirs.
+///
+/// Each sample is unpremultiplied and premultiplied again before it is added, with the relative
+/// errors of two divisions and products, and the sum of n samples adds n relative roundings.
 pub fn color_of_samples(samples: &[&Pixel], accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [f64; 4] {
     let count = samples.len() as f64;
     let (mut mean, mut error) = ([0.0; 4], [0.0; 4]);
@@ -206,16 +217,17 @@ pub fn color_of_samples(samples: &[&Pixel], accumulator: &AccumulatorRow, bits: 
     if mean[3] > 0.0 { straight([mean, error]) } else { [0.0; 4] }
 }
 
-/// What is known of the nearest depth of a pixel.
+/// Bounds on the nearest depth of a pixel.
 #[derive(Clone, Copy)]
 struct Depths {
-    /// The two smallest depths that its fragments may have, and whose the first is.
+    /// The surfel whose fragment may have the smallest depth, and the two smallest possible depths.
     surfel: u32,
     first: f64,
     second: f64,
-    /// Of fronts and of backs, the smallest depth that one may have, and that one surely has.
+    /// For fronts and for backs: the smallest depth that one may have, and the smallest that one
+    /// surely has.
     sides: [[f64; 2]; 2],
-    /// What the twin finds.
+    /// The nearest fragment of the twin.
     found: Nearest,
 }
 
@@ -247,25 +259,26 @@ impl Depths {
         }
     }
 
-    /// No nearest depth is larger.
+    /// Upper limit of the nearest depth.
     fn high(&self) -> f64 {
         self.sides[0][1].min(self.sides[1][1])
     }
 
-    /// Whether it is not known if a front or a back is nearest.
+    /// Whether it is undecided if a front or a back is nearest.
     fn side_is_open(&self) -> bool {
         let [front, back] = self.sides;
         let nearer = |a: [f64; 2], b: [f64; 2]| a[1] * (1.0 + 4.0 * U) < b[0];
         !nearer(front, back) && !nearer(back, front)
     }
 
-    /// The smallest of the others: a fragment is not too far behind itself, however little its depth is known.
+    /// The smallest possible depth of the other surfels' fragments: a fragment is never too far
+    /// behind itself, however uncertain its depth is.
     fn beside(&self, surfel: u32) -> f64 {
         if surfel == self.surfel { self.second } else { self.first }
     }
 }
 
-/// What is known of each pixel of `scene` seen by `camera`.
+/// Returns the error terms of each pixel of `scene` seen by `camera`.
 pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
     let splats = reference_all(scene, camera, options);
     let (relative, absolute, of_radius) = options.epsilon.parts();

@@ -1,4 +1,5 @@
-//! Hard geometry: disks seen edge-on, through and around the camera, too small, too thin, too large, at the image's rim.
+//! Hard geometry: disks seen edge-on, through and around the camera, too small, too thin, too
+//! large, and at the edge of the image.
 
 use std::f64::consts::TAU;
 
@@ -9,11 +10,11 @@ use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
 use crate::scene::Projection;
 
-/// What the bound of a case is made of, where nothing else dominates.
+/// The parts of a case's bound if nothing else dominates.
 pub const FRAGMENTS: &str =
     "the roundings of rho and depth over the cosine between view ray and normal, pixel by pixel";
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
@@ -21,7 +22,7 @@ pub fn cases() -> Result<Vec<HardCase>> {
 const LIST: &[Entry] = &[
     Entry {
         name: "edge-on exactly",
-        about: "Disks whose plane holds the view rays of a pixel column or row cover nothing and change nothing behind them.",
+        about: "Disks whose planes contain the view rays of a column or row of pixels: they cover nothing and change nothing behind them.",
         bound: "that of the sheet behind: the disks have no fragments",
         size: (65, 49),
         stage: Stage::plain,
@@ -31,7 +32,7 @@ const LIST: &[Entry] = &[
     Entry {
         name: "edge-on by 1e-7",
         about: "Disks tilted by 1e-7 to 1e-3 from edge-on, thinner than a millionth of a pixel, each on a column of pixels.",
-        bound: "rho in doubled precision (2^-42) over the cosine; depth in f32 over the cosine times the way from the centre",
+        bound: "rho in doubled precision (2^-42) over the cosine; depth in f32 over the cosine times the distance from the centre",
         size: (65, 49),
         stage: Stage::plain,
         fill: edge_on_nearly,
@@ -40,7 +41,7 @@ const LIST: &[Entry] = &[
     Entry {
         name: "edge-on, askew",
         about: "The same in a turned view, where no coordinate is a round number.",
-        bound: "rho in doubled precision (2^-42) over the cosine; depth in f32 over the cosine times the way from the centre",
+        bound: "rho in doubled precision (2^-42) over the cosine; depth in f32 over the cosine times the distance from the centre",
         size: (64, 48),
         stage: Stage::askew,
         fill: edge_on_askew,
@@ -48,7 +49,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "through the camera plane",
-        about: "A floor, a wall and random disks that reach from behind the camera to before it show their part in front.",
+        about: "A floor, a wall and random disks that reach from behind the camera to in front of it: the part in front shows.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
         size: (72, 60),
         stage: Stage::plain,
@@ -57,7 +58,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "across the near depth",
-        about: "Disks of all slants that a near depth of half the way to them cuts: the part in front shows, to its full width.",
+        about: "Disks of all slants that the near depth cuts: the part past it shows, to its full width.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
         size: (72, 60),
         stage: |projection, size| {
@@ -70,7 +71,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "around the camera",
-        about: "The camera in a box of six disks, and at the centre of a seventh that it sees exactly edge-on.",
+        about: "The camera in a box of six disks and at the centre of a seventh, which it sees exactly edge-on.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
         size: (72, 60),
         stage: Stage::plain,
@@ -79,7 +80,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "inside a splat",
-        about: "The camera a ten-thousandth above the disk that it stands on: depths from the near depth to the disk's rim.",
+        about: "The camera 1e-4 units above a large disk: depths from the near depth to the disk's rim.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
         size: (72, 60),
         stage: Stage::plain,
@@ -88,7 +89,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "one disk over all",
-        about: "One disk of ten thousand pixels' radius that fills the image: one workgroup draws all of it.",
+        about: "One disk with a radius of ten thousand pixels that fills the image: one workgroup draws all of it.",
         bound: FRAGMENTS,
         size: (96, 80),
         stage: Stage::askew,
@@ -97,7 +98,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "centre far outside",
-        about: "Disks that cover the image from centres five million pixels away, where f32 has no half pixels.",
+        about: "Disks that cover the image from centres five million pixels away, where f32 cannot represent half pixels.",
         bound: "records anchored in the image (pinhole) or 2^22 pixels away (orthographic)",
         size: (64, 48),
         stage: Stage::plain,
@@ -124,7 +125,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "intersecting sheets",
-        about: "Two sheets of disks that pass through each other within the image: each wins its half, epsilon blends the seam.",
+        about: "Two sheets of disks that cross within the image: each is nearest in its half, and epsilon blends the seam.",
         bound: FRAGMENTS,
         size: (64, 48),
         stage: Stage::askew,
@@ -146,7 +147,8 @@ fn edge_on_exactly(stage: &Stage) -> Filling {
     let mut surfels = stage.sheet(5.0, 0.3, |_, _| 4.0);
     let (across, down) = (DVec3::X, DVec3::Y);
     for k in 0..40 {
-        // Through the eye: with x = 0 or y = 0 the determinant is exactly zero in any precision.
+        // The planes contain the eye: with x = 0 or y = 0 the determinant is exactly zero in any
+        // precision.
         let along = 1.5 * (fraction(k, 0) - 0.5);
         let z = 1.0 + 2.0 * fraction(k, 1);
         let (center, side) = if k % 2 == 0 { (down * along, down) } else { (across * along, across) };
@@ -155,8 +157,8 @@ fn edge_on_exactly(stage: &Stage) -> Filling {
     Filling::of(surfels, (1.0, 1.0)).with_lone_rims()
 }
 
-/// A disk of radius 0.5 at the centre of pixel (x, y), tilted by `tilt` from the plane that holds the view ray and the
-/// image's vertical.
+/// A disk of radius 0.5 at the centre of pixel (x, y). It is tilted by `tilt` from the plane that
+/// contains the view ray and the image's vertical.
 fn standing(stage: &Stage, x: f64, y: f64, z: f64, tilt: f64) -> crate::scene::Surfel {
     let center = stage.at(x + 0.5, y + 0.5, z);
     let ray = stage.ray(center);
@@ -175,7 +177,8 @@ fn edge_on_nearly(stage: &Stage) -> Filling {
         surfels.push(standing(stage, 8.0 + 5.0 * k as f64, 24.0, 3.0, tilt));
         surfels.push(standing(stage, 40.0 + 4.0 * k as f64, 20.0, 3.0, -tilt));
     }
-    // Up to a tilt of 1e-5 the depth is known to less than epsilon: nine of fifteen columns, of 11 to 16 pixels each.
+    // Up to a tilt of 1e-5, the depth's error exceeds epsilon: in nine of fifteen columns, of 11 to
+    // 16 pixels each.
     Filling { excused: 0.05, ..Filling::of(surfels, (0.02, 0.2)) }
 }
 
@@ -185,7 +188,7 @@ fn edge_on_askew(stage: &Stage) -> Filling {
         let (x, y) = ((64.0 * fraction(k, 0)).floor(), (48.0 * fraction(k, 1)).floor());
         surfels.push(standing(stage, x, y, 2.0 + fraction(k, 2), tilt));
     }
-    // As above: twelve of twenty columns.
+    // The same holds for twelve of twenty columns.
     Filling { excused: 0.08, ..Filling::of(surfels, (1.0, 1.0)).with_lone_rims() }
 }
 
@@ -207,7 +210,8 @@ fn across_the_near_depth(stage: &Stage) -> Filling {
     let disk = |k: usize| {
         let center = stage.at(72.0 * fraction(k, 0), 60.0 * fraction(k, 1), 0.5 + 0.3 * fraction(k, 2));
         let normal = DVec3::new(fraction(k, 3) - 0.5, fraction(k, 4) - 0.5, 0.6 * (fraction(k, 5) - 0.5));
-        // Most of them reach across: the half extent in depth is the radius times the sine of the slant.
+        // Most disks cross the near depth: their half extent in depth is the radius times the sine
+        // of the slant.
         stage.disk(center, normal, 0.1 + 0.3 * fraction(k, 5))
     };
     Filling::of((0..100).map(disk).collect(), (0.3, 1.0)).with_lone_rims()
@@ -249,7 +253,7 @@ fn hundredth_of_a_pixel(stage: &Stage) -> Filling {
         let (x, y) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
         let z = 3.0 + 0.02 * fraction(k, 0);
         let angle = TAU * fraction(k, 1);
-        // Half of them beside the centre.
+        // Half of them lie beside the pixel's centre.
         let from_center = if (k / width + k % width).is_multiple_of(2) { 0.005 } else { 0.3 };
         let center = stage.at(x + from_center * angle.cos(), y + from_center * angle.sin(), z);
         surfels.push(stage.disk(center, DVec3::new(0.2, 0.1, -1.0), 0.01 * stage.pixel(z)));

@@ -1,15 +1,19 @@
-//! The bound on each pixel's error where surfaces show through each other: what [`bounds`](super::bounds) knows of each surface, or of each fragment,
-//! and what compositing makes of it.
+//! Bounds on each pixel's error if surfaces show through each other. They combine the bounds of
+//! each surface or fragment ([`bounds`](super::bounds)) by the rules of compositing.
 //!
-//! From front to back a pixel's transmittance T starts at 1; a surface of alpha a, known to da, and premultiplied colour p, known to dp, adds
-//! T p to the colour and leaves T (1 - a). With errors dT of T and dC of the colour, and u = 2^-24:
+//! From front to back, a pixel's transmittance T starts at 1. A surface of alpha a, with error da,
+//! and premultiplied colour p, with error dp, adds T p to the colour and leaves T (1 - a). With
+//! errors dT of T and dC of the colour, and u = 2^-24:
 //!
-//! - `dC += dT |p| + T dp + T |p| (d + 6 u)`, as p is divided by a and multiplied again, by a division of error d and six roundings;
+//! - `dC += dT |p| + T dp + T |p| (d + 6 u)`, as p is divided by a and multiplied again, with the
+//!   error d of a division and six roundings;
 //! - `dT <- dT (1 - a) + (T + dT) da + 4 u T`.
 //!
-//! A pixel is **open** where these errors leave undecided which of a front and a back is nearer, where a gap of epsilon lies, what lies within
-//! epsilon of a surface's nearest fragment, or, sorted, which of two fragments is nearer, but for those of one disk's place: their depths are
-//! the same numbers, and the order of the surfels decides.
+//! A pixel is **open** if these errors leave undecided whether a front or a back is nearer, where a
+//! gap of epsilon lies, or which fragments lie within epsilon of a surface's nearest one. With
+//! sorted fragments it is open if they leave undecided which of two fragments is nearer. Fragments
+//! of disks in the same place are exempt: their depths are the same numbers, and the order of the
+//! surfels decides.
 
 use super::bounds::{ColorRange, DIVISION, NOTHING, Pixel, straight};
 use super::fragment_bounds::{Fragment, Surface, fragments, weight_error};
@@ -19,12 +23,12 @@ use crate::passes::sorted::Rules;
 use crate::plan::{Accumulator, Facts, RenderOptions, Sides};
 use crate::scene::{Camera, Composite, Scene, Tail};
 
-/// What is known of a pixel's colour.
+/// The bound on a pixel's colour.
 #[derive(Clone, Copy, Debug)]
 pub struct Composited {
-    /// Something may rightly be decided otherwise.
+    /// Whether something may rightly be decided otherwise.
     pub open: bool,
-    /// Bounds on linear RGB, straight, and alpha.
+    /// Bounds on straight linear RGB, and on alpha.
     pub color: [f64; 4],
 }
 
@@ -33,11 +37,11 @@ pub struct Composited {
 struct Listed {
     fragment: Fragment,
     surface: Surface,
-    /// Its surfel's centre and half-axes.
+    /// The surfel's centre and half-axes.
     place: [[f32; 3]; 3],
 }
 
-/// Of each pixel of `scene` seen by `camera`.
+/// Returns the bound of each pixel of `scene` seen by `camera`.
 pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Composited> {
     let splats = reference_all(scene, camera, options);
     let view = (camera, Sides::of(&Facts::of(scene), camera, options));
@@ -66,7 +70,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Co
 /// A premultiplied colour and alpha, and its error.
 type Known = [[f64; 4]; 2];
 
-/// What is composited so far, and how far the device may be from it.
+/// The composite so far, with the error of the device.
 #[derive(Clone, Copy)]
 struct Shown {
     color: Known,
@@ -95,7 +99,8 @@ impl Shown {
     }
 }
 
-/// By what rules say of a fragment it is **open** too whether it is listed, and whether it is the last.
+/// Composites the fragments one by one, and returns whether the pixel is **open**. It is also open
+/// if it is undecided by the rules whether a fragment is listed, or whether it is the last.
 fn sorted(list: &[Listed], options: &RenderOptions) -> (bool, Shown) {
     let (mut open, mut shown) = (false, Shown::NOTHING);
     let (rules, opacity) = (Rules::of(options), f64::from(options.opacity));
@@ -113,7 +118,7 @@ fn sorted(list: &[Listed], options: &RenderOptions) -> (bool, Shown) {
         if alpha < rules.least_alpha {
             continue;
         }
-        // What is cut off above is so for all of a premultiplied colour.
+        // If alpha is clamped, the whole premultiplied colour is scaled.
         let cut = (rules.most_alpha / alpha).min(1.0);
         let next = shown.with([surface.color.map(|c| cut * weight * c), [0, 1, 2, 3].map(error)], opacity);
         open |= (next.transmittance - rules.least_shown).abs() <= next.transmittance_error;

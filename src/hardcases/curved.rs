@@ -1,17 +1,23 @@
-//! Caps: how far a fragment of the device may lie from its f64 twin, derived from the operations of `wgsl/curved.wgsl` to first order,
-//! and scenes of caps that are hard to meet.
+//! Error bounds of caps, and scenes of caps that are hard to intersect.
 //!
-//! With the names of [`passes::curved`](crate::passes::curved), e = 2^-24 and k = |s||t| / |s x t|, all lengths in r:
+//! The bounds limit how far a fragment of the device may lie from its f64 twin. They follow, to
+//! first order, from the operations of `wgsl/curved.wgsl`. With the names of
+//! [`passes::curved`](crate::passes::curved), e = 2^-24, k = |s||t| / |s x t|, and all lengths in
+//! units of r:
 //!
-//! - The rows of N are known to 24 e k of r k/|s|, r k/|t| and 1, which bound their lengths.
-//! - (U, V, W) is N times a point of the ray, which lies D pixels from the centre, so many r: it errs by 24 e k of that and by the 5 e of
-//!   a pixel to which the centre is kept, by 3 e of its coefficients, and by 4 e of the terms that its evaluation sums. Where the centre
-//!   is no anchor the point is the difference of two: 7 e of each.
-//! - The step errs by the spread times that, 24 e k of a row, and 4 e of itself.
-//! - The coefficients of the quadratic follow by its derivatives, and 12 e of the terms that each sums.
-//! - Its discriminant errs by dD of these. Where |D| > dD it is known whether there are roots; one of them then errs by at most
-//!   2 dF / sqrt(D - dD), where dF is what the polynomial errs by at the twin's root, if that is less than half the way to the other
-//!   root. The stable formula adds 12 e of the polynomial's terms to dF.
+//! - The rows of N have lengths of at most r k/|s|, r k/|t| and 1, and relative errors of 24 e k.
+//! - (U, V, W) is N times a point of the ray, at a distance d from the centre. The error of that
+//!   point is 24 e k d (the rows), 5 e of a pixel (the stored centre), 3 e of the coefficients, and
+//!   4 e of the terms that the evaluation sums. If the record is not anchored at the centre, the
+//!   point is the difference of two points, each with an error of 7 e.
+//! - The step (U, V, W) r/z + D errs by r/z times the error of (U, V, W), by 24 e k of a row, and
+//!   by 4 e of itself.
+//! - The errors of the quadratic's coefficients follow from its derivatives, plus 12 e of the terms
+//!   that each coefficient sums.
+//! - The discriminant Q then errs by some dQ. If |Q| > dQ, the number of roots is certain, and a
+//!   root errs by at most 2 dF / sqrt(Q - dQ), if that is less than half the distance to the other
+//!   root. Here dF is the error of the polynomial at the twin's root; the stable formula adds 12 e
+//!   of the polynomial's terms to it.
 
 use std::f64::consts::TAU;
 
@@ -25,10 +31,10 @@ use crate::passes::curved::Curve;
 use crate::passes::splat::{Intersection, Splat};
 use crate::scene::{Cap, Clip, Projection};
 
-/// No hit is farther along the ray (`FARTHEST_HIT` in the kernel).
+/// Greatest distance of a hit along the ray, in units of r (`FARTHEST_HIT` in the kernel).
 const FARTHEST_HIT: f64 = 8.0;
 
-/// The errors of U, V or both, and of W.
+/// The errors of U and V together, and of W.
 #[derive(Clone, Copy)]
 struct Errors {
     uv: f64,
@@ -36,7 +42,7 @@ struct Errors {
 }
 
 impl Precision {
-    /// The device's error at pixel (x, y) of a splat that curves, its own evaluation included.
+    /// Bounds the device's error at pixel (x, y) of a splat that curves, including the evaluation.
     pub fn cap(&self, curve: &Curve, splat: &Splat, (x, y): (u32, u32), at: &Intersection) -> Bound {
         const NOTHING: Bound = Bound { rho: f64::INFINITY, depth: f64::INFINITY };
         let d = DVec2::new(f64::from(x) - splat.anchor[0] as f64, f64::from(y) - splat.anchor[1] as f64);
@@ -64,13 +70,13 @@ impl Precision {
             return Bound { rho: 0.0, depth: 0.0 };
         }
         let slope = (discriminant - unknown).sqrt();
-        // Both roots, as it is known of both whether they are hits.
+        // Uses the larger root: for each of the two it must be certain whether it is a hit.
         let far = -0.5 * (b + discriminant.max(0.0).sqrt().copysign(b));
         let sigma = [far / a, c / far].map(f64::abs).into_iter().fold(0.0, f64::max).min(FARTHEST_HIT);
         let terms = a.abs() * sigma * sigma + b.abs() * sigma + c.abs();
         let value = da * sigma * sigma + db * sigma + dc + 12.0 * E * terms;
         let apart = slope * slope / (4.0 * (a.abs() + da));
-        // NaN knows nothing.
+        // With NaN, nothing is certain.
         if value.is_nan() || apart.is_nan() || value >= apart {
             return NOTHING;
         }
@@ -87,9 +93,9 @@ impl Precision {
         let (s, t) = (self.s.length(), self.t.length());
         let skew = s * t / self.s.cross(self.t).length();
         let known = 24.0 * E * skew;
-        // Of both rows together.
+        // Length of the rows of U and V together.
         let rows = (curve.radius * skew / s).hypot(curve.radius * skew / t);
-        // A pixel's step, in r.
+        // Size of a pixel, in units of r.
         let widening = if self.projection == Projection::Pinhole { curve.depth } else { 1.0 };
         let pixel = widening / (self.focal * curve.radius);
         let reach = d.abs().element_sum() + 1.0;
@@ -118,10 +124,10 @@ impl Precision {
     }
 }
 
-/// What the bounds of the cases are made of.
-const ROOTS: &str = "the roots of a quadratic whose coefficients are known: 2 dF / sqrt(D - dD)";
+/// The parts of the cases' bounds.
+const ROOTS: &str = "the roots of a quadratic with uncertain coefficients: 2 dF / sqrt(Q - dQ)";
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
@@ -129,7 +135,7 @@ pub fn cases() -> Result<Vec<HardCase>> {
 const LIST: &[Entry] = &[
     Entry {
         name: "caps of all shapes",
-        about: "Bowls, domes, saddles and channels, flat ones among them, round and eight times as long as wide, some cut.",
+        about: "Bowls, domes, saddles, channels and flat disks, round or eight times as long as wide, some cut by lines.",
         bound: ROOTS,
         size: (64, 48),
         stage: Stage::askew,
@@ -138,8 +144,8 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "caps of sixteen sides",
-        about: "The same caps as polygons of the most sides that there are, the last of them turned most often.",
-        bound: "the roots' bound, and that of a side: the error of (u, v), and 50 u of it",
+        about: "The same caps as polygons with 16 sides, the most there can be: the last side is rotated most often.",
+        bound: "the roots' bound, and for a side the error of (u, v) and 50 u of the distance",
         size: (64, 48),
         stage: Stage::askew,
         fill: |stage| shapes(stage).outline(16),
@@ -156,7 +162,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "caps, edge-on",
-        about: "Caps of heights from 1e-6 to 1e-1 of their size, tilted by 1e-5 to 1e-2 from edge-on, before a sheet.",
+        about: "Caps of heights from 1e-6 to 1e-1 of their size, tilted by 1e-5 to 1e-2 from edge-on, in front of a sheet.",
         bound: ROOTS,
         size: (64, 48),
         stage: Stage::askew,
@@ -165,7 +171,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "caps at the camera plane",
-        about: "Caps from behind the camera to before it, in sizes of a pixel's part to the whole image.",
+        about: "Caps from behind the camera to in front of it, from a fraction of a pixel to the whole image.",
         bound: ROOTS,
         size: (48, 40),
         stage: Stage::plain,
@@ -174,7 +180,8 @@ const LIST: &[Entry] = &[
     },
 ];
 
-/// The `k`th of some caps at about the depth 3: round, or long, of heights in the longer half-axis.
+/// The `k`th of some caps at depths around 3: round, or long if `thin` is less than 1. `height` is
+/// in units of the longer half-axis.
 fn scattered(stage: &Stage, k: usize, pixels: f64, thin: f64, height: f64) -> (crate::scene::Surfel, Cap) {
     let (width, rows) = stage.size();
     let z = 3.0 + 0.2 * fraction(k, 0);

@@ -1,4 +1,5 @@
-//! Hard outlines: disks that end at lines in their planes, surfaces of two sides, and pixels of many samples.
+//! Hard outlines: disks that end at lines in their planes, surfaces with two sides, and pixels with
+//! many samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,15 +10,15 @@ use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
 use crate::scene::{Clip, Projection, Samples, Surfel};
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
 
-/// What their bounds are made of.
-const LINES: &str = "how far inside a line: its length times the error of (u, v), and 10 u of it";
-const SIDES: &str = "how far inside a side: the error of (u, v), and 50 u of it";
-const MEAN: &str = "the mean of the samples' bounds, each of its own fragments";
+/// The parts of the cases' bounds.
+const LINES: &str = "the distance inside a line: the line's length times the error of (u, v), and 10 u of itself";
+const SIDES: &str = "the distance inside a side: the error of (u, v), and 50 u of itself";
+const MEAN: &str = "the mean of the samples' bounds, each derived from the sample's own fragments";
 
 const LIST: &[Entry] = &[
     Entry {
@@ -31,7 +32,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "triangles cut by lines",
-        about: "The same disks and needles as triangles, so that lines end polygons and polygons lines.",
+        about: "The same disks and needles as triangles: lines cut polygons.",
         bound: SIDES,
         size: (64, 48),
         stage: Stage::askew,
@@ -40,7 +41,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "cut disks, edge-on",
-        about: "Half disks tilted by 1e-5 to 1e-2 from edge-on, cut along the view and across it, before a sheet.",
+        about: "Half disks tilted by 1e-5 to 1e-2 from edge-on, cut along the view or across it, in front of a sheet.",
         bound: LINES,
         size: (64, 48),
         stage: Stage::askew,
@@ -49,7 +50,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "a disk over all, cut at a corner",
-        about: "A disk of ten thousand pixels' radius whose two lines meet in the image, seen aslant.",
+        about: "A disk with a radius of ten thousand pixels whose two lines meet in the image, seen at a slant.",
         bound: LINES,
         size: (96, 80),
         stage: Stage::askew,
@@ -58,7 +59,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "two halves of a disk",
-        about: "Disks in two halves that end at one line: each fragment is of one of them, or of both on the line itself.",
+        about: "Disks in two halves that meet at a line: each fragment belongs to one half, or to both on the line itself.",
         bound: LINES,
         size: (64, 48),
         stage: Stage::askew,
@@ -67,8 +68,8 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "fronts and backs that cross",
-        about: "Two sheets of opposite sides that pass through each other aslant, all within epsilon: each pixel shows the nearer side.",
-        bound: "which side is nearest, known but for the depths' bounds and one unit in their last place",
+        about: "A front and a back sheet that cross at a slant, all within epsilon: each pixel shows the nearer side.",
+        bound: "which side is nearest is known up to the depths' bounds and one unit in their last place",
         size: (64, 48),
         stage: Stage::askew,
         fill: sides_that_cross,
@@ -76,7 +77,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "16 samples, thin parts",
-        about: "Needles thinner than a sample, and disks of one, all of them translucent, before nothing.",
+        about: "Needles thinner than a sample and disks as small as one, all translucent, over nothing.",
         bound: MEAN,
         size: (40, 32),
         stage: Stage::askew,
@@ -85,7 +86,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "8 samples, cut and crossing",
-        about: "Two sheets of cut disks that pass through each other, on a grid that is not square.",
+        about: "Two sheets of cut disks that pass through each other, with a grid of samples that is not square.",
         bound: MEAN,
         size: (40, 32),
         stage: Stage::askew,
@@ -94,7 +95,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "4 samples, near the camera plane",
-        about: "Random disks from behind the camera to before it, in sizes of a pixel's part to the whole image.",
+        about: "Random disks from behind the camera to in front of it, from a fraction of a pixel to the whole image.",
         bound: MEAN,
         size: (36, 30),
         stage: Stage::plain,
@@ -103,7 +104,7 @@ const LIST: &[Entry] = &[
     },
 ];
 
-/// A line at `offset` radii from the centre, which keeps what lies toward `angle`.
+/// A clip line at `offset` radii from the centre; the side toward `angle` is kept.
 fn line(angle: f64, offset: f64) -> [f32; 3] {
     [angle.cos() as f32, angle.sin() as f32, -offset as f32]
 }
@@ -114,7 +115,7 @@ fn samples(across: u32, down: u32, filling: Filling) -> Filling {
     filling
 }
 
-/// The `k`th of some disks over the image, at about the depth `z`.
+/// The `k`th of some disks over the image, at about the depth `z`, with a radius of `pixels`.
 fn scattered(stage: &Stage, k: usize, z: f64, pixels: f64) -> Surfel {
     let (width, height) = stage.size();
     let z = z + 0.02 * fraction(k, 0);
@@ -135,10 +136,10 @@ fn cut_disks(stage: &Stage) -> Filling {
         clips.push(match k % 6 {
             0 => Clip([line(angle, 0.0), Clip::NONE.0[0]]),
             1 => Clip([line(angle, 0.9), line(angle + 1.0, 0.0)]),
-            // A sliver between two lines that are nearly one.
+            // A sliver between two nearly equal lines.
             2 => Clip([line(angle, 0.1), line(angle + PI, -0.12)]),
             3 => Clip([line(angle, -0.5), line(angle + 2.0, -0.3)]),
-            // Past the rim, on the one side and the other: all of it, and nothing.
+            // Past the rim, on one side or the other: the whole disk, or nothing.
             4 => Clip([line(angle, -1.5), line(angle, if k % 12 == 4 { 1.5 } else { -2.0 })]),
             _ => Clip::NONE,
         });

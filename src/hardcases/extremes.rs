@@ -1,5 +1,5 @@
-//! Hard numbers: a million fragments, far and tiny coordinates, depths and tolerances at their limits, colours of many
-//! decades, images of one pixel.
+//! Hard numbers: a million fragments, far and tiny coordinates, depths and tolerances at their
+//! limits, colours of many decades, images of one pixel.
 
 use glam::DVec3;
 
@@ -10,17 +10,17 @@ use crate::error::Result;
 use crate::plan::Accumulator;
 use crate::scene::{Epsilon, Kernel, Projection, Surfel};
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
 
-/// What f32 sums cannot do.
+/// The reason why f32 sums fail.
 const SUMS: &str = "a sum of n terms in f32 errs by up to n 2^-24 of itself, and its roundings depend on the order";
-const WIDE: &str = "the accumulator's 2^-32 of the scene's range of colours over the mean weight";
+const WIDE: &str = "the accumulator's 2^-32 of the scene's range of colours, over the mean weight";
 const DIGITS: &str =
-    "as in a scene of size one: positions are kept in f32 about the scene's origin, the eye in doubled";
-const EPSILON: &str = "no decision nearer than 3e-6 may fall otherwise; then as usual";
+    "as in a scene of size one: positions are f32 relative to the scene's origin, the eye has doubled precision";
+const EPSILON: &str = "decisions at least 3e-6 from epsilon's limit must agree; values as usual";
 
 macro_rules! entry {
     ($name:literal, $about:literal, $bound:expr, $size:expr, $stage:expr, $fill:expr) => {
@@ -31,17 +31,17 @@ macro_rules! entry {
 const LIST: &[Entry] = &[
     Entry {
         name: "a million disks on a pixel",
-        about: "A million disks of half a pixel on one pixel: sums of a million terms, and all of them on one address.",
-        bound: "2^-32 over the mean weight, whatever their number",
+        about: "A million disks of half a pixel on one pixel: sums of a million terms, all at one address.",
+        bound: "2^-32 over the mean weight, for any number of terms",
         size: (32, 32),
         stage: Stage::askew,
         fill: million,
-        // The sums of another projection are the same.
+        // The sums of the orthographic projection are the same.
         projections: &[Projection::Pinhole],
     },
     entry!(
         "depth ratio 1e7",
-        "Depths from two near depths to ten million times that, side by side in one image.",
+        "Depths from twice the near depth to ten million times that, side by side in one image.",
         FRAGMENTS,
         (64, 48),
         Stage::askew,
@@ -49,7 +49,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "UTM, millimetres",
-        "Disks of millimetres in map coordinates of 6e6.",
+        "Disks of millimetres at map coordinates of 6e6 metres.",
         DIGITS,
         (64, 48),
         |projection, size| Stage::placed(projection, size, DVec3::new(4.4e5, 6.26e6, 1200.5), 0.02),
@@ -57,7 +57,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "UTM, a kilometre off",
-        "The same a kilometre from the scene's origin, where f32 has steps of 1/16 millimetre and the eye stands between.",
+        "The same a kilometre from the scene's origin, where f32 has steps of 1/16 millimetre and the eye lies between two.",
         DIGITS,
         (64, 48),
         |projection, size| {
@@ -69,7 +69,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "coordinates of 1e-6",
-        "A scene of a millionth.",
+        "A scene with a size of 1e-6.",
         DIGITS,
         (64, 48),
         |projection, size| Stage::placed(projection, size, DVec3::ZERO, 1e-6),
@@ -77,7 +77,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "coordinates of 1e12",
-        "A scene of a million millions.",
+        "A scene with a size of 1e12.",
         DIGITS,
         (64, 48),
         |projection, size| Stage::placed(projection, size, DVec3::ZERO, 1e12),
@@ -93,7 +93,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "sheets 3e-6 about epsilon",
-        "Two sheets that are an epsilon apart but for 3e-6 of the depth: blended on the left, parted on the right.",
+        "Two sheets whose distance differs from epsilon by 3e-6 of the depth: blended on the left, separate on the right.",
         EPSILON,
         (48, 48),
         Stage::plain,
@@ -101,7 +101,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "sheets an epsilon apart",
-        "Two sheets exactly an epsilon apart: every pixel may rightly go either way, but none is lost, none is NaN.",
+        "Two sheets exactly an epsilon apart: either decision is right in every pixel, but none is lost and none is NaN.",
         "none on values, as all pixels are within 1e-6 of a decision",
         (48, 48),
         Stage::plain,
@@ -109,7 +109,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "sheets farther than epsilon",
-        "Of two sheets two epsilons apart only the nearer shows.",
+        "Two sheets two epsilons apart: only the nearer one shows.",
         EPSILON,
         (48, 48),
         Stage::plain,
@@ -125,7 +125,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "epsilon without bound",
-        "An epsilon of 1e300 accepts every disk of two sheets, ten times as far the one as the other.",
+        "An epsilon of 1e300 accepts every disk of two sheets, one ten times as far away as the other.",
         "depths in units of 2^-32 of the scene's depth over the mean weight",
         (48, 48),
         Stage::askew,
@@ -133,7 +133,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "epsilon along the ray",
-        "Two sheets through which rays pass 0.01 units apart in the middle: toward the corners an epsilon of 0.0105 along the ray ends between them.",
+        "Two sheets 0.01 units apart, and an epsilon of 0.0105 along the ray: toward the corners it ends between the sheets.",
         FRAGMENTS,
         (64, 48),
         Stage::askew,
@@ -141,15 +141,15 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "only the kernel's tail, smooth",
-        "Every pixel is reached by four disks' rims alone, where the weight is at its floor of 1/1024.",
-        "2^-32 over weights of 1/1024: 2^-22 a fragment",
+        "Every pixel is reached only by the rims of four disks, where the weight has its least value, 1/1024.",
+        "2^-32 over weights of 1/1024: 2^-22 per fragment",
         (32, 32),
         Stage::askew,
         |stage| tail(stage, Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true })
     ),
     entry!(
         "only the kernel's tail, hat",
-        "Every pixel is reached by four disks' rims alone, where the weight 1 - rho is 1/200.",
+        "Every pixel is reached only by the rims of four disks, where the weight 1 - rho is 1/200.",
         "the rounding of rho over a weight of 1/200",
         (32, 32),
         Stage::askew,
@@ -157,8 +157,8 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "only the kernel's tail, steep",
-        "Every pixel is reached by four disks' rims alone, of a kernel that is exp(-50) there: the weight is at its floor of 2^-24.",
-        "2^-51 over weights of 2^-24: 2^-27 a fragment, and the rounding of rho",
+        "Every pixel is reached only by the rims of four disks. The kernel is exp(-50) there: the weight has its least value, 2^-24.",
+        "2^-51 over weights of 2^-24: 2^-27 per fragment, and the rounding of rho",
         (32, 32),
         Stage::askew,
         |stage| tail(stage, Kernel::Ellipse { a: 50.0, n: 5.0, smooth: false })
@@ -173,7 +173,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "a cone's rim",
-        "A wavy sheet drawn by (1 - rho)^1.5, which is as flat at the rim as rho's rounding is steep.",
+        "A wavy sheet drawn by (1 - rho)^1.5, which is flat at the rim.",
         FRAGMENTS,
         (48, 48),
         Stage::askew,
@@ -181,7 +181,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "colours of 1e5 beside 1e-5",
-        "A sheet whose right half has colours of 1e5 and 1e-5 side by side, the left of 1e-5 only.",
+        "A sheet whose right half has colours of 1e5 and 1e-5 side by side, and the left of 1e-5 only.",
         WIDE,
         (48, 48),
         Stage::askew,
@@ -189,7 +189,7 @@ const LIST: &[Entry] = &[
     ),
     entry!(
         "negative colours",
-        "Colours between -3 and 2, which no display has but filters and attributes do.",
+        "Colours between -3 and 2: no display shows them, but filters and attributes produce them.",
         WIDE,
         (48, 48),
         Stage::askew,
@@ -198,7 +198,7 @@ const LIST: &[Entry] = &[
     entry!(
         "alpha of 1/255",
         "Nearly transparent disks among opaque ones: the mean is divided by the mean alpha.",
-        "the range's 2^-32 over the mean weight, over the pixel's alpha",
+        "2^-32 of the range, over the mean weight and the pixel's alpha",
         (48, 48),
         Stage::askew,
         thin_alpha
@@ -234,7 +234,7 @@ fn depth_ratio(stage: &Stage) -> Filling {
     }
 }
 
-/// The same in an image too small to see a rim alone.
+/// The sheet of [`rough`] in an image too small for a pixel that only rims reach.
 fn without_rims(stage: &Stage) -> Filling {
     Filling { expected: Vec::new(), ..rough(stage) }
 }
@@ -245,7 +245,8 @@ fn rough(stage: &Stage) -> Filling {
         .with_lone_rims()
 }
 
-/// A colour for each disk of [`rough`].
+/// One colour for each disk of [`rough`]; `value` takes the disk's index and an axis of
+/// [`fraction`].
 fn colors(stage: &Stage, value: impl Fn(usize, usize) -> f64) -> Vec<[f32; 4]> {
     let count = rough(stage).surfels.len();
     (0..count).map(|k| [value(k, 3) as f32, value(k, 4) as f32, value(k, 5) as f32, 1.0]).collect()

@@ -1,5 +1,5 @@
-//! What is known of each fragment: how far the device may be from the twin in where it lies, what it weighs, and its surfel's attributes. The
-//! derivation is told in [`bounds`](super::bounds).
+//! Error bounds of single fragments: their position, weight and attributes.
+//! [`bounds`](super::bounds) has the derivation.
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -10,20 +10,20 @@ use crate::passes::splat::Splat;
 use crate::plan::Sides;
 use crate::scene::{Camera, Clip, Kernel, LowPass, Scene};
 
-/// A fragment of the twin and how far the device may be from it.
+/// A fragment of the twin, with the errors that the device may make.
 #[derive(Clone, Copy)]
 pub(super) struct Fragment {
     pub(super) depth: f64,
-    /// World units.
+    /// Error of the depth, world units.
     pub(super) depth_error: f64,
     rho: f64,
     rho_error: f64,
-    /// How far inside the lines at which the disk ends.
+    /// Distance inside the lines at which the disk ends; negative outside.
     inside: f64,
     inside_error: f64,
-    /// It shows the back of a surface that has sides.
+    /// Whether it shows the back of a surface that has sides.
     pub(super) back: bool,
-    /// What light sees.
+    /// The normal that is lit.
     pub(super) normal: DVec3,
     pub(super) normal_error: f64,
 }
@@ -44,23 +44,23 @@ impl Fragment {
     }
 
     pub(super) fn may_hit(&self, camera: &Camera) -> bool {
-        // An error that is not a number knows nothing.
+        // With NaN as an error, the fragment may hit.
         !(self.rho - self.rho_error > 1.0
             || self.inside + self.inside_error < 0.0
             || self.depth + self.depth_error < camera.near * (1.0 - U))
     }
 }
 
-/// Calls `visit` for each fragment of each splat in the image.
+/// Calls `visit` with the pixel's index for each fragment of each splat in the image.
 pub(super) fn fragments(
     splats: &[Splat],
     scene: &Scene,
     (camera, sides): (&Camera, Sides),
     mut visit: impl FnMut(usize, &Splat, &Surface, &Fragment),
 ) {
-    // A depth whose last bit tells the side is off by a unit in the last place.
+    // If the last bit of a depth encodes the side, the depth errs by one unit in the last place.
     let of_side = if sides == Sides::Nearest { 2.0 * U } else { 0.0 };
-    // A disk seen exactly edge-on has no rows, and without a low-pass no fragment.
+    // A disk seen exactly edge-on has no rows and, without a low-pass, no fragments.
     let edge_on = |splat: &&Splat| splat.a.truncate() == DVec2::ZERO && splat.b == DVec3::ZERO;
     for splat in splats.iter().filter(|splat| splat.curve.is_some() || !edge_on(splat)) {
         let precision = Precision::of(splat, scene, camera);
@@ -81,7 +81,8 @@ pub(super) fn fragments(
                     rho,
                     rho_error: known(bound.rho),
                     inside: at.inside,
-                    // Of a cap it may be how little the ray's other meeting misses.
+                    // For a cap, this may be the distance by which the ray's other intersection
+                    // misses.
                     inside_error: known(
                         line_error(&splat.clip, rho, bound.rho)
                             + splat.outline.map_or(0.0, |_| bound.rho + U * (50.0 * rho + 2.0))
@@ -97,9 +98,11 @@ pub(super) fn fragments(
     }
 }
 
-/// How far the device may be off in how far inside the lines of `clip` a point is, which is `rho` from the centre and known to
-/// `rho_error`. A line grows along (u, v) by its length; it is turned with the disk by 6 u of itself, and 4 u of each of its products
-/// are lost.
+/// Bounds the error of the distance inside the lines of `clip`, for a point that is `rho` from the
+/// centre, with the error `rho_error`.
+///
+/// The distance changes with (u, v) by the line's length. The line is turned with the disk, with a
+/// relative error of 6 u, and each of its products has an error of 4 u.
 fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
     let of_line = |[x, y, z]: [f32; 3]| {
         let (length, z) = (f64::from(x).hypot(y.into()), f64::from(z).abs());
@@ -108,7 +111,8 @@ fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
     if clip.is_none() { 0.0 } else { of_line(clip.0[0]).max(of_line(clip.0[1])) }
 }
 
-/// How far the device may be off in a cap's normal, by how far it is in (u, v): what it turns by, and 30 u of that.
+/// Bounds the error of a cap's normal, for an error of (u, v): the slopes times it, and 30 u of the
+/// slopes.
 fn turned_error(splat: &Splat, rho_error: f64) -> f64 {
     splat.curve.map_or(0.0, |curve| curve.slopes.map(DVec3::length).iter().sum::<f64>() * (rho_error + 30.0 * U))
 }
@@ -136,14 +140,15 @@ impl Surface {
     }
 }
 
-/// The error of a fragment's weight.
+/// Bounds the error of a fragment's weight.
 pub(super) fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
     let psi = |rho: f64| kernel.weight(rho * rho);
     let weight = psi(f.rho);
     let moved = (psi((f.rho - f.rho_error).max(0.0)) - weight).max(weight - psi((f.rho + f.rho_error).min(1.0)));
     let exponential = |x: f64, power: f64| 2.0 * U * (3.0 + 2.0 * x) + x * power;
     let root = 9.0 * U;
-    // WGSL's pow is exp2(y log2 x), whose logarithm errs by 2^-21, or by 3 units in its last place where x < 1/2.
+    // WGSL's pow is exp2(y log2 x). The logarithm errs by 2^-21, or by 3 units in its last place
+    // where x < 1/2.
     let logarithm = |x: f64| (8.0 * U).max(6.0 * U * x.log2().abs());
     let evaluated = match kernel {
         Kernel::Constant => 0.0,
@@ -161,7 +166,7 @@ pub(super) fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
         }
         Kernel::Gaussian { sigma } => weight * exponential(0.5 * f.rho * f.rho / (sigma * sigma), 3.0 * U),
         Kernel::Ellipse { a, n, smooth } => {
-            // The kernel has a root for 3, products for 2, 4.
+            // The kernel uses a root for n = 3, and products for 2 and 4.
             let power = if [2.0, 4.0].contains(&n) { 3.0 * U } else { root.max(n * logarithm(f.rho)) + 3.0 * U };
             let step = if smooth { (-a).exp() } else { 0.0 };
             let plain = weight * (1.0 - step) + step;

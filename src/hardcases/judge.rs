@@ -1,4 +1,4 @@
-//! One image of a case against its reference: errors, and the verdict.
+//! Compares the image of a case with its reference: errors and verdict.
 
 use serde::Serialize;
 
@@ -10,25 +10,26 @@ use crate::plan::{Accumulator, AccumulatorRow};
 use crate::render::Report;
 use crate::scene::{Map, Samples};
 
-/// How a row ends.
+/// The result of judging an image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
 pub enum Verdict {
-    /// All that the case demands.
+    /// All requirements are met.
     Pass,
-    /// Over the case's bound, as expected of this accumulator, and within the accumulator's own; why.
+    /// The case's bound is exceeded, as expected of this accumulator, but not the accumulator's own
+    /// bound. Has the maps and the reason.
     ExpectedFailure(String),
-    /// Anything else; what.
+    /// Any other violation; has its description.
     Fail(String),
 }
 
 /// The error of one map over the pixels that are not excused.
 #[derive(Clone, Debug, Serialize)]
 pub struct MapError {
-    /// color (RGB), alpha, depth, normal, weight or count.
+    /// One of color (RGB), alpha, depth, normal, weight, count.
     pub map: &'static str,
-    /// What errors are fractions of: the range of the reference's values, or where they are nearly one (a range under
-    /// 1/1000 of the largest magnitude) that magnitude.
+    /// The unit of errors: the range of the reference's values, or their largest magnitude if the
+    /// range is under 1/1000 of it.
     pub range: f64,
     /// Largest error, as a fraction of the range.
     pub max: f64,
@@ -38,71 +39,72 @@ pub struct MapError {
     pub rms: f64,
     /// Largest bound of any pixel, as a fraction of the range.
     pub bound: f64,
-    /// Largest error as a fraction of the same pixel's bound: over 1 it is exceeded.
+    /// Largest ratio of a pixel's error to its bound by the case; above 1, the bound is exceeded.
     pub used: f64,
-    /// The largest error as a share of the bound of the row's own accumulator.
+    /// Largest ratio of a pixel's error to its bound by the row's own accumulator.
     pub used_of_own: f64,
 }
 
 /// One case rendered with one accumulator.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// The case's name.
+    /// Name of the case.
     pub case: String,
-    /// What it is about.
+    /// [`HardCase::about`].
     pub about: &'static str,
-    /// What its bound is made of.
+    /// [`HardCase::bound`].
     pub bound_is: &'static str,
-    /// The accumulator's name.
+    /// Name of the accumulator.
     pub accumulator: &'static str,
-    /// How it ended.
+    /// The verdict.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// By map.
+    /// The error of each map.
     pub maps: Vec<MapError>,
-    /// Largest error of colours in units of the scene's smallest attribute, where that is given.
+    /// Largest error of colours in units of [`HardCase::smallest`], if that is given.
     pub of_smallest: Option<f64>,
-    /// Pixels that the reference covers and the device does not; excused ones do not count.
+    /// Pixels, other than excused ones, that the reference covers and the device does not.
     pub lost: usize,
-    /// Pixels that the device covers and the reference does not; excused ones do not count.
+    /// Pixels, other than excused ones, that the device covers and the reference does not.
     pub invented: usize,
-    /// Values of any map that are NaN, excused pixels included.
+    /// Values of any map that are NaN, in excused pixels too.
     pub nan: usize,
-    /// Share of pixels that are excused.
+    /// Fraction of pixels that are excused.
     pub excused: f64,
-    /// Share of pixels that the reference covers.
+    /// Fraction of pixels that the reference covers.
     pub covered: f64,
-    /// How often a one-word sum wrapped; if ever, the image is that of `fixed`.
+    /// Number of one-word sums that wrapped; if there are any, the image is that of `fixed`.
     pub overflows: u64,
-    /// Where `fixed` has a larger RMSE than f32 sums by more than one rounding of the output: the map, and both.
+    /// If `fixed` has a larger RMSE than f32 sums by more than one rounding of the output: the map,
+    /// and both values.
     pub over_float: Option<String>,
-    /// Milliseconds of the device's render, with its compilation left out.
+    /// Milliseconds of the render on the device, without compilation.
     pub device_ms: f64,
 }
 
 impl Row {
-    /// The map with the largest part of its bound used up.
+    /// Returns the map with the largest ratio of error to bound.
     pub fn worst(&self) -> Option<&MapError> {
         self.maps.iter().max_by(|a, b| a.used.total_cmp(&b.used))
     }
 
-    /// The largest error of any map, as a fraction of its range.
+    /// Largest error of any map, as a fraction of its range.
     pub fn max_error(&self) -> f64 {
         self.maps.iter().map(|m| m.max).fold(0.0, f64::max)
     }
 
-    /// The largest RMSE of any map, as a fraction of its range.
+    /// Largest RMSE of any map, as a fraction of its range.
     pub fn rmse(&self) -> f64 {
         self.maps.iter().map(|m| m.rmse).fold(0.0, f64::max)
     }
 
-    /// Whether it is neither a pass nor an expected failure.
+    /// Whether the verdict is neither a pass nor an expected failure.
     pub fn failed(&self) -> bool {
         matches!(self.verdict, Verdict::Fail(_))
     }
 }
 
-/// Errors of one map while they are gathered.
+/// Accumulated errors of one map, before they are divided by the range.
 struct Gathered {
     map: &'static str,
     low: f64,
@@ -132,11 +134,12 @@ impl Gathered {
         }
     }
 
-    /// A value of the device beside the reference's, and the bounds of the case and of the accumulator.
+    /// Adds a value of the device, the reference's, and the bounds of the case and of the
+    /// accumulator.
     fn add(&mut self, value: f32, truth: f32, bound: f64, own: f64) {
         let (value, truth) = (f64::from(value), f64::from(truth));
         let error = (value - truth).abs();
-        // Not a number, or infinite: the largest error there is.
+        // NaN and infinite errors count as the largest error.
         let error = if error.is_finite() { error } else { f64::MAX.sqrt() };
         self.low = self.low.min(truth);
         self.high = self.high.max(truth);
@@ -145,7 +148,7 @@ impl Gathered {
         self.values += truth * truth;
         self.count += 1.0;
         self.bound = self.bound.max(bound);
-        // The reference is written as f32 too: half a unit in the last place.
+        // The reference is rounded to f32 too, by half a unit in the last place.
         let rounding = truth.abs() / 16_777_216.0;
         let share = |bound: f64| if error > 0.0 { error / (bound + rounding) } else { 0.0 };
         self.used = self.used.max(share(bound));
@@ -171,7 +174,7 @@ impl Gathered {
     }
 }
 
-/// Judges `frame`, rendered with `accumulator`.
+/// Judges `frame`, which was rendered with `accumulator`.
 pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame: &Frame, report: &Report) -> Row {
     let range = ColorRange::of(&case.scene);
     let exact = Accumulator::Fixed.row();
@@ -193,7 +196,7 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
             excused += 1;
             continue;
         }
-        // Samples may be covered where the pixel's centre, of which the maps are, is not.
+        // Samples may be covered even if the pixel's centre is not; maps are taken at the centre.
         let edge = !samples.is_empty() && there.weight == 0.0 && here.weight == 0.0;
         let shown = |values: &Values| if edge { values.color[3] > 0.0 } else { values.weight > 0.0 };
         match (shown(&there), shown(&here)) {
@@ -235,7 +238,7 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
     row
 }
 
-/// The samples of a pixel; none where its centre is the only one.
+/// Returns the samples of a pixel; none if a pixel has one sample, its centre.
 fn samples_of<'a>(case: &HardCase, truth: &'a Truth, pixel: usize) -> Vec<&'a Pixel> {
     let Samples { across, down } = case.options.samples;
     let (across, down, width) = (across as usize, down as usize, case.camera.width as usize);
@@ -261,7 +264,7 @@ fn gather(maps: &mut [Gathered; 6], (here, there): (&Values, &Values), bound: &P
     count.add(here.count, there.count, 0.0, 0.0);
 }
 
-/// The values of one pixel.
+/// The values of one pixel in all maps.
 struct Values {
     color: [f32; 4],
     depth: f32,
@@ -317,9 +320,9 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
     }
 }
 
-/// Notes in the row of `fixed` where f32 sums have a smaller RMSE, in any map, by more than one rounding of the output:
-/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. That is a failure. `rows` are those
-/// of one case.
+/// Fails the row of `fixed` if f32 sums have a smaller RMSE, in any map, by more than one rounding
+/// of the output: `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. The row also notes the
+/// values. `rows` must be those of one case.
 pub fn compare_rmse(rows: &mut [Row]) {
     let rounding = 1.0 / 16_777_216.0;
     let floats = |row: &&Row| [Accumulator::Float, Accumulator::Cas].map(Accumulator::name).contains(&row.accumulator);
@@ -355,7 +358,7 @@ mod tests {
     use crate::render::{Backend, render};
     use crate::scene::Maps;
 
-    /// The reference judged by itself passes, and whatever is changed in it is noticed.
+    /// The reference passes when it is judged by itself, and each change to it is noticed.
     #[test]
     fn each_fault_of_an_image_is_found() {
         let cases = cases().unwrap();
@@ -381,7 +384,7 @@ mod tests {
         fails(&|f| f.color[decided][0] += 1e-3, "color");
         fails(&|f| f.map_mut(Map::Depth).unwrap()[decided] *= 1.0001, "depth");
         fails(&|f| f.map_mut(Map::Count).unwrap()[decided] += 1.0, "count");
-        // A failure is expected of one word, but within its own bound only.
+        // The one-word accumulator is expected to fail, but only within its own bound.
         assert!(matches!(verdict(&|f| f.color[decided][0] += 1e-2, one_word), Verdict::Fail(_)));
         let bits = one_word.fraction_bits(case.scene.surfels.len() as u64);
         let range = ColorRange::of(&case.scene);

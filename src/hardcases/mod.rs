@@ -1,18 +1,21 @@
-//! Scenes that renderers like to get wrong, the bound that each one's errors must keep, and who is known not to.
+//! Scenes that are hard to render correctly, with a bound on the error of each image.
 //!
-//! A case is rendered by the f64 reference and, with each accumulator, on the device. Its bound is derived pixel by pixel
-//! from the fragments that the reference blends there ([`bounds`]) and is that of the accumulator `fixed`; an accumulator
-//! that is expected to exceed it says why, and must still keep the bound of its own row in
-//! [`ACCUMULATORS`]. A verdict looks at:
+//! A case is rendered by the f64 reference and, with each accumulator, on the device. Its bound is
+//! derived pixel by pixel from the fragments that the reference blends there ([`bounds`]), for the
+//! accumulator `fixed`. An accumulator that is expected to exceed it has a stated reason, and must
+//! still keep the bound of its own row in [`ACCUMULATORS`]. A verdict checks:
 //!
-//! - every value of every map: none is NaN, and each differs from the reference by no more than its bound;
+//! - every value of every map: none is NaN, and each differs from the reference by no more than its
+//!   bound;
 //! - pixels that only one of the two covers, and counts of fragments: none differ;
-//! - excused pixels, where a fragment lies within [`DECISION_MARGIN`](crate::metrics::DECISION_MARGIN) of a decision, or
-//!   within its own derived error of one: no more than the case allows;
-//! - the RMSE of `fixed`: at most that of f32 sums and one rounding of the output, `2^-24 rms(values)`, for every map;
-//! - the part of the image that the reference covers, which shows that the case is what it says.
+//! - excused pixels, where a fragment lies within
+//!   [`DECISION_MARGIN`](crate::metrics::DECISION_MARGIN) of a decision, or within its own derived
+//!   error of one: no more than the case allows;
+//! - the RMSE of `fixed`: at most that of f32 sums plus one rounding of the output,
+//!   `2^-24 rms(values)`, for every map;
+//! - the part of the image that the reference covers, which shows that the scene is as intended.
 //!
-//! Images are unlit: a light multiplies the errors of two maps that are judged by themselves.
+//! Images are unlit, because a light multiplies the errors of two maps that are judged separately.
 
 pub mod bounds;
 mod cases;
@@ -41,38 +44,39 @@ use crate::scene::{Camera, Composite, Map, Maps, Samples, Scene};
 /// An accumulator that is expected to exceed a case's bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Expected {
-    /// Its name.
+    /// The accumulator.
     pub accumulator: Accumulator,
-    /// Why.
+    /// The reason, for reports.
     pub reason: &'static str,
 }
 
-/// A scene that is hard to render, and what is demanded of its image.
+/// A scene that is hard to render, and the requirements on its image.
 #[derive(Clone, Debug)]
 pub struct HardCase {
-    /// A short name; orthographic twins end in `, orthographic`.
+    /// A short name; the names of orthographic twins end in `, orthographic`.
     pub name: String,
-    /// What it is about, in one sentence.
+    /// The difficulty, in one sentence.
     pub about: &'static str,
-    /// What its bound is made of, in one sentence.
+    /// The parts of its bound, in one sentence.
     pub bound: &'static str,
     /// The scene.
     pub scene: Scene,
     /// The camera.
     pub camera: Camera,
-    /// The options, the accumulator apart.
+    /// The options, except the accumulator.
     pub options: RenderOptions,
-    /// Least and largest share of pixels that the reference covers.
+    /// Least and largest fraction of pixels that the reference covers.
     pub covered: (f64, f64),
-    /// The largest share of pixels that may be excused.
+    /// Largest fraction of pixels that may be excused.
     pub excused: f64,
-    /// Who may exceed the bound.
+    /// Accumulators that may exceed the bound.
     pub expected: Vec<Expected>,
-    /// The smallest magnitude of an attribute, where colours span many decades: colour errors are told in units of it.
+    /// Smallest magnitude of an attribute, if colours span many decades; colour errors are then
+    /// also reported in units of it.
     pub smallest: Option<f64>,
 }
 
-/// The list of cases.
+/// Builds all cases.
 ///
 /// # Errors
 /// None that a caller could cause: the cameras are built by functions that can fail.
@@ -86,33 +90,32 @@ pub fn cases() -> Result<Vec<HardCase>> {
     Ok(all)
 }
 
-/// What a case's image should be: by the reference, and known to what error.
+/// The correct image of a case, and the errors that the device may make in it.
 pub struct Truth {
     /// The f64 reference, with its map of decisions.
     pub frame: Frame,
-    /// What is known at each pixel's centre.
+    /// The error terms at each pixel's centre.
     pub pixels: Vec<bounds::Pixel>,
-    /// What is known of each sample, where a pixel has several: rows of the finer grid.
+    /// The error terms of each sample, in rows of the finer grid, if a pixel has several.
     pub samples: Vec<bounds::Pixel>,
-    /// What is known of each pixel's colour, where surfaces show through each other; of the nearest one are the maps.
+    /// The bounds on each pixel's colour, if surfaces show through each other; the maps are still
+    /// those of the nearest surface.
     pub composited: Vec<composited::Composited>,
 }
 
 impl HardCase {
-    /// What is judged: points that face the camera have no normals.
+    /// Returns the maps to judge. Points that face the camera have no normals.
     pub fn maps(&self) -> Maps {
         if self.options.facing.is_some() { Maps::ON_DEVICE.but(&[Map::Normal]) } else { Maps::ON_DEVICE }
     }
 
-    /// Whether it can be rendered with an accumulator: surfaces that show through each other have sums of `fixed`.
+    /// Whether the case can be rendered with an accumulator: composited surfaces use the sums of
+    /// `fixed`.
     pub fn fits(&self, accumulator: &AccumulatorRow) -> bool {
         self.options.composite == Composite::Opaque || accumulator.of == Accumulator::Fixed
     }
 
     /// Renders the reference and derives the bounds.
-    ///
-    /// # Errors
-    /// Those of [`render`].
     pub fn truth(&self) -> Result<Truth> {
         let options = RenderOptions { maps: self.maps().and(&[Map::Decision]), ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
@@ -125,14 +128,11 @@ impl HardCase {
             Composite::Opaque => Vec::new(),
             _ => composited::pixels(&self.scene, &self.camera, &self.options),
         };
-        // As of an opaque picture, in which backs may be left out.
+        // These are the terms of an opaque picture, in which backs may be left out.
         Ok(Truth { frame, pixels: known(&self.camera), samples, composited })
     }
 
-    /// Renders with `accumulator` on `backend` and judges the image.
-    ///
-    /// # Errors
-    /// Those of [`render`].
+    /// Renders with `accumulator` on `backend`, and judges the image.
     pub fn judge(&self, truth: &Truth, accumulator: &'static AccumulatorRow, backend: &Backend) -> Result<Row> {
         let options = RenderOptions { accumulator: accumulator.of, maps: self.maps(), ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
@@ -140,7 +140,8 @@ impl HardCase {
     }
 }
 
-/// The accumulators that the adapter of `backend` has; all of them for the reference, which ignores the choice.
+/// Returns the accumulators that the adapter of `backend` supports; for the reference, which
+/// ignores the choice, all.
 pub fn supported(backend: &Backend) -> Vec<&'static AccumulatorRow> {
     let fits = |row: &&AccumulatorRow| match backend {
         Backend::Gpu { gpu, .. } => check::sums(&gpu.adapter, row.of).is_ok(),
@@ -149,10 +150,7 @@ pub fn supported(backend: &Backend) -> Vec<&'static AccumulatorRow> {
     ACCUMULATORS.iter().filter(fits).collect()
 }
 
-/// Renders and judges `cases` with `accumulators`: one row for each pair, case by case.
-///
-/// # Errors
-/// Those of [`render`], with the case's name.
+/// Renders and judges `cases` with `accumulators`. Returns one row per pair, case by case.
 pub fn run(
     cases: &[HardCase],
     accumulators: &[&'static AccumulatorRow],
@@ -181,23 +179,23 @@ pub fn run(
     Ok(rows)
 }
 
-/// The rows of a run and how many ended how.
+/// The rows of a run, and counts of their verdicts.
 #[derive(Debug, Serialize)]
 pub struct Outcome<'a> {
-    /// The adapter's name.
+    /// Name of the adapter.
     pub adapter: &'a str,
-    /// Rows that keep all that their cases demand.
+    /// Number of rows that meet all requirements of their cases.
     pub passed: usize,
-    /// Rows that exceed a bound as expected of their accumulator.
+    /// Number of rows that exceed a bound as expected of their accumulator.
     pub expected_failures: usize,
-    /// All others.
+    /// Number of all other rows.
     pub failed: usize,
-    /// All.
+    /// All rows.
     pub rows: &'a [Row],
 }
 
 impl<'a> Outcome<'a> {
-    /// Counts `rows`.
+    /// Counts the verdicts of `rows`.
     pub fn of(adapter: &'a str, rows: &'a [Row]) -> Self {
         let failed = rows.iter().filter(|row| row.failed()).count();
         let expected_failures = rows.iter().filter(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))).count();

@@ -1,4 +1,5 @@
-//! Points that face the camera: sizes past their limits, and shapes that cross the near depth and each other.
+//! Points that face the camera: sizes past their limits, and shapes that cross the near depth and
+//! each other.
 
 use glam::{DVec2, DVec3};
 
@@ -11,18 +12,18 @@ use crate::passes::splat::{Intersection, Splat};
 use crate::scene::facing::{Facing, PointShape};
 use crate::scene::{Projection, Surfel};
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
 
-/// What their bounds are made of.
-const SHAPE: &str = "a disk's bound; and of a height what it changes by over the error of rho, and 40 e of itself";
+/// The parts of the cases' bounds.
+const SHAPE: &str = "a disk's bound, the height's change over the error of rho, and 40 e of the height";
 
 const LIST: &[Entry] = &[
     Entry {
         name: "points of 0 and 50 pixels",
-        about: "Circles of radii from 1e-9 to 1e3 pixels, held between 1 and 50 across, some beside the image.",
+        about: "Circles of radii from 1e-9 to 1e3 pixels, clamped to 1 to 50 pixels across, some outside the image.",
         bound: SHAPE,
         size: (64, 48),
         stage: Stage::askew,
@@ -31,7 +32,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "squares of a pixel",
-        about: "Squares of a pixel and less, of which each shows at the pixel that it lies in.",
+        about: "Squares of at most a pixel, each of which shows at the pixel that contains it.",
         bound: SHAPE,
         size: (64, 48),
         stage: Stage::askew,
@@ -40,7 +41,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "spheres at the near depth",
-        about: "Centres from before the near depth to past it by a sphere's height, which comes nearer than that.",
+        about: "Spheres with centres from just before the near depth to a sphere's height past it, so that the near depth can cut them.",
         bound: SHAPE,
         size: (48, 40),
         stage: Stage::plain,
@@ -49,7 +50,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "cones through each other",
-        about: "Wide cones of few depths, so that nearly every pixel is decided by heights.",
+        about: "Wide cones at three depths, so that heights decide nearly every pixel.",
         bound: SHAPE,
         size: (64, 48),
         stage: Stage::askew,
@@ -58,7 +59,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "paraboloids around the camera",
-        about: "Paraboloids behind the camera, around it and before it, in sizes of a pixel's part to the whole image.",
+        about: "Paraboloids behind, around and in front of the camera, from a fraction of a pixel to the whole image.",
         bound: SHAPE,
         size: (48, 40),
         stage: Stage::plain,
@@ -73,7 +74,8 @@ fn facing(shape: PointShape, covered: (f64, f64), surfels: Vec<Surfel>) -> Filli
     filling
 }
 
-/// A point of a radius in pixels, at a place of the image and a depth. Its plane is of no matter.
+/// A point with a radius of `pixels`, at a place (x, y) of the image and a depth. The orientation
+/// of its disk does not matter.
 fn point(stage: &Stage, (x, y): (f64, f64), z: f64, pixels: f64) -> Surfel {
     stage.disk(stage.at(x, y, z), stage.ray(stage.at(x, y, z)), pixels * stage.pixel(z))
 }
@@ -92,7 +94,8 @@ fn near(stage: &Stage) -> Vec<Surfel> {
     let (width, height) = stage.size();
     let of = |k: usize| {
         let at = (fraction(k, 0) * width as f64, fraction(k, 1) * height as f64);
-        // Of a pinhole's points the height is a part of the depth, of others pixels are wider than the near depth is far.
+        // With a pinhole, the height is a fraction of the depth. With an orthographic camera, a
+        // pixel is wider than the near depth.
         let (z, pixels) = match stage.camera.projection {
             Projection::Pinhole => (NEAR * (0.9 + 0.6 * fraction(k, 2)), 12.0 * fraction(k, 3)),
             Projection::Orthographic => (0.9 * NEAR + 2.0 * stage.pixel(1.0) * fraction(k, 2), 2.5 * fraction(k, 3)),
@@ -120,14 +123,19 @@ fn around(stage: &Stage) -> Vec<Surfel> {
 }
 
 impl Precision {
-    /// The device's error at pixel (x, y) of a point that faces the camera, its own evaluation included: that of a disk parallel to the
-    /// image, whose radius is known as well as a turned one's, to 6 e; at the pixel that it lies in, of the distance in pixels, known to
-    /// 5 e of a pixel and 4 e of the terms; and of its height, which is evaluated at a rho that errs, to 40 e by its radius and itself.
+    /// Bounds the device's error at pixel (x, y) of a point that faces the camera, including the
+    /// evaluation.
+    ///
+    /// The error has three parts. That of a disk parallel to the image, whose radius has a relative
+    /// error of 6 e, like that of a turned disk. At the pixel that contains the point, that of the
+    /// distance in pixels: 5 e of a pixel and 4 e of the terms. And that of the height, which is
+    /// evaluated at a rho with an error, and to 40 e of itself.
     pub fn point(&self, point: &Point, splat: &Splat, (x, y): (u32, u32), at: &Intersection) -> Bound {
         let height = |rho: f64| point.shape().height((rho * rho).min(1.0)) * point.radius();
         let rho = at.rho2.sqrt();
         let plane = at.depth + height(rho);
-        // Of the disk it is the length that errs so, of a square at most as much by each side.
+        // The bound of a disk limits the error of the length of (u, v), and so of each of its
+        // components, which decide for a square.
         let disk = self.fragment(splat, x, y, &Intersection { depth: plane, rho2: at.uv.length_squared(), ..*at });
         let step = DVec2::new(f64::from(x) - splat.anchor[0] as f64, f64::from(y) - splat.anchor[1] as f64);
         let own = 2.0 * (5.0 * E + 4.0 * E * (step.abs().element_sum() + 1.0)) + 16.0 * E * rho;

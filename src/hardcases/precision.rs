@@ -1,21 +1,26 @@
-//! How far one fragment of the device may lie from its f64 twin: derived from the operations of `wgsl/camera_*.wgsl`,
-//! `wgsl/rows.wgsl` and `wgsl/footprint.wgsl`, to first order.
+//! Bounds how far a fragment of the device may lie from its f64 twin.
 //!
-//! With e = 2^-24 (half a unit in the last place of 1), camera-space p, s, t, and
-//! `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera `|(s x t).z| / (|s| |t|)`):
+//! The bounds follow, to first order, from the operations of `wgsl/camera_*.wgsl`, `wgsl/rows.wgsl`
+//! and `wgsl/footprint.wgsl`. With e = 2^-24 (half a unit in the last place of 1), camera-space p,
+//! s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera
+//! `|(s x t).z| / (|s| |t|)`):
 //!
-//! - s and t are rotated by three products of rounded factors each: an error of at most 6e of their length. The rows
-//!   `t x p`, `p x s`, `s x t` are then known to 10e, 10e and 15e of the product of the lengths of their factors.
-//! - the determinant by which all rows are divided sums some twenty roundings of size e |p||s||t| / sqrt(3); the root of
-//!   the sum of their squares is 2.6e, and 6e is granted: a relative error of 6e / cosine of the rows as a whole.
-//! - rows are relative to the splat's own pixel: coefficients of x and y act on the distance from the splat's centre,
-//!   D pixels; the centre is found in doubled precision (2^-42 of the image coordinate) and, unless the splat is thin,
-//!   kept to 5e of a pixel.
-//! - thin splats (aspect over 8) have rows a and b in doubled precision (2^-42), stored to 36 bits (row a) and 24 bits
-//!   of the much smaller changes along the long axis (row b).
-//! - evaluation on the device adds 4e of the sum of the terms' magnitudes (three roundings), and a division.
+//! - s and t are rotated by three products of rounded factors each, with an error of at most 6e of
+//!   their length. The rows `t x p`, `p x s`, `s x t` then err by 10e, 10e and 15e of the product
+//!   of their factors' lengths.
+//! - The determinant by which all rows are divided sums some twenty roundings of size
+//!   `e |p||s||t| / sqrt(3)`. The root of the sum of their squares is 2.6e; 6e is allowed. The rows
+//!   as a whole then have a relative error of 6e / cosine.
+//! - Rows are relative to the splat's own pixel, so the coefficients of x and y act on the distance
+//!   from the splat's centre, in pixels. The centre is computed in doubled precision (2^-42 of the
+//!   image coordinate) and, unless the splat is thin, stored to 5e of a pixel.
+//! - Thin splats (aspect over 8) have rows a and b in doubled precision (2^-42). They are stored to
+//!   36 bits (row a), and to 24 bits of the much smaller changes along the long axis (row b).
+//! - Evaluation on the device adds 4e of the sum of the terms' magnitudes (three roundings), and a
+//!   division.
 //!
-//! rho moves by no more than the vector (u, v) does, and a relative error of the depth is one of rho too (pinhole).
+//! rho changes by no more than the vector (u, v). For a pinhole, a relative error of the depth is
+//! also one of rho.
 
 use crate::passes::splat::{Intersection, Splat};
 use crate::scene::{Camera, Projection, Scene};
@@ -23,36 +28,38 @@ use glam::{DVec2, DVec3, Vec3};
 
 /// Half a unit in the last place of 1 in f32.
 pub const E: f64 = 1.0 / 16_777_216.0;
-/// What doubled arithmetic keeps.
+/// Relative error of doubled arithmetic.
 const DOUBLED: f64 = 1.0 / (1u64 << 42) as f64;
-/// What row a of a thin splat keeps: 36 bits in the record, and three more roundings when evaluated.
+/// Relative error of row a of a thin splat: 36 bits in the record, and three more roundings when it
+/// is evaluated.
 const THIN: f64 = 1.0 / (1u64 << 35) as f64;
 
 /// Bounds on the difference between device and twin at one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Bound {
-    /// Absolute, of rho = |(u, v)|.
+    /// Absolute error of rho = |(u, v)|.
     pub rho: f64,
-    /// Relative, of the depth.
+    /// Relative error of the depth.
     pub depth: f64,
 }
 
-/// What the bounds of a splat's record depend on.
+/// The properties of a splat that its error bounds depend on.
 pub struct Precision {
     pub(super) projection: Projection,
-    /// As defined above.
+    /// The cosine of the module's documentation.
     pub cosine: f64,
     pub(super) s: DVec3,
     pub(super) t: DVec3,
     pub(super) distance: f64,
     center_z: f64,
-    /// The splat's centre in the image; only where the record is anchored there.
+    /// The splat's centre in the image, pixels, if the record is anchored there.
     pub(super) center: Option<DVec2>,
-    /// The direction through the anchor, for records that are anchored in the image.
+    /// The direction through the anchor, for records that are anchored elsewhere in the image.
     pub(super) anchor_ray: DVec3,
     pub(super) principal: DVec2,
     pub(super) focal: f64,
-    /// Frobenius norm of the coefficients of x and y in rows a and b, and the smaller singular value.
+    /// Frobenius norm of the coefficients of x and y in rows a and b; below, their smaller singular
+    /// value.
     change: f64,
     least_change: f64,
     depth_row: DVec2,
@@ -60,7 +67,7 @@ pub struct Precision {
 }
 
 impl Precision {
-    /// Of `splat`, the twin of one of the scene's surfels.
+    /// Returns the properties of `splat`, the twin of one of the scene's surfels.
     pub fn of(splat: &Splat, scene: &Scene, camera: &Camera) -> Self {
         let surfel = &scene.surfels[splat.surfel as usize];
         let turned = |v: [f32; 3]| camera.rotation * Vec3::from_array(v).as_dvec3();
@@ -99,28 +106,31 @@ impl Precision {
             change: change.sqrt(),
             least_change: std::f64::consts::SQRT_2 * determinant / change.sqrt(),
             depth_row: splat.c.truncate(),
-            // Where the kernel's own f32 may decide either way, the wider bound holds.
+            // A margin on 8: if the kernel's own f32 may decide either way, the wider bound is
+            // used.
             thin: own && change > 8.01 * determinant,
         }
     }
 
-    /// The relative error of the determinant.
+    /// Relative error of the determinant.
     fn determinant(&self) -> f64 {
         let error = 6.0 * E / self.cosine;
         if error < 0.9 { error / (1.0 - error) } else { f64::INFINITY }
     }
 
-    /// Whether the device may rightly differ about which side of the disk is seen, or about it being seen at all.
+    /// Whether the device may rightly differ about which side of the disk is seen, or whether it is
+    /// seen.
     pub fn side_is_open(&self) -> bool {
         self.determinant().is_infinite()
     }
 
-    /// The record's error at pixel (x, y), where the twin has `at`, if both are evaluated without error.
+    /// Bounds the record's error at pixel (x, y), where the twin has `at`, as if both were
+    /// evaluated exactly.
     pub fn record(&self, splat: &Splat, x: u32, y: u32, at: &Intersection) -> Bound {
         self.bound(splat, x, y, at, 0.0)
     }
 
-    /// The device's error at pixel (x, y), its own evaluation included.
+    /// Bounds the device's error at pixel (x, y), including the evaluation.
     pub fn fragment(&self, splat: &Splat, x: u32, y: u32, at: &Intersection) -> Bound {
         self.bound(splat, x, y, at, 4.0 * E)
     }
@@ -129,7 +139,7 @@ impl Precision {
         let step = DVec2::new(f64::from(x) - splat.anchor[0] as f64, f64::from(y) - splat.anchor[1] as f64);
         let reach = step.abs().element_sum() + 1.0;
         let rho = at.rho2.sqrt();
-        // Per unit of row: what one unit of a row's error is as a change of (u, v).
+        // Factors by which an error of a row changes (u, v).
         let z = if self.projection == Projection::Pinhole { at.depth } else { 1.0 };
         let inverse_axes = (1.0 / self.s.length() + 1.0 / self.t.length()) / self.cosine;
         let Some(center) = self.center else {

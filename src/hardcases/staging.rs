@@ -1,4 +1,4 @@
-//! Where a case is staged: a camera, and surfels placed by where the camera sees them.
+//! Stages for the cases: a camera, and surfels that are placed in its image.
 
 use glam::{DMat3, DVec3};
 
@@ -7,9 +7,11 @@ use crate::error::Result;
 use crate::plan::{Accumulator, Optimisation, RenderOptions};
 use crate::scene::{Camera, Cap, Clip, Colors, Epsilon, Kernel, Lens, Outline, Projection, Scene, Shading, Surfel, Up};
 
-/// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
+/// Returns the fractional part of the `k`th element of a sequence that fills [0, 1) evenly along
+/// each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
-    // Fractions of square roots of primes and of the plastic number's powers: independent over the rationals.
+    // Fractions of square roots of primes and of powers of the plastic number: independent over the
+    // rationals.
     const STEPS: [f64; 6] = [
         0.754_877_666_246_692_7,
         0.569_840_290_998_053_2,
@@ -21,35 +23,36 @@ pub fn fraction(k: usize, axis: usize) -> f64 {
     (0.5 + (k + 1) as f64 * STEPS.get(axis % 6).copied().unwrap_or(0.0)).fract()
 }
 
-/// A camera with a frame of its own: lengths are in units of `unit` world units, x right, y down, z forward.
+/// A camera with its own frame: x right, y down, z forward, in units of `unit` world units.
 #[derive(Clone, Debug)]
 pub struct Stage {
     /// The camera.
     pub camera: Camera,
     /// The scene's origin, world units.
     pub origin: DVec3,
-    /// World units of one unit.
+    /// World units per unit of the stage.
     pub unit: f64,
 }
 
-/// Height of an orthographic image, units: what a pinhole camera of 60 degrees sees at about the depth of most cases.
+/// Height of an orthographic image, units: about that of a 60-degree pinhole's image at the depth
+/// of most cases.
 const HEIGHT: f64 = 4.0;
 
-/// Depth below which nothing is drawn, units.
+/// Near depth, units.
 pub const NEAR: f64 = 1e-3;
 
 impl Stage {
-    /// At the origin, looking along z.
+    /// Creates a stage at the origin that looks along z.
     pub fn plain(projection: Projection, size: (u32, u32)) -> Result<Self> {
         Self::new(projection, size, DVec3::ZERO, DVec3::ZERO, DMat3::IDENTITY, 1.0)
     }
 
-    /// Beside the origin, looking askew.
+    /// Creates a stage beside the origin that looks in an oblique direction.
     pub fn askew(projection: Projection, size: (u32, u32)) -> Result<Self> {
         Self::placed(projection, size, DVec3::ZERO, 1.0)
     }
 
-    /// The same in a scene about `origin`, `unit` world units large.
+    /// Creates the oblique stage in a scene about `origin`, with `unit` world units per unit.
     pub fn placed(projection: Projection, size: (u32, u32), origin: DVec3, unit: f64) -> Result<Self> {
         let forward = DVec3::new(-0.22, 0.91, -0.35).normalize();
         let right = forward.cross(DVec3::Z).normalize();
@@ -73,7 +76,8 @@ impl Stage {
         Ok(Self { camera, origin, unit })
     }
 
-    /// The point, in units of camera space, that the image shows at (x, y), pixels, at depth `z`.
+    /// Returns the camera-space point, in units, that the image shows at (x, y), pixels, at depth
+    /// `z`.
     pub fn at(&self, x: f64, y: f64, z: f64) -> DVec3 {
         let (x, y) = ((x - self.camera.cx) / self.camera.fx, (y - self.camera.cy) / self.camera.fy);
         match self.camera.projection {
@@ -82,7 +86,7 @@ impl Stage {
         }
     }
 
-    /// The direction of the view ray through a point of camera space.
+    /// Returns the direction of the view ray through a camera-space point.
     pub fn ray(&self, point: DVec3) -> DVec3 {
         match self.camera.projection {
             Projection::Pinhole => point.normalize(),
@@ -90,7 +94,7 @@ impl Stage {
         }
     }
 
-    /// The width of a pixel at depth `z`, units.
+    /// Width of a pixel at depth `z`, units.
     pub fn pixel(&self, z: f64) -> f64 {
         match self.camera.projection {
             Projection::Pinhole => z / self.camera.fx,
@@ -98,12 +102,12 @@ impl Stage {
         }
     }
 
-    /// Pixels of the image, across and down.
+    /// Width and height of the image, pixels.
     pub fn size(&self) -> (usize, usize) {
         (self.camera.width as usize, self.camera.height as usize)
     }
 
-    /// A surfel from its centre and half-axes in units of camera space.
+    /// Creates a surfel from its centre and half-axes in units of camera space.
     pub fn surfel(&self, center: DVec3, s: DVec3, t: DVec3) -> Surfel {
         let world = |v: DVec3| self.camera.rotation.transpose() * (v * self.unit);
         Surfel {
@@ -113,15 +117,15 @@ impl Stage {
         }
     }
 
-    /// A round disk.
+    /// Creates a round disk.
     pub fn disk(&self, center: DVec3, normal: DVec3, radius: f64) -> Surfel {
         let normal = normal.normalize();
         let s = normal.any_orthonormal_vector();
         self.surfel(center, s * radius, normal.cross(s) * radius)
     }
 
-    /// A sheet of disks over the whole image, a grid of `spacing` pixels, at the depth `depth(x, y)` that the caller gives
-    /// for a place in the image, tilted one by one.
+    /// Creates a sheet of disks over the whole image: a grid of `spacing` pixels at the depths
+    /// `depth(x, y)`, each disk with its own small tilt.
     pub fn sheet(&self, spacing: f64, tilt: f64, depth: impl Fn(f64, f64) -> f64) -> Vec<Surfel> {
         let (width, height) = self.size();
         let (columns, rows) = ((width as f64 / spacing).ceil() as usize, (height as f64 / spacing).ceil() as usize);
@@ -137,41 +141,43 @@ impl Stage {
     }
 }
 
-/// What a case puts on its stage.
+/// The surfels and options of a case, and the requirements on its image.
 pub struct Filling {
     /// The surfels.
     pub surfels: Vec<Surfel>,
-    /// Linear colours; without any, varied ones in [0, 1].
+    /// Linear colours, one per surfel; if absent, varied ones in [0, 1].
     pub colors: Option<Vec<[f32; 4]>>,
-    /// The lines at which the surfels end; none or one for each.
+    /// The clip lines of each surfel; may be empty.
     pub clips: Vec<Clip>,
-    /// How they curve; none or one for each.
+    /// The curvature of each surfel; may be empty.
     pub caps: Vec<Cap>,
-    /// The options.
+    /// The options, except the accumulator.
     pub options: RenderOptions,
-    /// Least and largest share of pixels covered.
+    /// Least and largest fraction of pixels that the reference covers.
     pub covered: (f64, f64),
-    /// Largest share of pixels excused.
+    /// Largest fraction of pixels that may be excused.
     pub excused: f64,
-    /// Expected failures.
+    /// Accumulators that may exceed the bound.
     pub expected: Vec<Expected>,
     /// The smallest magnitude of an attribute, for high dynamic range.
     pub smallest: Option<f64>,
 }
 
-/// What one-word sums cannot do in an image with a pixel that only a disk's rim reaches.
-const BITS: &str = "24 fraction bits, all that one word leaves where hundreds of fragments may meet, keep 16 of a weight \
-                    of 1/400 at a disk's rim";
+/// The reason why one-word sums fail in an image with a pixel that only a disk's rim reaches.
+const BITS: &str = "one-word sums have only 24 fraction bits where hundreds of fragments may meet, and keep 16 of a \
+                    weight of 1/400 at a disk's rim";
 
-/// Unlit, nothing behind the scene; and each disk is drawn, also those that are the same: sums of many terms are judged. The tolerance
-/// does not depend on the disks' sizes, which differ by many powers of ten.
+/// Options of all cases: unlit, over an empty background. Duplicate disks are drawn too, because
+/// sums of many terms are judged. The tolerance does not depend on the disks' sizes, which differ
+/// by many powers of ten.
 pub fn options() -> RenderOptions {
     let (without, epsilon) = (vec![Optimisation::Copies], Epsilon::Relative(0.01));
     RenderOptions { epsilon, shading: Shading::Unlit, lights: Vec::new(), without, ..RenderOptions::default() }
 }
 
 impl Filling {
-    /// Of `surfels` that cover a share of the image between these.
+    /// Creates a filling of `surfels` that cover a fraction of the image between `covered.0` and
+    /// `covered.1`.
     pub fn of(surfels: Vec<Surfel>, covered: (f64, f64)) -> Self {
         Self {
             surfels,
@@ -186,24 +192,25 @@ impl Filling {
         }
     }
 
-    /// Some pixel is reached by disks' rims alone, where sums of one word keep too few bits.
+    /// Expects one-word sums to fail: some pixel is reached only by the rims of disks, where they
+    /// have too few bits.
     pub fn with_lone_rims(self) -> Self {
         self.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
     }
 
-    /// As polygons of so many sides.
+    /// Replaces the disks by polygons of `sides` sides.
     pub fn outline(mut self, sides: u32) -> Self {
         self.options.outline = Outline::of_sides(sides).ok();
         self
     }
 
-    /// With another kernel.
+    /// Sets the kernel.
     pub fn kernel(mut self, kernel: Kernel) -> Self {
         self.options.kernel = kernel;
         self
     }
 
-    /// With `accumulators` that may exceed the bound.
+    /// Adds `accumulators` that may exceed the bound.
     pub fn expect(mut self, accumulators: &[Accumulator], reason: &'static str) -> Self {
         self.expected.extend(accumulators.iter().map(|&accumulator| Expected { accumulator, reason }));
         self
@@ -211,7 +218,8 @@ impl Filling {
 }
 
 impl Stage {
-    /// `filling`, of which this projection alone sees pixels that only rims reach.
+    /// Applies [`Filling::with_lone_rims`] if the stage has this `projection`; the other sees no
+    /// such pixel.
     pub fn rims_in(&self, projection: Projection, filling: Filling) -> Filling {
         if self.camera.projection == projection { filling.with_lone_rims() } else { filling }
     }
@@ -219,26 +227,26 @@ impl Stage {
 
 /// A row of the lists of cases.
 pub struct Entry {
-    /// Name.
+    /// [`HardCase::name`] of the pinhole case.
     pub name: &'static str,
-    /// About.
+    /// [`HardCase::about`].
     pub about: &'static str,
-    /// What the bound is made of.
+    /// [`HardCase::bound`].
     pub bound: &'static str,
-    /// Image size.
+    /// Width and height of the image, pixels.
     pub size: (u32, u32),
-    /// The stage.
+    /// Creates the stage.
     pub stage: fn(Projection, (u32, u32)) -> Result<Stage>,
-    /// What is on it.
+    /// Creates the filling.
     pub fill: fn(&Stage) -> Filling,
-    /// Which projections it makes sense for.
+    /// The projections for which the case makes sense.
     pub projections: &'static [Projection],
 }
 
 /// Both projections.
 pub const BOTH: &[Projection] = &[Projection::Pinhole, Projection::Orthographic];
 
-/// Builds the cases of a list.
+/// Builds the cases of a list: one per entry and projection.
 pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
     let mut cases = Vec::new();
     for entry in entries {

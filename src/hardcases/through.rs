@@ -8,13 +8,13 @@ use crate::error::Result;
 use crate::scene::composite::ALL_LAYERS;
 use crate::scene::{Composite, Kernel, Surfel, Tail, gaussian};
 
-/// The cases.
+/// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
     build(LIST)
 }
 
-/// What their bounds are made of.
-const THROUGH: &str = "each surface's bound times what is let through to it, and six roundings a surface";
+/// The parts of the cases' bounds.
+const THROUGH: &str = "each surface's bound times the transmittance in front of it, and six roundings per surface";
 
 const LAYERS: Composite = Composite::Layers(ALL_LAYERS);
 
@@ -39,7 +39,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "layers closer than epsilon",
-        about: "Disks a third of an epsilon apart, which are one surface of thirty epsilons, and a gap.",
+        about: "Disks a third of an epsilon apart, which form one surface of thirty epsilons, and disks behind a gap.",
         bound: THROUGH,
         size: (24, 20),
         stage: Stage::plain,
@@ -52,7 +52,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "a tail of most of the weight",
-        about: "Two layers of thirty, and all behind them as one.",
+        about: "Thirty surfaces: two are layers, and the rest is one tail.",
         bound: THROUGH,
         size: (24, 20),
         stage: Stage::plain,
@@ -61,7 +61,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "alphas of nothing and nearly all",
-        about: "Sheets of alpha 0, 1 - 2^-8, 1/2 and 1 behind one another, and one behind that, which nobody sees.",
+        about: "Sheets of alpha 0, 1 - 2^-8, 1/2 and 1 behind one another, and a hidden one behind these.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
@@ -77,7 +77,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "sheets that cross",
-        about: "Two sheets that pass through each other, which parts are nearer by turns.",
+        about: "Two sheets that pass through each other: each is nearer in one half.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
@@ -91,7 +91,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "many fragments, one by one",
-        about: "Eight sheets of disks with colours of their own, each fragment composited by itself.",
+        about: "Eight sheets of disks with different colours; fragments are composited one by one.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
@@ -103,7 +103,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "by the rules of Gaussians",
-        about: "Eight sheets of disks with alphas of 0.01 to 1: the faint and what lies behind the opaque is left out.",
+        about: "Eight sheets of disks with alphas of 0.01 to 1: faint fragments and those behind opaque ones are left out.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
@@ -118,7 +118,7 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "many at one place, one by one",
-        about: "Two hundred disks at one place, whose colours decide which comes first.",
+        about: "Two hundred disks at one place: their colours decide which comes first.",
         bound: THROUGH,
         size: (24, 20),
         stage: Stage::plain,
@@ -146,14 +146,15 @@ fn through(composite: Composite, covered: (f64, f64), surfels: Vec<Surfel>) -> F
 }
 
 impl Filling {
-    /// With other alphas.
+    /// Sets the alpha of each surfel.
     fn alphas(mut self, alpha: impl Fn(usize) -> f32) -> Self {
         self.colors.iter_mut().flatten().enumerate().for_each(|(k, color)| color[3] = alpha(k));
         self
     }
 }
 
-/// Disks that face the camera, each over the whole image, `apart` times their depth.
+/// Disks that face the camera, each over the whole image. Neighbouring depths differ by `apart`
+/// times the depth.
 fn disks(stage: &Stage, count: usize, apart: f64) -> Vec<Surfel> {
     let (width, height) = stage.size();
     let middle = (0.5 * width as f64, 0.5 * height as f64);
@@ -165,7 +166,7 @@ fn disks(stage: &Stage, count: usize, apart: f64) -> Vec<Surfel> {
     (0..count).map(disk).collect()
 }
 
-/// Sheets of small disks, `apart` times their depth.
+/// Sheets of small disks. Neighbouring depths differ by `apart` times the depth.
 fn sheets(stage: &Stage, count: usize, apart: f64) -> Vec<Surfel> {
     (0..count).flat_map(|k| stage.sheet(4.0, 0.02, |_, _| 3.0 * (1.0 + apart).powi(k as i32))).collect()
 }

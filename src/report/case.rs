@@ -1,4 +1,4 @@
-//! Cases: measurements that may be compared with each other, because they differ in nothing but the configuration.
+//! Cases: groups of measurements that differ only in the configuration, and so can be compared.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,13 +7,13 @@ use super::text::{count, significant};
 
 /// All configurations of one scene at one size.
 pub(super) struct Case<'a> {
-    /// The scene, and what tells the case from others of the same scene.
+    /// The scene's name, and the size if the scene has several cases.
     pub title: String,
-    /// In the order they came.
+    /// Measurements in their original order.
     pub measurements: Vec<&'a Measurement>,
 }
 
-/// The scenes with their measurements, in the order they come.
+/// Groups measurements by scene, in the order of first occurrence.
 pub(super) fn scenes(measurements: &[Measurement]) -> Vec<(&str, Vec<&Measurement>)> {
     let mut scenes: Vec<(&str, Vec<&Measurement>)> = Vec::new();
     for measurement in measurements {
@@ -25,21 +25,22 @@ pub(super) fn scenes(measurements: &[Measurement]) -> Vec<(&str, Vec<&Measuremen
     scenes
 }
 
-/// Surfels, width, height and footprint in thousandths of a pixel.
+/// Surfels, width, height, and footprint in thousandths of a pixel.
 type Size = (u64, u32, u32, u64);
 
-/// The cases of a study. A scene is one case, unless a configuration comes more than once: then something about the
-/// scene was varied, and each value of that is a case.
+/// Returns the cases of a study. A scene is one case, unless a configuration occurs in it more than
+/// once. Then something about the scene was varied, and each of its values is a case.
 pub(super) fn cases(measurements: &[Measurement]) -> Vec<Case<'_>> {
     scenes(measurements).iter().flat_map(|(scene, of_scene)| cases_of(scene, of_scene)).collect()
 }
 
-/// The cases of one scene.
+/// Returns the cases of one scene.
 pub(super) fn cases_of<'a>(scene: &str, of_scene: &[&'a Measurement]) -> Vec<Case<'a>> {
     let keys: [fn(&Measurement) -> Size; 3] = [
         |_| (0, 0, 0, 0),
         |m| (m.surfels, m.width, m.height, 0),
-        // A configuration may draw the same scene a little larger than another, so this comes last.
+        // The footprint comes last, because configurations may draw the same scene slightly larger
+        // or smaller.
         |m| (m.surfels, m.width, m.height, (m.footprint_px * 1e3).round() as u64),
     ];
     let tell_apart = |key: &&fn(&Measurement) -> Size| {
@@ -59,7 +60,7 @@ pub(super) fn cases_of<'a>(scene: &str, of_scene: &[&'a Measurement]) -> Vec<Cas
     groups.into_values().map(|measurements| Case { title: title(measurements.first()), measurements }).collect()
 }
 
-/// The size of a measurement in words.
+/// Describes the size of a measurement.
 pub(super) fn extent(m: &Measurement) -> String {
     let (surfels, radius) = (count(m.surfels), significant(m.footprint_px, 2));
     format!("{surfels} surfels of {radius} px, {} × {}", m.width, m.height)

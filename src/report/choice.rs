@@ -1,4 +1,4 @@
-//! Which configuration to use for an error that one can accept.
+//! The section of the page on which configuration to use for an acceptable error.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use super::pareto::best;
 use super::results::Measurement;
 use super::text::{escape, optional, significant};
 
-/// An error limit: none at all (less than every power) or a power of ten.
+/// An error limit: zero, which is less than every power, or a power of ten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Limit {
     Exact,
@@ -15,9 +15,9 @@ enum Limit {
 }
 
 impl Limit {
-    /// The smallest limit that an error keeps.
+    /// Returns the smallest limit that holds for an error.
     fn of(error: f64) -> Self {
-        // What is written as 1e-6 keeps 1e-6, though its logarithm may be a little more than -6.
+        // The tolerance is for errors such as 1e-6, whose logarithm may be slightly more than -6.
         if error > 0.0 { Self::Power((error.log10() - 1e-9).ceil() as i32) } else { Self::Exact }
     }
 
@@ -40,12 +40,14 @@ impl Limit {
     }
 }
 
-/// The fastest within each limit, the tightest first; a limit with the same answer as a tighter one is left out.
+/// Returns the fastest configuration within each limit, the tightest limit first. A limit with the
+/// same answer as a tighter one is left out.
 fn answers<'a>(case: &Case<'a>) -> Vec<(Limit, &'a Measurement)> {
     let mut answers: Vec<(Limit, &Measurement)> = Vec::new();
     for measurement in best(&case.measurements).into_iter().rev() {
         let Some(limit) = measurement.numeric_error().map(Limit::of) else { continue };
-        // Along the front, what comes later here is faster.
+        // Later ones on this side of the front are faster, so they replace earlier ones with the
+        // same limit.
         if answers.last().is_some_and(|(last, _)| *last == limit) {
             answers.pop();
         }
@@ -54,14 +56,14 @@ fn answers<'a>(case: &Case<'a>) -> Vec<(Limit, &'a Measurement)> {
     answers
 }
 
-/// A configuration in all cases, and the geometric mean of its median times, ms.
+/// A configuration that ran in all cases, and the geometric mean of its median times, ms.
 struct Overall<'a> {
     config: &'a str,
     milliseconds: f64,
 }
 
-/// The same over all cases: within each limit, the configuration that keeps it in every case and has the least
-/// geometric mean of times, so that each case counts alike however long it takes.
+/// Returns, for each limit, the configuration that keeps it in every case and has the least
+/// geometric mean of times. With that mean, each case counts equally, however long it takes.
 fn overall<'a>(cases: &[Case<'a>]) -> Vec<(Limit, Overall<'a>)> {
     let configs: BTreeSet<&str> = cases.iter().flat_map(|case| &case.measurements).map(|m| m.config.as_str()).collect();
     let limits: BTreeSet<Limit> =
@@ -87,7 +89,7 @@ fn overall<'a>(cases: &[Case<'a>]) -> Vec<(Limit, Overall<'a>)> {
     answers
 }
 
-/// The section of the page.
+/// Returns the section of the page.
 pub(super) fn section(cases: &[Case<'_>]) -> String {
     let rows: String = cases.iter().map(rows).collect();
     if rows.is_empty() {
@@ -119,12 +121,13 @@ fn sentence<'a>(start: &str, answers: impl Iterator<Item = (Limit, &'a str, f64)
         })
         .collect();
     if clauses.is_empty() {
-        return "<p>No configuration ran in all cases, so the answer is one for each.</p>".into();
+        return "<p>No configuration ran in all cases, so each case has its own answer.</p>".into();
     }
     format!("<p>{start}:</p><ul class=\"answer\">{}</ul>", clauses.concat())
 }
 
-/// The scene has a row of its own, so that a phone shows the answers without scrolling.
+/// Returns the table rows of a case. The scene's name has a row of its own, so that a phone shows
+/// the answers without scrolling.
 fn rows(case: &Case<'_>) -> String {
     let row = |(limit, m): &(Limit, &Measurement)| {
         let (limit, config, time) = (limit.name(), escape(&m.config), significant(m.total_ms.median, 3));

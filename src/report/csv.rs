@@ -1,13 +1,14 @@
-//! The measurements as a table in CSV (RFC 4180): one row each, CRLF at the end of each line.
+//! Writes the measurements as a CSV table (RFC 4180): one row each, with CRLF line ends.
 //!
-//! The columns are always in the same order: what was run, the total time, errors, and last those that only some
-//! studies have: a pass, a measure against ground truth. A value that is missing is an empty field.
+//! The order of columns is fixed: the configuration, rates and memory, errors, the total time, and
+//! last the columns that only some studies have, of passes and of measures against ground truth. A
+//! missing value is an empty field.
 
 use std::collections::BTreeSet;
 
 use super::results::{Measurement, Summary};
 
-/// The columns that every study has, without those of the total time.
+/// Columns that every study has, without those of the total time.
 const COLUMNS: [&str; 19] = [
     "study",
     "scene",
@@ -30,7 +31,7 @@ const COLUMNS: [&str; 19] = [
     "kept",
 ];
 
-/// The whole table, with its header.
+/// Returns the whole table, with its header.
 pub(super) fn table(measurements: &[Measurement]) -> String {
     let passes: BTreeSet<&String> = measurements.iter().flat_map(|m| m.passes.keys()).collect();
     let truths: BTreeSet<&String> = measurements.iter().flat_map(|m| m.reconstruction.keys()).collect();
@@ -82,7 +83,7 @@ fn summary(summary: Option<&Summary>) -> [String; 4] {
     statistics.map(|statistic| number(summary.map(statistic)))
 }
 
-/// The shortest text that reads back as the same number.
+/// Formats the shortest text that reads back as the same number.
 fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| format!("{value:?}"))
 }
@@ -92,7 +93,7 @@ fn line(fields: &[String]) -> String {
     fields.join(",") + "\r\n"
 }
 
-/// Quotes a field where RFC 4180 asks for it.
+/// Quotes a field if RFC 4180 requires it.
 fn quoted(field: &str) -> String {
     if field.contains(['"', ',', '\r', '\n']) {
         format!("\"{}\"", field.replace('"', "\"\""))

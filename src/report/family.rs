@@ -1,14 +1,16 @@
-//! Families: configurations of one backend and accumulator share a colour and a marker, in every plot and table.
+//! Families: configurations of one backend and accumulator share a colour and a marker in every
+//! plot and table.
 
 use super::results::Measurement;
 use super::text::escape;
 
-/// Colours that the common kinds of colour blindness can tell apart (Okabe and Ito 2008), without its yellow, which
-/// is too light for paper. Markers differ too, so that nothing depends on colour alone.
+/// Colours that the common kinds of colour blindness can tell apart (Okabe and Ito 2008), without
+/// their yellow, which is too light for paper. Markers differ too, so that nothing depends on
+/// colour alone.
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
-/// Markers as polygons of radius about 1. The number of colours and of markers share no divisor, so that a pair comes
-/// again only after all pairs.
+/// Markers as polygons of radius about 1. The numbers of colours and markers have no common
+/// divisor, so a pair repeats only after all pairs.
 const MARKERS: [&[(f64, f64)]; 8] = [
     &DISK,
     &[(-0.88, -0.88), (0.88, -0.88), (0.88, 0.88), (-0.88, 0.88)],
@@ -54,7 +56,7 @@ const PLUS: [(f64, f64); 12] = [
     (-0.4, -0.4),
 ];
 
-/// [`PLUS`] turned by 45 degrees.
+/// [`PLUS`] rotated by 45 degrees.
 const CROSS: [(f64, f64); 12] = [
     (-1.1, -0.55),
     (-0.55, -1.1),
@@ -70,22 +72,22 @@ const CROSS: [(f64, f64); 12] = [
     (-0.55, 0.0),
 ];
 
-/// How the points of a family look.
+/// Colour and marker of a family.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
-    /// A colour of SVG and CSS.
+    /// A colour for SVG and CSS.
     pub color: &'static str,
     outline: &'static [(f64, f64)],
 }
 
 impl Style {
-    /// The marker around (x, y), as the `points` of a polygon.
+    /// Returns the marker around (x, y) as the `points` of a polygon.
     pub fn marker(&self, x: f64, y: f64, radius: f64) -> String {
         let corners = self.outline.iter().map(|(u, v)| format!("{:.1},{:.1}", x + u * radius, y + v * radius));
         corners.collect::<Vec<_>>().join(" ")
     }
 
-    /// The marker alone, to stand in a line of text.
+    /// Returns the marker alone, for a line of text.
     pub fn swatch(&self) -> String {
         let (points, color) = (self.marker(8.0, 8.0, 5.5), self.color);
         format!(
@@ -94,7 +96,7 @@ impl Style {
     }
 }
 
-/// The families of a study, in the order they come.
+/// Names of the families of a study, in the order of first occurrence.
 pub(super) struct Families(Vec<String>);
 
 impl Families {
@@ -113,7 +115,7 @@ impl Families {
         style(self.0.iter().position(|known| *known == name).unwrap_or(0))
     }
 
-    /// Every family with its marker, as a list.
+    /// Returns a list of all families with their markers.
     pub fn legend(&self) -> String {
         let entry = |(index, name): (usize, &String)| format!("<li>{} {}</li>", style(index).swatch(), escape(name));
         let entries: String = self.0.iter().enumerate().map(entry).collect();
@@ -121,7 +123,7 @@ impl Families {
     }
 }
 
-/// The family's name: the backend, and the accumulator if there is one.
+/// Returns the family's name: the backend, and the accumulator if there is one.
 pub(super) fn name(measurement: &Measurement) -> String {
     format!("{} {}", measurement.backend, measurement.accumulator).trim().to_owned()
 }

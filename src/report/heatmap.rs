@@ -1,4 +1,5 @@
-//! Where an image differs from its reference, on a logarithmic scale of colours.
+//! Heat maps of the difference between an image and its reference, on a logarithmic scale of
+//! colours.
 
 use rayon::prelude::*;
 
@@ -8,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::metrics::largest_difference;
 
-/// Dark to light, evenly in perceived lightness, and so readable without colour too: ten samples of "magma" (Smith and
-/// van der Walt 2015).
+/// Ten samples of "magma" (Smith and van der Walt 2015), from dark to light. Their perceived
+/// lightness is even, so they can be read without colour too.
 const COLORS: [[u8; 3]; 10] = [
     [0x00, 0x00, 0x04],
     [0x18, 0x0f, 0x3d],
@@ -23,13 +24,15 @@ const COLORS: [[u8; 3]; 10] = [
     [0xfc, 0xfd, 0xbf],
 ];
 
-/// Zero has the lowest colour for itself; the smallest difference starts here, so that one sees that it is there.
+/// Where the smallest difference lies on the scale of colours. Only zero has the lowest colour, so
+/// that small differences can be seen.
 const FIRST: f64 = 0.2;
 
-/// No scale spans more decades: less than that below the largest difference would be seen nowhere else either.
+/// Most decades of a scale. Differences that are smaller, compared with the largest one, are of no
+/// interest.
 const MOST_DECADES: i32 = 8;
 
-/// A scale from one power of ten to another.
+/// A scale from 10^`low` to 10^`high`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     low: i32,
@@ -37,7 +40,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale that holds all `differences`; those that are zero have their own colour on any scale.
+    /// Returns the scale that contains all `differences`. Zero needs no place on it: it has its own
+    /// colour on any scale.
     pub fn over(differences: impl IntoIterator<Item = f64>) -> Self {
         let positive = differences.into_iter().filter(|d| *d > 0.0 && d.is_finite());
         let (low, high) = positive.fold((f64::INFINITY, 0f64), |(l, h), d| (l.min(d), h.max(d)));
@@ -49,7 +53,8 @@ impl Scale {
         Self { low, high }
     }
 
-    /// The colour of a difference, sRGB. Zero is the lowest colour; what is beyond the scale has the colour of its end.
+    /// Returns the sRGB colour of a difference. Zero has the lowest colour; differences beyond the
+    /// scale have the colour of its end.
     ///
     /// ```
     /// use epsplat::report::heatmap::Scale;
@@ -61,7 +66,7 @@ impl Scale {
         if difference <= 0.0 {
             return COLORS[0];
         }
-        // Also where the difference is no number, which deserves to be seen.
+        // NaN has the highest colour, so that it is noticed.
         let along = (difference.log10() - f64::from(self.low)) / f64::from(self.high - self.low);
         let along = if along.is_nan() { 1.0 } else { FIRST + (1.0 - FIRST) * along.clamp(0.0, 1.0) };
         let place = along * (COLORS.len() - 1) as f64;
@@ -73,7 +78,7 @@ impl Scale {
         })
     }
 
-    /// The scale with its numbers, as SVG.
+    /// Returns the scale with its numbers, as SVG.
     pub(super) fn legend(&self) -> String {
         const LEFT: f64 = 64.0;
         const WIDTH: f64 = 360.0;
@@ -91,7 +96,7 @@ impl Scale {
         for index in 0..PIECES {
             let power = f64::from(self.low) + decades * (f64::from(index) + 0.5) / f64::from(PIECES);
             let (x, color) = (LEFT + piece * f64::from(index), rgb(10f64.powf(power)));
-            // Pieces overlap a little, or their seams would show.
+            // Pieces overlap a little, to hide their seams.
             body += &format!(r#"<rect x="{x:.1}" y="4" width="{:.1}" height="14" fill="{color}"/>"#, piece + 0.4);
         }
         for power in self.low..=self.high {
@@ -109,7 +114,7 @@ impl Scale {
     }
 }
 
-/// For each pixel the largest absolute difference of a value, over linear RGBA.
+/// Returns the largest absolute difference of each pixel's linear RGBA values.
 ///
 /// # Errors
 ///
@@ -124,18 +129,19 @@ pub fn differences(image: &Frame, reference: &Frame) -> Result<Vec<f64>> {
     Ok(image.color.par_iter().zip(&reference.color).map(|(a, b)| largest_difference(a, b)).collect())
 }
 
-/// The differences of one image, as the page shows them.
+/// The heat map of one image.
 pub(super) struct Map {
-    /// Where it is shrunk, each pixel is the largest of its block, so that none is lost.
+    /// Differences by pixel. If the map is shrunk, each is the largest of a block, so that none is
+    /// lost.
     pub shown: Grid<f64>,
     /// The largest difference.
     pub largest: f64,
-    /// Share of pixels that differ at all.
+    /// Fraction of pixels that differ.
     pub share: f64,
 }
 
 impl Map {
-    /// Of a picture whose sides are at most `side`.
+    /// Computes the heat map of an image, shrunk to sides of at most `side`.
     pub fn of(image: &Frame, reference: &Frame, side: u32) -> Result<Self> {
         let differences = differences(image, reference)?;
         let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
@@ -147,7 +153,7 @@ impl Map {
         })
     }
 
-    /// It as a picture.
+    /// Encodes the map as an `img` element.
     pub fn picture(&self, scale: Scale, alt: &str) -> Result<String> {
         let rgba = self.shown.values.iter().flat_map(|difference| {
             let [r, g, b] = scale.color(*difference);

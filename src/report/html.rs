@@ -1,5 +1,5 @@
-//! The page for people: one file that needs no network and no script. It is also well-formed XML, so that a test can
-//! take it apart.
+//! The page for people: one file that needs no network and no script. It is well-formed XML too, so
+//! that a test can parse it.
 
 use super::case::cases;
 use super::family::Families;
@@ -10,10 +10,10 @@ use super::text::{count, escape, significant};
 use super::{choice, pareto, scaling, tables};
 use crate::Result;
 
-/// It has no `<` and no `&`, so it stands in XML as it is.
+/// Contains no `<` and no `&`, so it needs no escaping in XML.
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page.
+/// Returns the whole page.
 pub(super) fn page(study: &Study) -> Result<String> {
     let families = Families::of(&study.measurements);
     let cases = cases(&study.measurements);
@@ -36,7 +36,7 @@ pub(super) fn page(study: &Study) -> Result<String> {
     ))
 }
 
-/// What the study is and where it ran.
+/// Describes the study and the machine that it ran on.
 fn header(study: &Study) -> String {
     let machine = &study.machine;
     let rows = [
@@ -55,7 +55,8 @@ fn header(study: &Study) -> String {
     )
 }
 
-/// The pictures, scene by scene; all heat maps have one scale, so that they can be compared.
+/// Shows the pictures of each scene. All heat maps have the same scale, so that they can be
+/// compared.
 fn images(sets: &[ImageSet]) -> Result<String> {
     if sets.is_empty() {
         return Ok(String::new());
@@ -78,8 +79,8 @@ fn images(sets: &[ImageSet]) -> Result<String> {
         .map(|(scene, figures)| format!("<h3>{}</h3>{legend}<div class=\"pictures\">{figures}</div>", escape(scene)))
         .collect();
     Ok(format!(
-        "<section><h2>Images</h2><p>Left the image, right where it differs from the f64 reference: the largest \
-         difference of a pixel's values, over linear RGBA. Black is no difference.</p>{scenes}</section>"
+        "<section><h2>Images</h2><p>Left is the image, right its difference from the f64 reference: the largest \
+         of a pixel's linear RGBA values. Black is no difference.</p>{scenes}</section>"
     ))
 }
 

@@ -1,9 +1,10 @@
-//! Where the name of a point goes, so that it hides no other name, no marker and no line.
+//! Places the names of points so that they hide no other name, marker or line.
 //!
-//! Names are placed one after the other, each at the best of a fixed set of places around its point (Christensen, Marks
-//! and Shieber 1995, "greedy"): enough for the tens of points of a plot, and always the same result.
+//! Names are placed one after the other, each at the best of a fixed set of positions around its
+//! point ("greedy" in Christensen, Marks and Shieber 1995). That is enough for the tens of points
+//! of a plot, and the result is always the same.
 
-/// A rectangle of the plot, in its own units, y down.
+/// A rectangle in the plot's units, y down.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Area {
     pub left: f64,
@@ -13,12 +14,12 @@ pub(super) struct Area {
 }
 
 impl Area {
-    /// The square around a point.
+    /// Returns the square with sides of 2 `half` around a point.
     pub fn around(x: f64, y: f64, half: f64) -> Self {
         Self { left: x - half, top: y - half, right: x + half, bottom: y + half }
     }
 
-    /// What the two have in common, in square units.
+    /// Area of the intersection, in square units.
     pub fn overlap(&self, other: &Self) -> f64 {
         let width = self.right.min(other.right) - self.left.max(other.left);
         let height = self.bottom.min(other.bottom) - self.top.max(other.top);
@@ -30,14 +31,14 @@ impl Area {
     }
 }
 
-/// The height of a name.
+/// Height of a name.
 pub(super) const HEIGHT: f64 = 13.0;
-/// The width of a character: a little more than the usual sans-serif has on average, so that a name rather takes less
-/// room than was kept for it.
+/// Width of a character, slightly more than the average of common sans-serif fonts, so that a name
+/// is narrower than the space reserved for it.
 const CHARACTER: f64 = 6.7;
-/// How far a name may stand from its marker; beyond the first, a line joins them.
+/// Distances between a name and its marker. From the second on, a line joins them.
 const DISTANCES: [f64; 5] = [7.0, 14.0, 24.0, 38.0, 56.0];
-/// Right is where one looks first.
+/// Directions of a name from its marker, the preferred one first: readers look to the right first.
 const DIRECTIONS: [(f64, f64); 12] = [
     (1.0, 0.0),
     (1.0, -0.8),
@@ -53,7 +54,8 @@ const DIRECTIONS: [(f64, f64); 12] = [
     (-1.0, 1.5),
 ];
 
-/// The best place for a name of `characters` at the point (x, y) inside `bounds`, and whether it needs a line to it.
+/// Returns the best place for a name of `characters` characters at the point (x, y) inside
+/// `bounds`, and whether it needs a line to the point.
 pub(super) fn place(characters: usize, (x, y): (f64, f64), bounds: &Area, taken: &[Area]) -> (Area, bool) {
     let (width, height) = (characters as f64 * CHARACTER, HEIGHT);
     let mut best = (f64::INFINITY, Area::around(x, y, 0.0), false);

@@ -1,8 +1,9 @@
-//! The results of a benchmark study as files: a table for programs (`results.csv`), the same for programs that read
-//! JSON (`results.json`), and a page for people (`index.html`) that needs no network and no script.
+//! Writes the results of a benchmark study: a table for programs (`results.csv`), the same as JSON
+//! (`results.json`), and a page for people (`index.html`) that needs no network and no script.
 //!
-//! The page answers in this order: which configuration to use, what each speed costs in error ([`pareto`]), all numbers,
-//! how time grows ([`scaling`]), and where in the image the errors are ([`heatmap`]).
+//! The page shows, in this order: which configuration to use, what each speed costs in error
+//! ([`pareto`]), all numbers, how time grows ([`scaling`]), and where in the image the errors are
+//! ([`heatmap`]).
 
 mod case;
 mod choice;
@@ -28,13 +29,13 @@ use crate::{Error, Result};
 /// The files that [`write()`] writes.
 pub const FILES: [&str; 3] = ["results.csv", "results.json", "index.html"];
 
-/// Writes [`FILES`] into the folder `dir`, which is created if it is missing. Each file appears whole or not at all, and
-/// none before all are finished.
+/// Writes [`FILES`] into the folder `dir`, which is created if it is missing. Each file appears
+/// whole or not at all, and none before all are finished.
 ///
 /// # Errors
 ///
-/// [`Error::Write`] if a file or the folder cannot be written, [`Error::Usage`] if an image and its reference differ in
-/// size.
+/// [`Error::Write`] if a file or the folder cannot be written, [`Error::Usage`] if an image and its
+/// reference differ in size.
 pub fn write(dir: &Path, study: &Study) -> Result<()> {
     let page = html::page(study)?;
     let mut json = serde_json::to_string_pretty(&study.measurements).map_err(|e| Error::write(dir, e.into()))?;

@@ -1,4 +1,4 @@
-//! Time against error: which configurations no other beats in both.
+//! Time against error: the configurations that no other one beats in both.
 
 use super::case::Case;
 use super::family::Families;
@@ -6,8 +6,11 @@ use super::plot::{Axis, Plot};
 use super::results::Measurement;
 use super::text::{escape, significant, tick};
 
-/// The Pareto front of points (time, error): the indices of those that no other point dominates, which is to be no worse
-/// in both and better in one; in order of time. Equal points are all in it or none.
+/// Returns the Pareto front of points (time, error): the indices of the points that no other point
+/// dominates, in order of time.
+///
+/// A point dominates another if it is no worse in both and better in one. Of equal points, all or
+/// none are on the front.
 ///
 /// ```
 /// use epsplat::report::pareto::front;
@@ -27,7 +30,7 @@ pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     front
 }
 
-/// The measurements that have a time and this error, with both.
+/// Returns the measurements that have a time and this error, with both.
 pub(super) fn points<'a>(
     measurements: &[&'a Measurement],
     error: fn(&Measurement) -> Option<f64>,
@@ -40,14 +43,14 @@ pub(super) fn points<'a>(
     measurements.iter().filter_map(point).collect()
 }
 
-/// The measurements of the front of time against numeric error, the fastest first.
+/// Returns the measurements on the front of time against numeric error, the fastest first.
 pub(super) fn best<'a>(measurements: &[&'a Measurement]) -> Vec<&'a Measurement> {
     let points = points(measurements, Measurement::numeric_error);
     let places: Vec<(f64, f64)> = points.iter().map(|(_, point)| *point).collect();
     front(&places).into_iter().map(|index| points[index].0).collect()
 }
 
-/// An error that a plot shows.
+/// A kind of error that a plot shows.
 struct Kind {
     name: &'static str,
     axis: &'static str,
@@ -70,7 +73,7 @@ const KINDS: [Kind; 2] = [
     },
 ];
 
-/// The section of the page; nothing if there are no errors.
+/// Returns the section of the page; empty if there are no errors.
 pub(super) fn section(cases: &[Case<'_>], families: &Families) -> String {
     let plots: String = cases
         .iter()
@@ -83,8 +86,8 @@ pub(super) fn section(cases: &[Case<'_>], families: &Families) -> String {
     let legend = families.legend();
     format!(
         "<section><h2>What each speed costs</h2>\
-         <p>Faster is to the left, more exact is below; both scales are logarithmic. The line joins what no other \
-         configuration beats in both.</p>{legend}<div class=\"plots\">{plots}</div></section>"
+         <p>Faster is to the left, more exact is below; both scales are logarithmic. The line joins the \
+         configurations that no other beats in both.</p>{legend}<div class=\"plots\">{plots}</div></section>"
     )
 }
 
@@ -109,7 +112,7 @@ fn figure(index: usize, case: &Case<'_>, kind: &Kind, families: &Families) -> St
     for (measurement, place) in &points {
         plot.marker(*place, families.style(measurement), &describe(measurement, *place));
     }
-    // Names on the front come first, because places are given in that order.
+    // Names on the front are placed first, because earlier names get the better places.
     let behind = (0..points.len()).filter(|index| !front.contains(index));
     for index in front.iter().copied().chain(behind) {
         plot.name(places[index], &points[index].0.config);
@@ -136,19 +139,19 @@ mod tests {
     fn a_dominated_point_is_not_on_the_front() {
         assert!(front(&[]).is_empty());
         assert_eq!(front(&[(1.0, 1.0)]), [0]);
-        // A staircase whose points are all on it, each with one that it dominates.
+        // A staircase, all of it on the front, and for each of its points one that it dominates.
         let stairs: Vec<(f64, f64)> = (0..10).map(|i| (f64::from(i), f64::from(10 - i))).collect();
         let above: Vec<(f64, f64)> = stairs.iter().map(|(t, e)| (t + 0.5, e + 0.25)).collect();
         let all: Vec<(f64, f64)> = above.iter().chain(&stairs).copied().collect();
         assert_eq!(front(&all), (10..20).collect::<Vec<usize>>());
-        // As fast but less exact, or as exact but slower, is dominated.
+        // A point that is as fast but less exact, or as exact but slower, is dominated.
         assert_eq!(front(&[(1.0, 2.0), (1.0, 1.0), (2.0, 1.0)]), [1]);
         assert_eq!(front(&[(2.0, 0.0), (1.0, 0.5), (2.0, 0.0)]), [1, 0, 2]);
     }
 
     #[test]
     fn the_front_is_what_the_definition_says() {
-        // Points without order on a small grid, so that ties are frequent.
+        // Pseudo-random points on a small grid, so that ties are frequent.
         let points: Vec<(f64, f64)> = (0u32..200).map(|i| (f64::from(i * 37 % 11), f64::from(i * 53 % 13))).collect();
         let dominated = |p: &(f64, f64)| points.iter().any(|q| q.0 <= p.0 && q.1 <= p.1 && q != p);
         let mut found = front(&points);

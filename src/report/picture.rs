@@ -1,4 +1,4 @@
-//! Pictures inside the page: PNG as data URIs, not larger than a page needs.
+//! Pictures inside the page: PNG as data URIs, no larger than the page needs.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -8,14 +8,14 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::png;
 
-/// Larger pictures are shrunk by a whole factor: the page shows them no larger.
+/// Longest side on the page, pixels. Larger pictures are shrunk by a whole factor.
 const LARGEST_SIDE: u32 = 512;
 
-/// So many pictures are kept as large as that. Of more, each is smaller, down to a quarter: a sweep has hundreds, and the
-/// page is one file.
+/// Most pictures that may have sides of [`LARGEST_SIDE`]. If there are more, they are smaller, down
+/// to a quarter: a sweep has hundreds, and the page is one file.
 const MANY: usize = 32;
 
-/// The largest side of each of `pictures` pictures.
+/// Returns the longest side of each of `pictures` pictures.
 pub(super) fn largest_side(pictures: usize) -> u32 {
     let share = (MANY as f64 / pictures.max(1) as f64).sqrt().clamp(0.25, 1.0);
     (f64::from(LARGEST_SIDE) * share) as u32
@@ -28,12 +28,13 @@ pub(super) struct Grid<T> {
     pub values: Vec<T>,
 }
 
-/// By how much a picture of this size is shrunk for its sides to be at most `side`.
+/// Returns the whole factor that shrinks the sides of a picture to at most `side`.
 pub(super) fn shrink_factor(width: u32, height: u32, side: u32) -> u32 {
     width.max(height).div_ceil(side).max(1)
 }
 
-/// Reduces each block of pixels to one; blocks at the right and bottom edge may be smaller.
+/// Reduces each block of pixels to one, so that both sides are at most `side`. Blocks at the right
+/// and bottom edges may be smaller.
 pub(super) fn shrink<T: Copy>([width, height, side]: [u32; 3], values: &[T], reduce: impl Fn(&[T]) -> T) -> Grid<T> {
     let factor = shrink_factor(width, height, side) as usize;
     if factor == 1 {
@@ -55,13 +56,13 @@ pub(super) fn shrink<T: Copy>([width, height, side]: [u32; 3], values: &[T], red
     Grid { width: width.div_ceil(factor as u32), height: height.div_ceil(factor as u32), values: small }
 }
 
-/// The colour of a frame, sRGB.
+/// Encodes the colours of a frame, shrunk to sides of at most `side`, as an `img` element.
 pub(super) fn of_frame(frame: &Frame, side: u32, alt: &str) -> Result<String> {
     let small = shrink([frame.width, frame.height, side], &frame.color, mean);
     image(small.width, small.height, &png::srgb_bytes(&small.values), alt)
 }
 
-/// The mean of linear colours with straight alpha, each weighted by its alpha.
+/// Averages linear colours with straight alpha, weighted by alpha.
 fn mean(block: &[[f32; 4]]) -> [f32; 4] {
     let alpha: f32 = block.iter().map(|color| color[3]).sum();
     if alpha <= 0.0 {
@@ -71,7 +72,7 @@ fn mean(block: &[[f32; 4]]) -> [f32; 4] {
     [r, g, b, alpha / block.len() as f32]
 }
 
-/// An `img` element of sRGB bytes, four a pixel.
+/// Encodes sRGB bytes, four per pixel, as an `img` element.
 pub(super) fn image(width: u32, height: u32, rgba: &[u8], alt: &str) -> Result<String> {
     let mut bytes = Vec::new();
     png::encode(&mut bytes, width, height, rgba)

@@ -1,8 +1,8 @@
-//! One plot as SVG: two logarithmic axes, lines, markers, names.
+//! One plot as SVG: two logarithmic axes, lines, markers and names.
 //!
-//! It is written here rather than with `plotters` because the page needs what that crate's SVG lacks: a class and a
-//! tooltip on each marker, `title` and `desc` for those who cannot see it, no fixed width, and names that give way to
-//! each other. What is left is little more than the two axes.
+//! It does not use `plotters`, because the page needs what that crate's SVG lacks: a class and a
+//! tooltip on each marker, `title` and `desc` for screen readers, a flexible width, and names that
+//! avoid each other. The rest is little more than the two axes.
 
 use std::fmt::Write;
 
@@ -12,23 +12,23 @@ use super::text::escape;
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 370.0;
-/// Where the values are drawn: the rest is for the ticks and the names of the axes.
+/// The rectangle of the values. Ticks and names of axes are outside.
 const INSIDE: Area = Area { left: 66.0, top: 12.0, right: WIDTH - 10.0, bottom: HEIGHT - 50.0 };
-/// The room at the right for the names of curves, where a plot has curves.
+/// Width at the right for the names of curves, if a plot has curves.
 const NAMES_ROOM: f64 = 124.0;
-/// The room below the axis break in which zero stands.
+/// Height below the axis break, where zero is.
 const ZERO_ROOM: f64 = 40.0;
 const MARKER: f64 = 5.5;
-/// Names that are longer, in characters, are cut: the whole one is in the tooltip and in the table.
+/// Longest name, in characters; longer ones are cut. The tooltip and the table have the whole name.
 const LONGEST_NAME: usize = 30;
-/// The same for curves, so that the room for their names holds it.
+/// Longest name of a curve, in characters, so that it fits [`NAMES_ROOM`].
 const LONGEST_CURVE_NAME: usize = 17;
 
-/// A logarithmic axis. Zero, if it occurs, stands at a floor of its own below a break.
+/// A logarithmic axis. Zero, if it occurs, has its own place below a break.
 pub(super) struct Axis {
-    /// What it shows, with the unit.
+    /// The quantity and its unit.
     pub name: &'static str,
-    /// How a number reads at a tick.
+    /// Formats a number at a tick.
     pub tick: fn(f64) -> String,
     low: f64,
     high: f64,
@@ -36,24 +36,25 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// An axis that holds all `values`, which are finite and not negative.
+    /// Creates an axis that contains all `values`, which must be finite and not negative.
     pub fn over(name: &'static str, tick: fn(f64) -> String, values: impl Iterator<Item = f64> + Clone) -> Self {
         let zero = values.clone().any(|value| value <= 0.0);
         let powers = values.filter(|value| *value > 0.0).map(f64::log10);
         let (low, high) = powers.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        // If all are zero, some range must still be shown.
+        // If all values are zero, some range must still be shown.
         let (low, high) = if low <= high { (low, high) } else { (-8.0, -6.0) };
-        // A factor of four at least: less would blow noise up to a difference, and hold too few round numbers.
+        // The axis spans at least a factor of four. With less, noise would look like a difference,
+        // and there would be too few round numbers.
         let margin = (0.08 * (high - low)).max(0.3 - (high - low) / 2.0);
         Self { name, tick, low: low - margin, high: high + margin, zero }
     }
 
-    /// Where a value stands, from 0 (low end) to 1, above the break; none for zero.
+    /// Returns the position of a value above the break, from 0 (low end) to 1; `None` for zero.
     fn fraction(&self, value: f64) -> Option<f64> {
         (value > 0.0).then(|| (value.log10() - self.low) / (self.high - self.low))
     }
 
-    /// Round numbers, at least three.
+    /// Returns round numbers for the ticks, at least three.
     fn ticks(&self) -> Vec<f64> {
         let decades = (self.low.floor() as i32)..=(self.high.ceil() as i32);
         let ticks = |multiples: &[f64]| -> Vec<f64> {
@@ -67,7 +68,7 @@ impl Axis {
     }
 }
 
-/// A plot that is being drawn.
+/// A plot under construction.
 pub(super) struct Plot {
     x: Axis,
     y: Axis,
@@ -77,12 +78,12 @@ pub(super) struct Plot {
 }
 
 impl Plot {
-    /// An empty plot of points: its axes and its grid.
+    /// Creates an empty plot of points, with axes and grid.
     pub fn of_points(x: Axis, y: Axis) -> Self {
         Self::new(x, y, INSIDE)
     }
 
-    /// The same with room for the names of curves at their right ends.
+    /// Creates an empty plot of curves, with space for names at their right ends.
     pub fn of_curves(x: Axis, y: Axis) -> Self {
         Self::new(x, y, Area { right: INSIDE.right - NAMES_ROOM, ..INSIDE })
     }
@@ -139,14 +140,16 @@ impl Plot {
         (self.place_x(x), self.place_y(y))
     }
 
-    /// A line from point to point.
+    /// Draws a line from point to point.
     pub fn line(&mut self, class: &str, color: &str, points: &[(f64, f64)]) {
         let places: Vec<_> = points.iter().map(|point| self.place(*point)).collect();
         self.path(class, color, &places);
     }
 
-    /// The line of the best error for a given time: level until the next point, then down to it; `points` are in order
-    /// of time. It comes from above and goes on to the right, because a longer time is no worse.
+    /// Draws the best error for each time: level until the next point, then down to it.
+    ///
+    /// `points` must be in order of time. The line starts at the top and continues to the right,
+    /// because a longer time is no worse.
     pub fn steps(&mut self, class: &str, color: &str, points: &[(f64, f64)]) {
         let mut places = Vec::new();
         let mut level = self.inside.top;
@@ -170,7 +173,7 @@ impl Plot {
         }
     }
 
-    /// A horizontal line that shows where a value of the y axis lies.
+    /// Draws a labelled horizontal line at a value of the y axis.
     pub fn level(&mut self, name: &str, value: f64) {
         let y = self.place_y(value);
         if (self.inside.top..=self.inside.bottom).contains(&y) {
@@ -187,7 +190,7 @@ impl Plot {
         }
     }
 
-    /// A marker; `tip` is what it says when one points at it.
+    /// Draws a marker; `tip` is its tooltip.
     pub fn marker(&mut self, point: (f64, f64), style: Style, tip: &str) {
         let (x, y) = self.place(point);
         let (corners, color) = (style.marker(x, y, MARKER), style.color);
@@ -198,7 +201,7 @@ impl Plot {
         self.taken.push(Area::around(x, y, MARKER + 1.0));
     }
 
-    /// A name at a point. Names give way to everything that was drawn before them.
+    /// Draws a name at a point. Names avoid everything that was drawn before them.
     pub fn name(&mut self, point: (f64, f64), name: &str) {
         let of_curve = self.inside.right < INSIDE.right;
         let longest = if of_curve { LONGEST_CURVE_NAME } else { LONGEST_NAME };
@@ -207,11 +210,12 @@ impl Plot {
             text.push('…');
         }
         let (x, y) = self.place(point);
-        // The name of a curve stands to the right of its end, where no curve is.
+        // The name of a curve stands to the right of its end, where there are no curves.
         let bounds = if of_curve { Area { left: x, ..INSIDE } } else { INSIDE };
         let (area, joined) = labels::place(text.chars().count(), (x, y), &bounds, &self.taken);
         let middle = (area.left + area.right) / 2.0;
-        // The text is anchored on the side of its point, so that it does not stray if its font is narrower.
+        // The text is anchored on the side of its point, so that it stays there if its font is
+        // narrower.
         let (anchor, at) = if area.left >= x {
             ("start", area.left)
         } else if area.right <= x {
@@ -228,7 +232,8 @@ impl Plot {
         self.taken.push(area);
     }
 
-    /// The finished picture. `id` is unique on the page; `title` says what it is and `description` what it shows.
+    /// Returns the finished SVG. `id` must be unique on the page; `title` names the plot and
+    /// `description` says what it shows.
     pub fn finish(self, class: &str, id: &str, title: &str, description: &str) -> String {
         let (title, description) = (escape(title), escape(description));
         format!(

@@ -1,4 +1,4 @@
-//! What a study measured.
+//! The results of a study, as data.
 
 use std::collections::BTreeMap;
 
@@ -6,60 +6,61 @@ use serde::Serialize;
 
 use crate::frame::Frame;
 
-/// A study: what was run, where, and what came out.
+/// A study: what was run, where, and the results.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// A short name, the page's title.
+    /// A short name, which is the page's title.
     pub name: String,
     /// One sentence that says what the study shows.
     pub about: String,
-    /// The command line that repeats it.
+    /// The command line that repeats the study.
     pub command: String,
-    /// When it ran, as the reader should see it.
+    /// Date of the run, formatted for readers.
     pub date: String,
-    /// Where it ran.
+    /// The machine that it ran on.
     pub machine: Machine,
-    /// Timed runs of each configuration; each [`Summary`] is over these.
+    /// Number of timed runs of each configuration; each [`Summary`] is over these.
     pub runs: u32,
-    /// One for each configuration of each scene.
+    /// One measurement for each configuration of each scene.
     pub measurements: Vec<Measurement>,
-    /// Pictures for the page; they are in no other file.
+    /// Pictures, which appear only on the page.
     pub images: Vec<ImageSet>,
 }
 
 /// The machine and the software that a study ran on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Machine {
-    /// The adapter's name.
+    /// Name of the adapter.
     pub adapter: String,
-    /// The graphics API the adapter is reached through.
+    /// Graphics API of the adapter.
     pub api: String,
-    /// The adapter's driver and its version.
+    /// Driver of the adapter, and its version.
     pub driver: String,
-    /// The processor's name.
+    /// Name of the processor.
     pub cpu: String,
     /// Logical cores that the process may use.
     pub cores: u32,
-    /// The operating system.
+    /// Operating system.
     pub os: String,
-    /// The version of epsplat.
+    /// Version of epsplat.
     pub version: String,
 }
 
-/// One configuration on one scene.
+/// The measurement of one configuration on one scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Measurement {
-    /// The study's name.
+    /// Name of the study.
     pub study: String,
-    /// The scene's name.
+    /// Name of the scene.
     pub scene: String,
-    /// The configuration's name, the same in every scene.
+    /// Name of the configuration, the same in every scene.
     pub config: String,
-    /// `gpu` (compute kernels), `raster` (fixed-function blending) or `reference` (f64 on the processor).
+    /// `gpu` (compute kernels), `raster` (fixed-function blending) or `reference` (f64 on the
+    /// processor).
     pub backend: String,
-    /// How sums are kept; empty if the backend has no choice.
+    /// Name of the accumulator; empty if the backend has no choice.
     pub accumulator: String,
-    /// Surfels in the scene.
+    /// Number of surfels in the scene.
     pub surfels: u64,
     /// Mean radius of a splat, pixels.
     pub footprint_px: f64,
@@ -71,54 +72,61 @@ pub struct Measurement {
     pub total_ms: Summary,
     /// Time of each pass by its name, milliseconds.
     pub passes: BTreeMap<String, Summary>,
-    /// Surfels of the scene per second of the median time, whether a backend draws all of them or finds some hidden.
+    /// Surfels of the scene per second of the median time. Hidden surfels count too, whether or not
+    /// a backend draws them.
     pub splats_per_second: f64,
-    /// Fragments blended per second of the median time; none if they were not counted.
+    /// Fragments blended per second of the median time; `None` if they were not counted.
     pub fragments_per_second: Option<f64>,
-    /// Bytes of device memory per splat: its surfel and its record.
+    /// Bytes of device memory per splat, for its surfel and its record.
     pub bytes_per_splat: f64,
-    /// Device memory that the render held at most, bytes.
+    /// Peak device memory of the render, bytes.
     pub device_bytes: u64,
-    /// Error against the f64 reference with the same options; none if it was not compared.
+    /// Error against the f64 reference with the same options; `None` if it was not compared.
     pub numeric: Option<Numeric>,
-    /// Error against ground truth by measure: `psnr_db`, `max_abs`, `percentile_99_9`, `ssim`, `depth_relative_mean`,
-    /// `normal_degrees_mean`, `hole_rate` and so on, none without ground truth; and `apart_psnr_db` and `apart_rmse` against the reference of the
-    /// configuration that it approximates, and `cut`, the surfels that are drawn in place of all. An image that equals the truth has a
-    /// `psnr_db` of infinity.
+    /// Further measures, by name.
+    ///
+    /// Measures against ground truth are `psnr_db`, `max_abs`, `percentile_99_9`, `ssim`,
+    /// `depth_relative_mean`, `normal_degrees_mean`, `hole_rate` and so on; without ground truth
+    /// there are none. `apart_psnr_db` and `apart_rmse` are against the reference of the
+    /// configuration that this one approximates, and `cut` is the number of surfels that are drawn
+    /// in place of all. An image that equals the truth has an infinite `psnr_db`.
     pub reconstruction: BTreeMap<String, f64>,
-    /// How many times as fast as the fastest raster configuration of the same scene with an equal or smaller
-    /// [`numeric_error`](Self::numeric_error); none if there is no such configuration.
+    /// Speed relative to the fastest raster configuration of the same scene with an equal or
+    /// smaller [`numeric_error`](Self::numeric_error); `None` if there is no such configuration.
     pub ratio_to_raster: Option<f64>,
-    /// The largest [`numeric_error`](Self::numeric_error) that the study allows; none if it allows any.
+    /// Largest [`numeric_error`](Self::numeric_error) that the study allows; `None` if it allows
+    /// any.
     pub error_limit: Option<f64>,
     /// Whether the error limit is kept; true if there is none.
     pub kept: bool,
 }
 
 impl Measurement {
-    /// The one number that the report ranks by: [`Numeric::rmse`]; none if it is missing or not finite.
+    /// The error that the report ranks by: [`Numeric::rmse`]; `None` if it is missing or not
+    /// finite.
     pub fn numeric_error(&self) -> Option<f64> {
         self.numeric.as_ref().map(|numeric| numeric.rmse).filter(|rmse| rmse.is_finite() && *rmse >= 0.0)
     }
 
-    /// RMSE against ground truth, from the PSNR for a peak of 1: `10^(-PSNR / 20)`. None without ground truth.
+    /// RMSE against ground truth, from the PSNR for a peak of 1: `10^(-PSNR / 20)`; `None` without
+    /// ground truth.
     pub fn reconstruction_error(&self) -> Option<f64> {
         let psnr = self.reconstruction.get("psnr_db")?;
         Some(10f64.powf(-psnr / 20.0)).filter(|rmse| rmse.is_finite())
     }
 
-    /// Pixels of the image.
+    /// Number of pixels of the image.
     pub fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
 }
 
-/// Several runs of one thing as four numbers, all in the unit of the values.
+/// Statistics of repeated measurements, in the unit of the values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// The middle value; of an even number of values, the mean of the middle two.
+    /// The middle value, or the mean of the middle two.
     pub median: f64,
-    /// Median absolute deviation from the median, not scaled.
+    /// Median absolute deviation from the median, unscaled.
     pub mad: f64,
     /// The smallest value.
     pub min: f64,
@@ -127,7 +135,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Summarises finite values; none if there are no values.
+    /// Summarises finite values; `None` if there are no values.
     ///
     /// ```
     /// use epsplat::report::Summary;
@@ -145,7 +153,7 @@ impl Summary {
     }
 }
 
-/// The median of sorted values, of which there is at least one.
+/// Median of sorted values; there must be at least one.
 fn middle(sorted: &[f64]) -> f64 {
     let half = sorted.len() / 2;
     if sorted.len().is_multiple_of(2) { sorted[half - 1] / 2.0 + sorted[half] / 2.0 } else { sorted[half] }
@@ -158,20 +166,20 @@ pub struct Numeric {
     pub rmse: f64,
     /// Largest absolute difference of a value.
     pub max_abs: f64,
-    /// Peak signal-to-noise ratio for a peak of 1, dB; none if the images are equal.
+    /// Peak signal-to-noise ratio for a peak of 1, dB; `None` if the images are equal.
     pub psnr_db: Option<f64>,
 }
 
-/// A picture of one configuration on one scene.
+/// The picture of one configuration on one scene.
 #[derive(Clone, Debug)]
 pub struct ImageSet {
-    /// The scene's name, as in [`Measurement::scene`].
+    /// [`Measurement::scene`].
     pub scene: String,
-    /// The configuration's name, as in [`Measurement::config`].
+    /// [`Measurement::config`].
     pub config: String,
-    /// What the configuration rendered.
+    /// The image that the configuration rendered.
     pub image: Frame,
-    /// What the f64 reference rendered with the same options; of the same size.
+    /// The f64 reference's image with the same options, of the same size; `None` if there is none.
     pub reference: Option<Frame>,
 }
 
@@ -188,7 +196,7 @@ mod tests {
         assert_eq!(odd, Summary { median: 3.0, mad: 1.0, min: 1.0, max: 9.0 });
         let even = Summary::of(&[1.0, 2.0]).unwrap();
         assert_eq!((even.median, even.mad), (1.5, 0.5));
-        // The mean of two large values does not overflow, and a NaN is no panic.
+        // The mean of two large values does not overflow, and NaN does not panic.
         assert_eq!(Summary::of(&[f64::MAX, f64::MAX]).unwrap().median, f64::MAX);
         assert_eq!(Summary::of(&[f64::NAN, 1.0, 2.0]).unwrap().median, 2.0);
     }

@@ -1,4 +1,4 @@
-//! How time grows with the number of surfels, with their size in the image, and with the image.
+//! How time grows with the number of surfels, their size in the image, and the number of pixels.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::plot::{Axis, Plot};
 use super::results::Measurement;
 use super::text::{escape, significant, tick, tick_count};
 
-/// Fewer values make no curve.
+/// Fewest values of a curve.
 const FEWEST: usize = 3;
 
 /// A quantity that time may grow with.
@@ -17,8 +17,9 @@ struct Quantity {
     tick: fn(f64) -> String,
     class: &'static str,
     value: fn(&Measurement) -> f64,
-    /// What must be equal along a curve, the strictest choice first; the first that makes curves is taken, because a
-    /// study that varies one thing often cannot help varying another.
+    /// The properties that must be equal along a curve, the strictest choice first. The first
+    /// choice that gives a curve is used, because a study that varies one quantity often has to
+    /// vary another.
     alike: &'static [Alike],
 }
 
@@ -85,7 +86,7 @@ fn radius(m: &Measurement) -> String {
     significant(m.footprint_px, 2)
 }
 
-/// The curves of a configuration, one for each value of what must be alike: each with its points in order.
+/// Curves by configuration and value of the equal properties, each with its points in order.
 type Curves<'a> = BTreeMap<(&'a str, String), Vec<(f64, &'a Measurement)>>;
 
 fn curves<'a>(measurements: &'a [Measurement], quantity: &Quantity) -> (Curves<'a>, &'static str) {
@@ -99,7 +100,7 @@ fn curves<'a>(measurements: &'a [Measurement], quantity: &Quantity) -> (Curves<'
         }
         curves.retain(|_, points| {
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            // Two times for one value mean that something else varied too: that is no curve.
+            // Two times for one value mean that another property varied too, so this is no curve.
             points.len() >= FEWEST && points.windows(2).all(|pair| pair[0].0 < pair[1].0)
         });
         if !curves.is_empty() {
@@ -109,16 +110,16 @@ fn curves<'a>(measurements: &'a [Measurement], quantity: &Quantity) -> (Curves<'
     (Curves::new(), "")
 }
 
-/// Time as a start and a cost for each: `base + slope * value`, ms.
+/// Time as a constant and a cost per surfel: `base + slope * value`, ms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     base: f64,
     slope: f64,
-    /// The farthest that a point lies from the line, as a fraction of its own time.
+    /// Largest distance of a point from the line, as a fraction of the point's time.
     departure: f64,
 }
 
-/// The line with the least squares of departures, each as a fraction of its own time.
+/// Fits the line with the least squares of relative departures, as fractions of each point's time.
 fn line(points: &[(f64, f64)]) -> Line {
     let sum = |term: &dyn Fn(f64, f64) -> f64| points.iter().map(|&(value, time)| term(value, time)).sum::<f64>();
     // Weights 1 / t^2.
@@ -130,14 +131,14 @@ fn line(points: &[(f64, f64)]) -> Line {
     Line { base, slope, departure }
 }
 
-/// The section of the page; nothing if nothing was varied.
+/// Returns the section of the page; empty if nothing was varied.
 pub(super) fn section(measurements: &[Measurement], families: &Families) -> String {
     let figures: String = QUANTITIES.iter().map(|quantity| figure(measurements, quantity, families)).collect();
     if figures.is_empty() {
         return String::new();
     }
     format!(
-        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by a decade in a decade, \
+        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by one decade per decade, \
          time is proportional. Bars are one median absolute deviation.</p>{}<div class=\"plots\">{figures}</div></section>",
         families.legend()
     )
@@ -168,9 +169,11 @@ fn figure(measurements: &[Measurement], quantity: &Quantity, families: &Families
             &format!("{}: {} ms at {said}", m.config, significant(time.median, 3)),
         );
     }
-    // A name stands at the end of its curve; what must be alike is added only if a configuration has several curves.
+    // A name stands at the end of its curve. If a configuration has several curves, the value of
+    // the equal properties is added.
     let named = |config: &str| curves.keys().filter(|(other, _)| *other == config).count();
-    // From the top down, so that names that make room for each other keep the order of their curves.
+    // Names are placed from the top down, so that they keep the order of their curves when they
+    // avoid each other.
     let end = |curve: &[(f64, &Measurement)]| {
         let (value, m) = curve[curve.len() - 1];
         (value, m.total_ms.median)
@@ -195,12 +198,12 @@ fn figure(measurements: &[Measurement], quantity: &Quantity, families: &Families
     format!("<figure>{svg}<figcaption>{}; {alike} along a curve.{lines}</figcaption></figure>", escape(title))
 }
 
-/// How nearly a curve over surfels is a straight line, as a sentence.
+/// Describes how close a curve over surfels is to a straight line, as a sentence.
 fn straight(((config, _), curve): (&(&str, String), &Vec<(f64, &Measurement)>)) -> String {
     let points: Vec<_> = curve.iter().map(|(value, m)| (*value, m.total_ms.median)).collect();
     let Line { base, slope, departure } = line(&points);
     format!(
-        " {}: {} ms and {} ns a surfel, to {} %.",
+        " {}: {} ms and {} ns per surfel, to {} %.",
         escape(config),
         significant(base, 2),
         significant(slope * 1e6, 3),
@@ -230,7 +233,7 @@ mod tests {
         all.push(measurement("a", "s", 1000, 1.0, 100));
         assert_eq!(lengths(&all, 0), [3]);
         assert!(lengths(&all, 1).is_empty() && lengths(&all, 2).is_empty());
-        // Nor does a value that comes twice make a third.
+        // A value that occurs twice is no third one.
         let twice = [10, 100, 100].map(|surfels| measurement("a", "s", surfels, 1.0, 100));
         assert!(lengths(&twice, 0).is_empty());
     }
@@ -252,7 +255,7 @@ mod tests {
         let grid: Vec<Measurement> =
             [1.0, 4.0].iter().flat_map(|r| [10, 100, 1000].map(|n| measurement("a", "s", n, *r, 100))).collect();
         assert_eq!(lengths(&grid, 0), [3, 3]);
-        // A sphere that is sampled more finely has smaller splats: that is still a curve over the surfels.
+        // A more finely sampled sphere has smaller splats, and is still a curve over surfels.
         let finer: Vec<Measurement> = [(10, 9.0), (100, 3.0), (1000, 1.0)]
             .map(|(n, r)| measurement("a", &format!("sphere-{n}"), n, r, 100))
             .into();

@@ -1,4 +1,4 @@
-//! All numbers, a table for each scene.
+//! The section of the page with all numbers, as one table per scene.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use super::pareto::best;
 use super::results::{Measurement, Summary};
 use super::text::{NONE, count, escape, optional, si, significant, tick};
 
-/// A column: the group that it stands in, its head, and its cell for a measurement.
+/// A column: its group, its head, and its cell for a measurement.
 struct Column<'a> {
     group: &'static str,
     head: String,
@@ -21,10 +21,10 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Passes in the order they run; others follow by name.
+/// Passes in the order in which they run; others follow by name.
 const PASSES: [&str; 4] = ["project", "visibility", "accumulate", "resolve"];
 
-/// Measures against ground truth as a reader knows them; others have their own name.
+/// Heads for measures against ground truth; others are shown by their own names.
 const TRUTHS: [(&str, &str); 17] = [
     ("psnr_db", "PSNR, dB"),
     ("ssim", "SSIM"),
@@ -45,14 +45,14 @@ const TRUTHS: [(&str, &str); 17] = [
     ("rmse", "RMSE"),
 ];
 
-/// The names in the order of `known`, then the others.
+/// Sorts names by the order of `known`, then the others by name.
 fn in_order<'a>(names: BTreeSet<&'a String>, known: &[&str]) -> Vec<&'a String> {
     let mut names: Vec<&String> = names.into_iter().collect();
     names.sort_by_key(|name| known.iter().position(|known| known == name).unwrap_or(known.len()));
     names
 }
 
-/// Median and deviation with equally many decimals.
+/// Formats median and deviation with the same number of decimals.
 fn time(summary: &Summary) -> String {
     let median = significant(summary.median, 3);
     if median.contains('e') || !summary.mad.is_finite() {
@@ -70,7 +70,8 @@ fn limit(m: &Measurement) -> String {
     }
 }
 
-/// The columns after the configuration's name. Of those that some studies lack, the ones that have a value.
+/// Returns the columns after the configuration's name. Optional columns appear only if some row has
+/// a value for them.
 fn columns<'a>(rows: &[&'a Measurement]) -> Vec<Column<'a>> {
     let mut columns = Vec::new();
     let varies = |of: fn(&Measurement) -> u64| rows.iter().map(|m| of(m)).collect::<BTreeSet<_>>().len() > 1;
@@ -120,7 +121,7 @@ fn columns<'a>(rows: &[&'a Measurement]) -> Vec<Column<'a>> {
     columns
 }
 
-/// The heads of the groups: neighbours of one group share a cell.
+/// Returns the heads of the groups; neighbouring columns of one group share a cell.
 fn group_row(columns: &[Column<'_>]) -> String {
     let groups = columns.chunk_by(|a, b| a.group == b.group);
     groups
@@ -130,7 +131,7 @@ fn group_row(columns: &[Column<'_>]) -> String {
         .collect()
 }
 
-/// The section of the page.
+/// Returns the section of the page.
 pub(super) fn section(measurements: &[Measurement], families: &Families) -> String {
     let tables: String = scenes(measurements).into_iter().map(|(scene, rows)| table(scene, &rows, families)).collect();
     format!(
@@ -140,7 +141,7 @@ pub(super) fn section(measurements: &[Measurement], families: &Families) -> Stri
     )
 }
 
-/// The cases of a scene are parts of one table, so that their columns can be compared.
+/// Returns the table of a scene. Its cases are parts of one table, so that columns can be compared.
 fn table(scene: &str, rows: &[&Measurement], families: &Families) -> String {
     let columns = columns(rows);
     let swept = columns.iter().any(|column| column.group.is_empty());

@@ -1,10 +1,10 @@
-//! Names and numbers as text for HTML, SVG and people.
+//! Formats names and numbers for HTML and SVG.
 
-/// What stands for a value that does not exist.
+/// Shown in place of a missing value.
 pub(super) const NONE: &str = "–";
 
-/// Text that may stand between tags or inside an attribute of HTML, SVG or XML. Characters that XML cannot hold are
-/// left out.
+/// Escapes text for use between tags or inside an attribute of HTML, SVG or XML. Characters that
+/// XML cannot contain are left out.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -22,7 +22,8 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A number with `digits` significant digits; with a power of ten if it is very small or very large.
+/// Formats a number with `digits` significant digits, with a power of ten if it is very small or
+/// very large.
 pub(super) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -31,7 +32,7 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
         return if value > 0.0 { "∞".to_owned() } else { NONE.to_owned() };
     }
     let places = digits.saturating_sub(1);
-    // Rounding may carry into the next power of ten, so the power is that of the rounded number.
+    // Rounding may carry into the next power of ten, so the power is taken from the rounded number.
     let scientific = format!("{value:.places$e}");
     let power: i32 = scientific.rsplit('e').next().and_then(|power| power.parse().ok()).unwrap_or(0);
     if (-3..6).contains(&power) {
@@ -42,22 +43,22 @@ pub(super) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// A number with `digits` significant digits, or none.
+/// Formats a number with `digits` significant digits, or [`NONE`].
 pub(super) fn optional(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| significant(value, digits))
 }
 
-/// A large number with a prefix of the SI: `12.3 M`.
+/// Formats a large number with an SI prefix: `12.3 M`.
 pub(super) fn si(value: f64) -> String {
     const PREFIXES: [(f64, &str); 4] = [(1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k")];
-    // What rounds to a thousand of a prefix takes the next one.
+    // A value that rounds to 1,000 of a prefix takes the next prefix.
     match PREFIXES.iter().find(|(unit, _)| value.is_finite() && value >= unit * 0.9995) {
         Some((unit, prefix)) => significant(value / unit, 3) + prefix,
         None => significant(value, 3),
     }
 }
 
-/// The number at a tick of an axis, as short as it can be.
+/// Formats the number at a tick of an axis, as short as possible.
 pub(super) fn tick(value: f64) -> String {
     if (1e-3..1e5).contains(&value) {
         grouped(&format!("{}", (value * 1e6).round() / 1e6))
@@ -66,7 +67,7 @@ pub(super) fn tick(value: f64) -> String {
     }
 }
 
-/// The number at a tick of an axis of counts.
+/// Formats the number at a tick of an axis of counts.
 pub(super) fn tick_count(value: f64) -> String {
     let text = si(value);
     let (number, prefix) = text.split_once(' ').unwrap_or((&text, ""));
@@ -74,12 +75,12 @@ pub(super) fn tick_count(value: f64) -> String {
     format!("{number} {prefix}").trim_end().to_owned()
 }
 
-/// A whole number with its digits in groups of three.
+/// Formats a whole number with commas between groups of three digits.
 pub(super) fn count(value: u64) -> String {
     grouped(&value.to_string())
 }
 
-/// Puts a comma before every third digit of the whole part.
+/// Inserts a comma before every third digit of the whole part.
 fn grouped(number: &str) -> String {
     let (whole, fraction) = number.find('.').map_or((number, ""), |point| number.split_at(point));
     let (sign, whole) = whole.strip_prefix('-').map_or(("", whole), |whole| ("-", whole));

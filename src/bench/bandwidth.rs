@@ -1,4 +1,4 @@
-//! How fast a device copies its own memory: what the bytes per second of a pass are held against.
+//! Measures the copy bandwidth of a device, the yardstick for the bytes per second of a pass.
 
 use std::time::Instant;
 
@@ -10,43 +10,44 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::timing::Timing;
 use crate::report::Summary;
 
-/// Seconds that a timed run takes, about: beside it, handing over the work and noticing its end are nothing.
+/// Target duration of a timed run in seconds; makes submission and waiting negligible.
 const RUN: f64 = 0.1;
 
-/// Copies of a timed run, at most.
+/// The largest number of copies in a timed run.
 const MOST_COPIES: f64 = 512.0;
 
-/// Timestamps count if they say between so much of the host's time and so much: those of some drivers are taken before the work.
+/// Device times are used if they are within these multiples of the host's time: the timestamps of
+/// some drivers are taken before the work is done.
 const TRUSTED: [f64; 2] = [0.5, 1.02];
 
-/// Words of the copy that are compared with their source.
+/// Number of words, from the start, in which the copy is compared with its source.
 const COMPARED: u64 = 1024;
 
-/// How fast a device copies from one buffer to another. Each byte counts twice, as it is read and written.
+/// Bandwidth of copies from one buffer to another. Each byte counts twice: read and written.
 #[derive(Clone, Debug, Serialize)]
 pub struct CopyBandwidth {
-    /// Bytes of the buffer that is copied.
+    /// Size of the buffer that is copied, bytes.
     pub buffer_bytes: u64,
-    /// Copies of it in a timed run, one after the other.
+    /// Copies in a timed run, one after the other.
     pub copies: u32,
-    /// Timed runs.
+    /// Number of timed runs.
     pub runs: u32,
-    /// Bytes read and written, 10^9 a second.
+    /// Bytes read and written per second, in GB/s (10^9 bytes), by [`clock`](Self::clock).
     pub gb_per_second: Summary,
-    /// The same by the host's clock, from the submission until the device is done.
+    /// The same by the host's clock, from submission until the device is idle.
     pub wall_gb_per_second: Summary,
-    /// Whose clock the first are by: `timestamps` of the device, or `wall`.
+    /// The clock of `gb_per_second`: `timestamps` (of the device) or `wall`.
     pub clock: &'static str,
 }
 
 impl CopyBandwidth {
-    /// Measures it on `gpu` in `runs` runs, with a buffer of `bytes` or of as many as the adapter grants.
+    /// Measures `gpu` in `runs` runs on a buffer of `bytes`, or of the adapter's limit if smaller.
     ///
     /// # Errors
-    /// Whatever a device may report, and a copy that differs from its source.
+    /// Any error of the device, and a copy that differs from its source.
     pub fn measure(gpu: &Gpu, bytes: u64, runs: u32) -> Result<Self> {
         let pair = Pair::new(gpu, bytes.min(gpu.buffer_limit()) / 4)?;
-        // The first touches the memory, the second tells how long one takes.
+        // The first copy touches the memory, the second gives the time per copy.
         pair.copy(gpu, 1)?;
         let (once, _) = pair.copy(gpu, 1)?;
         let copies = (RUN / once.max(1e-9)).clamp(1.0, MOST_COPIES) as u32;
@@ -70,26 +71,28 @@ impl CopyBandwidth {
     }
 }
 
-/// The seconds by the `device`'s clock, if it has one and they can be.
+/// Returns the `device` time if it is plausible beside the `wall` time, both in seconds.
 fn trusted(wall: f64, device: Option<f64>) -> Option<f64> {
     device.filter(|device| (TRUSTED[0] * wall..=TRUSTED[1] * wall).contains(device))
 }
 
-/// A buffer and its copy.
+/// A buffer, and the one that it is copied to.
 struct Pair {
     from: Buffer<u32>,
     into: Buffer<u32>,
 }
 
 impl Pair {
-    /// Of so many words, no two next to each other the same: what is 0 all over may be kept in less room.
+    /// Creates two buffers of `words` words and fills the first.
+    ///
+    /// Neighbouring words differ, as a device may compress a buffer of zeros.
     fn new(gpu: &Gpu, words: u64) -> Result<Self> {
         let (from, into) = (Buffer::storage(gpu, "copied", words)?, Buffer::storage(gpu, "copy", words)?);
         from.write(gpu, words as usize, |range| range.map(scrambled).collect(), &())?;
         Ok(Self { from, into })
     }
 
-    /// Seconds that so many copies take: by the host's clock, and by the device's.
+    /// Makes `copies` copies and returns the seconds by the host's clock and by the device's.
     fn copy(&self, gpu: &Gpu, copies: u32) -> Result<(f64, Option<f64>)> {
         let mut timing = Timing::new(gpu);
         let start = Instant::now();
@@ -106,14 +109,14 @@ impl Pair {
         Ok((wall, ms.filter(|_| on_device).map(|ms| 1e-3 * ms)))
     }
 
-    /// Fails if the start of the copy is not that of its source.
+    /// Fails if the first [`COMPARED`] words of the copy differ from the source.
     fn compare(&self, gpu: &Gpu) -> Result<()> {
         let same = self.into.read(gpu, COMPARED)?.into_iter().enumerate().all(|(index, word)| word == scrambled(index));
         if same { Ok(()) } else { Err(gpu.error("a buffer that was copied differs from its source")) }
     }
 }
 
-/// The word of a buffer at `index`: a step of the golden ratio.
+/// The test pattern: `index` times 2^32 over the golden ratio, modulo 2^32.
 fn scrambled(index: usize) -> u32 {
     (index as u32).wrapping_mul(0x9e37_79b9)
 }
@@ -136,7 +139,7 @@ mod tests {
         for speed in [found.gb_per_second, found.wall_gb_per_second] {
             assert!(speed.min > 0.0 && speed.max < 1e5, "{found:?}");
         }
-        // A buffer that is larger than the adapter grants is as large as it grants.
+        // A buffer above the adapter's limit is shrunk to the limit.
         let small = gpu.with_buffer_limit(1 << 20);
         assert_eq!(CopyBandwidth::measure(&small, 4 << 20, 1).unwrap().buffer_bytes, 1 << 20);
     }

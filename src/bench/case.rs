@@ -1,4 +1,4 @@
-//! One scene of a study, and what its configurations showed on it.
+//! One scene of a study, and the results of its configurations.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::plan::RenderOptions;
 use crate::render::{Backend, DeviceBytes};
 
-/// One scene of a sweep.
+/// One scene of a study's sweep, with the backend of the configurations that need an adapter.
 pub(super) struct Case<'a> {
     pub definition: &'a Definition,
     pub entry: &'a SceneEntry,
@@ -17,19 +17,20 @@ pub(super) struct Case<'a> {
     pub gpu: Option<&'a Backend>,
 }
 
-/// One configuration on it.
+/// One configuration on a [`Case`], with its times and its last frames.
 pub(super) struct Timed<'a> {
     pub config: &'a Config,
     pub options: &'a RenderOptions,
-    /// Mean milliseconds of a frame over the cameras, one value a run.
+    /// Time per frame in ms, mean over the cameras; one value per run.
     pub total_ms: Vec<f64>,
-    /// The same of each pass.
+    /// Time of each pass in ms, as in `total_ms`, by the pass's name.
     pub passes: BTreeMap<String, Vec<f64>>,
-    /// What the last run showed, a frame for each camera.
+    /// Frames of the last run, one per camera.
     pub frames: Vec<Frame>,
     pub bytes: DeviceBytes,
-    /// Surfels and nodes that are drawn in place of all surfels, mean over the cameras, if levels of detail are cut.
+    /// Surfels and octree nodes in the cut that is drawn, mean over the cameras; `None` without
+    /// levels of detail.
     pub cut: Option<f64>,
-    /// Whether the last run has the bits of the first.
+    /// Whether the frames of the last run are bit-identical to those of the warm-up.
     pub stable: bool,
 }

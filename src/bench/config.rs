@@ -1,4 +1,4 @@
-//! A configuration of a study: one way to render.
+//! A configuration of a study: a backend and its render options.
 
 use std::fmt;
 
@@ -10,21 +10,26 @@ use crate::options::{RenderOptions, Suggested};
 use crate::plan::{Accumulator, BackendName, RenderOptions as Settings};
 use crate::scene::{Samples, Shading};
 
-/// One way to render. What it does not say is as for `epsplat render`, but for one sample a pixel.
+/// A backend and its render options, under a name.
+///
+/// Options that are not given have the defaults of `epsplat render`, except that there is one
+/// sample per pixel.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// Its name.
+    /// The name, unique in the study.
     pub name: String,
-    /// Who renders.
+    /// The backend that renders.
     pub backend: BackendName,
-    /// The options of its pictures, by the names of the command line with `_` for `-`.
+    /// The render options, keyed by their command-line names with `_` for `-`.
     pub options: RenderOptions,
-    /// The configuration that it approximates, by name: its error against that one's f64 twin is reported as `apart_rmse` and
-    /// `apart_psnr_db`, on scenes that have both.
+    /// The name of the configuration that this one approximates.
+    ///
+    /// The error against the f64 reference of that configuration is reported as `apart_rmse` and
+    /// `apart_psnr_db`, on scenes that both render.
     pub approximates: Option<String>,
-    /// The largest RMSE against the f64 reference that is allowed.
+    /// The largest allowed RMSE against the f64 reference; a larger one is a failure.
     pub error_limit: Option<f64>,
-    /// Whether a quick run has it.
+    /// Whether a quick run includes this configuration.
     pub quick: bool,
 }
 
@@ -34,7 +39,7 @@ impl<'de> Deserialize<'de> for Config {
     }
 }
 
-/// Reads the table of a configuration, whose keys are its own and the names of options.
+/// Reads the TOML table of a configuration: keys of [`Config`] and names of options.
 struct Table;
 
 impl<'de> Visitor<'de> for Table {
@@ -64,7 +69,7 @@ impl<'de> Visitor<'de> for Table {
     }
 }
 
-/// A backend by its name.
+/// A backend that is read by its name.
 struct Named(BackendName);
 
 impl<'de> Deserialize<'de> for Named {
@@ -74,22 +79,22 @@ impl<'de> Deserialize<'de> for Named {
 }
 
 impl Config {
-    /// The settings of a render, on a scene whose own shading is `shading`.
+    /// Returns the render settings; `shading` is the scene's, used if the configuration gives none.
     pub fn settings(&self, shading: Option<Shading>) -> Settings {
         self.options.settle(Some(self.backend), Suggested { shading, ..Suggested::default() })
     }
 
-    /// Whether a cut of levels of detail is drawn.
+    /// Whether the configuration draws a cut of the levels of detail.
     pub fn cuts(&self) -> bool {
         self.options.levels.lod.is_some_and(|detail| !detail.is_finest())
     }
 
-    /// How the compute kernels keep sums; none if others render.
+    /// The accumulator of the compute kernels; `None` for the other backends.
     pub fn accumulator(&self) -> Option<Accumulator> {
         (self.backend == BackendName::Gpu).then(|| self.options.research.accumulator.unwrap_or_default())
     }
 
-    /// How sums are kept, by name; empty for the reference.
+    /// The name of the accumulator or of the blend format; empty for the reference.
     pub fn sums(&self) -> &'static str {
         match self.backend {
             BackendName::Gpu => self.accumulator().map_or("", Accumulator::name),
@@ -98,7 +103,7 @@ impl Config {
         }
     }
 
-    /// Whether two frames must have the same bits. The rasteriser blends in no fixed order.
+    /// Whether frames are bit-identical from run to run. The rasteriser blends in no fixed order.
     pub fn deterministic(&self) -> bool {
         match self.backend {
             BackendName::Gpu => self.accumulator().is_some_and(|sums| sums.row().deterministic),

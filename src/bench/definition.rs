@@ -1,4 +1,4 @@
-//! What a study is: scenes, configurations, and what is asked of them.
+//! The definition of a study: its scenes, its configurations, and how they are measured.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -16,189 +16,204 @@ use crate::surfels::sampling::Priority;
 use crate::surfels::simplify::Tolerance;
 use crate::truth::DEFAULT_GRID;
 
-/// A study: every configuration on every scene.
+/// A study: a set of configurations, rendered on a set of scenes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Definition {
-    /// A short name.
+    /// A short name; it also names the folder of the study's report.
     pub name: String,
     /// One sentence that says what the study shows.
     pub about: String,
     /// Width and height of the images, pixels.
     #[serde(default = "default_size")]
     pub size: [u32; 2],
-    /// Timed runs of each configuration, after one to warm up.
+    /// Number of timed runs of each configuration, after one run to warm up.
     #[serde(default = "default_runs")]
     pub runs: u32,
-    /// The configuration that the others' times are given relative to.
+    /// The name of the configuration whose time is the unit of relative times.
     pub baseline: Option<String>,
-    /// Rays of ground truth across a pixel: their square is cast through each.
+    /// Rays of ground truth along one side of a pixel: `rays` x `rays` are cast per pixel.
     #[serde(default = "default_rays")]
     pub rays: u32,
-    /// Linear RGBA behind the scene, straight alpha; else what a render has.
+    /// Background colour as linear RGBA, straight alpha; by default that of the configuration.
     pub background: Option<[f32; 4]>,
-    /// What a quick run takes instead.
+    /// The settings of a quick run.
     #[serde(default)]
     pub quick: Quick,
-    /// What is rendered.
+    /// The scenes, `[[scene]]` in the file.
     #[serde(rename = "scene", default)]
     pub scenes: Vec<SceneEntry>,
-    /// How.
+    /// The configurations, `[[config]]` in the file.
     #[serde(rename = "config", default)]
     pub configs: Vec<Config>,
-    /// Where the scenes' files are: the folder of the definition.
+    /// The folder of the definition, which paths in it are relative to.
     #[serde(skip)]
     pub(super) folder: PathBuf,
 }
 
-/// What a quick run takes instead; see [`Definition::quick_form`].
+/// Settings of a quick run in place of the study's; see [`Definition::quick_form`].
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quick {
-    /// Timed runs.
+    /// Number of timed runs of each configuration.
     pub runs: Option<u32>,
     /// Width and height of the images, pixels.
     pub size: Option<[u32; 2]>,
 }
 
-/// One scene, or a sweep: each `count` with each `footprint_px`.
+/// One scene, or a sweep over each `count` combined with each `footprint_px`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneEntry {
-    /// Its name.
+    /// The name, unique in the study.
     pub name: String,
-    /// A point cloud or mesh, relative to the definition's folder. Either this or a shape.
+    /// A point cloud or mesh, relative to the definition's folder. Needs no `shape` beside it.
     pub file: Option<PathBuf>,
-    /// Where to get the file, for who lacks it.
+    /// The place to download the file from, shown if the file is missing.
     pub source: Option<String>,
-    /// How surfels are made of the file; as `epsplat render` reads it by default.
+    /// How surfels are made from the file; by default as `epsplat render` does.
     #[serde(default)]
     pub surfels: Making,
-    /// By what samples of a mesh are handed out, as `epsplat sample` takes it.
+    /// The priority by which voxels are given samples of a mesh, as for `epsplat sample`.
     #[serde(default, deserialize_with = "parsed")]
     pub priority: Option<Priority>,
-    /// What is kept of how they end; all by default.
+    /// Whether surfels keep their clip lines and curvature; by default both.
     #[serde(default)]
     pub rims: Rims,
-    /// An image for the mesh of the file, relative to the definition's folder.
+    /// The texture of the mesh in `file`, relative to the definition's folder.
     pub texture: Option<PathBuf>,
-    /// The image is looked up once a pixel; else surfels have its colours.
+    /// Whether the texture is looked up per pixel. Otherwise each surfel has one colour from it.
     #[serde(default)]
     pub lookup: bool,
-    /// Surfels are those that `epsplat simplify --shape cap` leaves, within this tolerance.
+    /// Simplifies the surfels as `epsplat simplify --shape cap` does, within this tolerance.
     #[serde(default, deserialize_with = "parsed")]
     pub simplify: Option<Tolerance>,
-    /// A generated surface: sphere, torus, plane, checkerboard, text, shells or crossing.
+    /// A generated surface in place of a file.
+    ///
+    /// Sphere, torus, plane, checkerboard, text, shells or crossing.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,
-    /// Triangles beside the surfels: a shape, with a number of them after a colon if it is to be another than 200,000, or a mesh, relative to
-    /// the definition's folder. Where rays tell the truth, what shows beside the curve at which they meet is measured too.
+    /// Triangles that are drawn together with the surfels: a shape or a mesh file.
+    ///
+    /// A shape may be followed by a colon and the number of triangles (default 200,000); a file is
+    /// relative to the definition's folder. With `truth`, the visible curve where surfels and
+    /// triangles meet is compared with the true one.
     #[serde(default, deserialize_with = "parsed")]
     pub triangles: Option<Beside>,
-    /// Surfels of the shape, or to be made of the mesh.
+    /// Number of surfels of the shape, or to sample from the mesh.
     pub count: Option<OneOrMany<u64>>,
-    /// Disk radius of a shape's surfels in units of their mean spacing; the generator's by default.
+    /// Disk radius of a shape's surfels in mean spacings; by default as in `epsplat generate`.
     pub radius: Option<f64>,
-    /// How far a shape's points lie off it, along its normals: the standard deviation in units of their mean spacing.
+    /// Noise of a shape's points along their normals: the standard deviation in mean spacings.
     pub noise: Option<f64>,
-    /// The same points once more, as another input, so far out along their normals, world units. What share of the pixels show a mean of
-    /// both is measured.
+    /// Adds a copy of the points as a second input, moved along their normals by this distance.
+    ///
+    /// In world units. The share of pixels that blend both inputs is measured (`mixed_rate`).
     pub shirt: Option<f64>,
-    /// The mean radius of the splats, pixels, as if seen face-on: disks are enlarged or shrunk to it.
+    /// Mean splat radius in pixels, as if seen face-on: disks are scaled to it.
     pub footprint_px: Option<OneOrMany<f64>>,
-    /// Leaves out what of a sweep would cover more pixels than this, counting `surfels * pi * footprint_px^2`.
+    /// Skips points of a sweep where `surfels * pi * footprint_px^2` exceeds this number of pixels.
     pub most_fragments: Option<f64>,
-    /// Camera position, world units; else the scene is framed.
+    /// Camera position, world units; by default the camera frames the scene.
     pub eye: Option<[f64; 3]>,
-    /// What the camera looks at, world units; else the scene's centre.
+    /// Target of the camera, world units; by default the scene's centre.
     pub target: Option<[f64; 3]>,
-    /// Which way is up in the image.
+    /// Up direction in the image; by default the scene's.
     pub up: Option<[f64; 3]>,
     /// Vertical field of view, degrees.
     pub fov: Option<f64>,
-    /// Orthographic: world units from the image's top to its bottom.
+    /// Selects an orthographic camera and gives the height of its image, world units.
     pub ortho: Option<f64>,
-    /// Width and height of this scene's images, pixels, in quick runs too; else the study's.
+    /// Width and height in pixels, also in quick runs; by default the study's.
     pub size: Option<[u32; 2]>,
-    /// How large the scene is seen, of what it would be: 0.5 takes the camera twice as far away.
+    /// Scale of the scene in the image. 0.5 moves a pinhole camera twice as far away, or halves the
+    /// scale of an orthographic one.
     pub fill: Option<f64>,
-    /// Cameras on a circle around the scene's centre, the first of which is the one above.
+    /// Number of cameras on a circle around the scene's centre; the first is the one defined above.
     #[serde(default = "one")]
     pub views: u32,
-    /// The configurations that render it, by name; else all.
+    /// The names of the configurations that render the scene; by default all.
     pub configs: Option<Vec<String>>,
-    /// Compare with ground truth by rays: of the shape, or of the triangles of a mesh.
+    /// Whether images are compared with ray-cast ground truth: the shape, or the mesh's triangles.
     #[serde(default)]
     pub truth: bool,
-    /// The shading of configurations that choose none.
+    /// Shading for configurations that set none.
     pub shading: Option<Shading>,
-    /// The opacity of configurations that choose none.
+    /// Opacity for configurations that set none.
     pub opacity: Option<f32>,
-    /// Opacities of the classes of the file's points, as `epsplat render --class-opacity` takes them.
+    /// Opacity by class of the file's points, as for `epsplat render --class-opacity`.
     #[serde(default, deserialize_with = "parsed")]
     pub classes: Option<ClassOpacities>,
-    /// Surfels in a quick run.
+    /// Number of surfels in a quick run.
     pub quick_count: Option<OneOrMany<u64>>,
-    /// Splats' mean radius in a quick run, pixels.
+    /// Mean splat radius in a quick run, pixels.
     pub quick_footprint_px: Option<OneOrMany<f64>>,
-    /// Whether a quick run has it.
+    /// Whether a quick run includes this scene.
     #[serde(default = "yes")]
     pub quick: bool,
 }
 
-/// How surfels are made of a file.
+/// How surfels are made from the file or the shape of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Making {
-    /// By all that it says, as `epsplat render` does.
+    /// From everything in the file, as `epsplat render` does.
     #[default]
     File,
-    /// By its points alone, as `epsplat render` does: ellipses that hold their cells, normals turned to the viewer.
+    /// From the points alone, as `epsplat render` does.
+    ///
+    /// Ellipses contain the points' cells, and normals are turned to the viewer.
     Points,
-    /// By its points and the normals that its triangles have there: what a scanner's software exports.
+    /// From the points and the vertex normals of the triangles: what a scanner's software exports.
     Normals,
-    /// By its points alone, as `epsplat surfels` does: normals that agree, ellipses that hold their cells.
+    /// From the points alone, as `epsplat surfels` does.
+    ///
+    /// Normals are consistent, and ellipses contain the points' cells.
     Knn,
-    /// The same with ellipses that bound neighbours.
+    /// As [`Knn`](Self::Knn), with ellipses that bound the neighbours.
     Ellipse,
-    /// The same with disks from clusters of three.
+    /// As [`Knn`](Self::Knn), with disks from clusters of three points.
     Bsp,
-    /// The same with one radius for all.
+    /// As [`Bsp`](Self::Bsp), with one radius for all surfels.
     #[serde(rename = "bsp:global")]
     BspGlobal,
-    /// The same with disks as large as the triangles at a mesh's vertices.
+    /// As [`Knn`](Self::Knn), with disks as large as the triangles at a mesh's vertices.
     Qsplat,
-    /// As `epsplat sample` does: `count` of a mesh, with ellipses that cover it.
+    /// As `epsplat sample` does: `count` samples of a mesh, with ellipses that cover it.
     Sample,
-    /// The same, where Tien 2008 places them.
+    /// As [`Sample`](Self::Sample), with the positions of Tien 2008.
     Projected,
-    /// As `epsplat sample` does, curved as the mesh is around them.
+    /// As [`Sample`](Self::Sample), with the mesh's curvature around each sample.
     Caps,
-    /// Samples of a mesh, or of a shape, `count` of them, with its normals alone, as `epsplat render` draws them.
+    /// From `count` samples of a mesh or shape with only their normals, as `epsplat render` does.
     Scanned,
-    /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
+    /// From `count` random points of a mesh with its normals; ellipses contain their cells.
     Uniform,
-    /// As `epsplat hybrid` does: samples of a mesh whose diagonal is seen as long as `count` pixels, and the triangles that stay.
+    /// As `epsplat hybrid` does: samples of a mesh, and the triangles that remain.
+    ///
+    /// The mesh's diagonal is seen as `count` pixels long.
     Hybrid,
-    /// Those that the cuts of the scene's configurations take of a file of `epsplat lod`, and nodes: it is not read whole.
+    /// The surfels and nodes in the configurations' cuts of a file of `epsplat lod`, read in parts.
     Levels,
-    /// Of a shape none: `count` triangles stand for it, and the orthographic camera comes so near that a disk of their mean area has a radius of
+    /// No surfels: `count` triangles approximate a shape.
+    ///
+    /// The orthographic scale is set so that a disk of the mean triangle area has a radius of
     /// `footprint_px`.
     Triangles,
-    /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them.
+    /// Gaussians of a shape, as `epsplat generate --gaussians` makes them.
     Gaussians,
 }
 
-/// Triangles beside surfels.
+/// Triangles that are drawn together with surfels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Beside {
-    /// About so many that stand for a shape.
+    /// A shape, and its approximate number of triangles.
     Shape(Shape, u64),
-    /// A mesh.
+    /// A mesh file.
     File(PathBuf),
 }
 
-/// Triangles of a shape whose number nobody says: in most images their edges are too short to see.
+/// Default number of triangles of a shape: in most images their edges are too short to see.
 const TRIANGLES: u64 = 200_000;
 
 impl FromStr for Beside {
@@ -220,41 +235,41 @@ impl FromStr for Beside {
     }
 }
 
-/// How surfels end and curve.
+/// Whether surfels have clip lines and curvature.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rims {
-    /// They curve, and end at lines.
+    /// Both.
     #[default]
     Curved,
-    /// They end at lines.
+    /// Clip lines only.
     Clipped,
-    /// Whole ellipses.
+    /// Neither: flat, whole ellipses.
     Flat,
 }
 
 impl Making {
-    /// What a shape may become.
+    /// The kinds of surfels that a shape can have.
     pub const OF_SHAPES: [Self; 4] = [Self::File, Self::Scanned, Self::Gaussians, Self::Triangles];
 
-    /// Whether the mesh is sampled at a number of points.
+    /// Whether surfels are samples of a mesh, which need a `count`.
     pub fn samples(self) -> bool {
         matches!(self, Self::Sample | Self::Projected | Self::Caps | Self::Scanned | Self::Uniform | Self::Hybrid)
     }
 }
 
-/// A value, or the values of a sweep.
+/// A value, or the list of values of a sweep.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "a number or a list of numbers is needed")]
 pub enum OneOrMany<T> {
-    /// One.
+    /// A single value.
     One(T),
-    /// A sweep.
+    /// The values of a sweep.
     Many(Vec<T>),
 }
 
 impl<T: Copy> OneOrMany<T> {
-    /// The values in order.
+    /// Returns the values in order.
     pub fn values(&self) -> Vec<T> {
         match self {
             Self::One(value) => vec![*value],
@@ -292,7 +307,7 @@ pub(super) fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D
 }
 
 impl Definition {
-    /// The quick form: what `quick`, `quick_count` and `quick_footprint_px` say.
+    /// Returns the study with its quick settings, without entries that have `quick = false`.
     pub fn quick_form(mut self) -> Self {
         self.runs = self.quick.runs.unwrap_or(self.runs);
         self.size = self.quick.size.unwrap_or(self.size);
@@ -305,13 +320,13 @@ impl Definition {
         self
     }
 
-    /// The configurations that render the scene of `entry`.
+    /// Returns the configurations that render the scene of `entry`.
     pub(super) fn configs_of<'a>(&'a self, entry: &'a SceneEntry) -> impl Iterator<Item = &'a Config> {
         let wants = |config: &&Config| entry.configs.as_ref().is_none_or(|names| names.contains(&config.name));
         self.configs.iter().filter(wants)
     }
 
-    /// The settings of `config` on the scene of `entry`.
+    /// Returns the render settings of `config` for the scene of `entry`.
     pub fn settings(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
         let settings = config.settings(entry.shading);
         let opacity = config.options.transparency.opacity.or(entry.opacity).unwrap_or(settings.opacity);
@@ -319,12 +334,12 @@ impl Definition {
         RenderOptions { opacity, background: background.unwrap_or(settings.background), ..settings }
     }
 
-    /// Whether a configuration renders on an adapter.
+    /// Whether any configuration needs an adapter.
     pub fn needs_gpu(&self) -> bool {
         self.configs.iter().any(|config| config.backend != BackendName::Reference)
     }
 
-    /// The files of all scenes.
+    /// Returns the paths of all files that the scenes read.
     pub fn files(&self) -> Vec<PathBuf> {
         let beside = |scene: &'_ SceneEntry| match &scene.triangles {
             Some(Beside::File(file)) => Some(file.clone()),
@@ -335,7 +350,7 @@ impl Definition {
         files.map(|file| self.path_of(&file)).collect()
     }
 
-    /// Where a scene's file is.
+    /// Returns the path of a scene's file, which is relative to the definition's folder.
     pub(super) fn path_of(&self, file: &Path) -> PathBuf {
         self.folder.join(file)
     }

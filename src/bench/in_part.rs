@@ -1,4 +1,4 @@
-//! Scenes of files of `epsplat lod` that no memory has room for: what a study's cuts take of one is read.
+//! Scenes from files of `epsplat lod` that do not fit in memory: only the cuts of a study are read.
 
 use std::path::Path;
 
@@ -14,7 +14,9 @@ use crate::progress::Progress;
 use crate::render::taken;
 use crate::surfels::part;
 
-/// The part of the scene's file that the cuts of all of its configurations take from its cameras: each draws of it what it would of the whole.
+/// Reads the part of `file` that the cuts of all configurations need from all cameras.
+///
+/// Each configuration draws the same cut from this part as it would from the whole file.
 pub(super) fn stage(
     definition: &Definition,
     entry: &SceneEntry,
@@ -25,7 +27,7 @@ pub(super) fn stage(
     let levels = Levels::open(Input::open(&path, None)?)?.ok_or_else(|| {
         Error::malformed(
             &path,
-            "it has no levels of detail that can be read in parts: epsplat lod makes a file that has",
+            "it has no levels of detail that can be read in parts: make such a file with epsplat lod",
         )
     })?;
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &part::nothing(&levels))?;
@@ -34,13 +36,15 @@ pub(super) fn stage(
     let views: Vec<_> =
         cameras.iter().flat_map(|camera| options.iter().map(move |options| (camera, options))).collect();
     let (scene, _) = taken(&levels, &views, |_| Ok(()), progress)?;
-    // Of the surfels that were read.
+    // The mean over the surfels that were read, not over the whole file.
     let footprint_px = footprint(&scene, &cameras);
     Ok(Staged { scene, cameras, surface: None, dressed: false, footprint_px })
 }
 
-/// What a configuration draws, and what the reference that it is compared with draws beside that: the reference may take one sample where the configuration takes
-/// several, and backs that the configuration leaves out.
+/// Adds the maps of the f64 reference, so that the cut also holds what the reference draws.
+///
+/// The reference may take one sample where the configuration takes several, and may draw back faces
+/// that the configuration culls.
 fn judged(options: RenderOptions) -> RenderOptions {
     RenderOptions { maps: options.maps.and(&OF_REFERENCE), ..options }
 }

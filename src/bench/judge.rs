@@ -1,4 +1,4 @@
-//! What the frames of a study are worth: their error against the f64 reference and against ground truth.
+//! Judges the frames of a study: their error against the f64 reference and against ground truth.
 
 use std::collections::BTreeMap;
 
@@ -14,23 +14,23 @@ use crate::report::{ImageSet, Measurement, Numeric};
 use crate::scene::{Blend, Colors, Composite, Map, Maps, Scene, Shading, ShadingAt};
 use crate::truth::{Surface, Truth};
 
-/// The side that pictures for the page are kept at, pixels.
+/// The longer side of the report's pictures, pixels.
 const PICTURE_SIDE: usize = 512;
 
-/// The maps of a reference that configurations are compared with.
+/// The maps of the reference that errors need: fragment counts, and pixels to excuse.
 pub(super) const OF_REFERENCE: [Map; 2] = [Map::Count, Map::Decision];
 
-/// A configuration against the reference.
+/// The error of a configuration against the f64 reference.
 pub(super) struct Errors {
-    /// The worst of all cameras.
+    /// The worst error over the cameras.
     pub numeric: Numeric,
-    /// Fragments that are blended in a frame, mean over the cameras.
+    /// Blended fragments per frame, mean over the cameras.
     pub fragments: f64,
-    /// What the first camera sees.
+    /// The image and the reference of the first camera, for the report.
     pub picture: ImageSet,
 }
 
-/// The items with the same key together, in the order of their first: the indices of each group.
+/// Groups equal keys: each key with the indices of its items, in order of first occurrence.
 fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> {
     let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
     for (index, key) in keys.enumerate() {
@@ -42,13 +42,16 @@ fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> 
     groups
 }
 
-/// Compares all with the reference, which renders once what differs in nothing but how sums are kept.
+/// Compares all configurations with the f64 reference.
+///
+/// Configurations that differ only in how sums are kept share one render of the reference.
 pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
     let default = RenderOptions::default();
     let maps = Maps::of(&OF_REFERENCE);
     let key = |timed: &Timed<'_>| RenderOptions {
         accumulator: default.accumulator,
-        // Layers that the rasteriser peels are others than those of lists.
+        // Peeled layers differ from those of fragment lists, so the rasteriser has a reference of
+        // its own.
         raster: timed.options.raster.filter(|_| peel::layers(timed.options).is_some()),
         maps,
         ..timed.options.clone()
@@ -85,12 +88,14 @@ pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: 
             }
         }
     }
-    // Every configuration is in one group, and there is a camera.
+    // No entry is `None`: each configuration is in one group, and there is at least one camera.
     Ok(errors.into_iter().flatten().collect())
 }
 
-/// The measures against ground truth of each, the worst of all cameras; empty ones if the scene has none. Depth and normal
-/// are rendered for it, apart from the timed frames, where a configuration does not ask for them.
+/// Returns the measures of each configuration against ground truth, the worst over the cameras.
+///
+/// A result is empty if the scene has neither ground truth nor a second input ([`between_inputs`]).
+/// Frames with depth and normal are rendered anew for this and are not timed.
 pub(super) fn against_truth(
     case: &Case<'_>,
     timed: &[Timed<'_>],
@@ -112,7 +117,8 @@ pub(super) fn against_truth(
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];
-            // Points that face the camera have no normals, and of what is not blended none is kept.
+            // Points that face the camera have no normals of their own, and without blending no
+            // normal is stored.
             let normals = timed.options.facing.is_none() && timed.options.blend == Blend::Weighted;
             let wanted: &[Map] = if normals { &[Map::Depth, Map::Normal] } else { &[Map::Depth] };
             let maps = timed.options.maps.and(wanted);
@@ -130,14 +136,16 @@ pub(super) fn against_truth(
     Ok(worst)
 }
 
-/// What of the surfels and the triangles shows beside the curve at which they meet, the worst of all cameras.
+/// Measures where surfels and triangles meet: wrong pixels and the offset of the visible curve.
+///
+/// The worst over the cameras, as `wrong_winner_rate` and `curve_offset_px`.
 fn beside_joint(
     case: &Case<'_>,
     timed: &Timed<'_>,
     both: &[Surface; 2],
     worst: &mut BTreeMap<String, f64>,
 ) -> Result<()> {
-    // Told apart by colour.
+    // Surfels are red and triangles green, so that colour tells which of them a pixel shows.
     let Scene { triangles, .. } = &case.staged.scene;
     let scene = Scene {
         colors: Colors::Constant([1.0, 0.0, 0.0, 1.0]),
@@ -158,7 +166,9 @@ fn beside_joint(
     Ok(())
 }
 
-/// How many of the pixels that show anything show a mean of the first input and of the others, the worst of all cameras.
+/// Measures the share of covered pixels that blend the first input with another, as `mixed_rate`.
+///
+/// The worst over the cameras.
 fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<String, f64>) -> Result<()> {
     let scene = &case.staged.scene;
     let all = 0..scene.surfels.len() as u64;
@@ -170,7 +180,7 @@ fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<Strin
     for camera in &case.staged.cameras {
         let (frame, _) = renderer.frame(camera, &())?;
         let shown = || frame.color.iter().filter(|color| color[3] > 0.0);
-        // An eighth of a code of 8 bits is none that anybody sees.
+        // A share below 1/2048, an eighth of an 8-bit step, is invisible and does not count.
         let mixed = shown().filter(|[r, g, ..]| r.min(*g) > 1.0 / 2048.0).count();
         let rate = mixed as f64 / shown().count().max(1) as f64;
         let known = worst.entry("mixed_rate".to_owned()).or_insert(rate);
@@ -179,7 +189,7 @@ fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<Strin
     Ok(())
 }
 
-/// Pictures whose colours are those of their surfels.
+/// Returns options that show the unlit, opaque colours of the surfels.
 fn in_own_colors(options: &RenderOptions) -> RenderOptions {
     RenderOptions {
         shading: Shading::Unlit,
@@ -190,8 +200,10 @@ fn in_own_colors(options: &RenderOptions) -> RenderOptions {
     }
 }
 
-/// What each that approximates another is apart from that one's reference, the worst of all cameras: over the whole picture, as what is
-/// left out or added is part of it.
+/// Returns `apart_rmse` and `apart_psnr_db` of configurations that approximate another.
+///
+/// The error against the f64 reference of the other configuration, the worst over the cameras. No
+/// pixel is excused: detail that the approximation omits or adds is part of its error.
 pub(super) fn against_approximated(
     case: &Case<'_>,
     timed: &[Timed<'_>],
@@ -214,7 +226,7 @@ pub(super) fn against_approximated(
     Ok(apart)
 }
 
-/// Measures of which less is worse.
+/// Measures whose smaller value is the worse one.
 const LESS_IS_WORSE: [&str; 3] = ["psnr_db", "ssim", "silhouette_iou"];
 
 fn join_worst(worst: &mut BTreeMap<String, f64>, error: &Reconstruction) {
@@ -240,7 +252,7 @@ fn join_worst(worst: &mut BTreeMap<String, f64>, error: &Reconstruction) {
     }
 }
 
-/// Fills in [`Measurement::ratio_to_raster`] for the configurations of one case.
+/// Sets [`Measurement::ratio_to_raster`] for the configurations of one case.
 pub(super) fn compare_with_raster(measurements: &mut [Measurement]) {
     let rasters: Vec<(f64, f64)> = measurements
         .iter()
@@ -254,8 +266,9 @@ pub(super) fn compare_with_raster(measurements: &mut [Measurement]) {
     }
 }
 
-/// The colours of both, shrunk by a whole factor to at most [`PICTURE_SIDE`]. Of each block of pixels both keep the one in
-/// which they differ most, so that no error is averaged away.
+/// Shrinks the colours of both images by an integer factor to at most [`PICTURE_SIDE`].
+///
+/// Both keep the pixel of each block in which they differ most, so that no error is averaged away.
 fn small_pair(image: &Frame, reference: &Frame) -> (Frame, Frame) {
     let (width, height) = (image.width as usize, image.height as usize);
     let factor = width.max(height).div_ceil(PICTURE_SIDE).max(1);

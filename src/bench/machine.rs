@@ -1,4 +1,4 @@
-//! Where and when a study ran, without saying where on the machine its files are.
+//! Describes the machine, date and command of a study, without paths of the local file system.
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::render::Backend;
 use crate::report::Machine;
 
-/// The machine, as far as the system tells.
+/// Describes the adapter, processor and operating system, as far as the system reports them.
 pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
     let adapter = match gpu {
         Some(Backend::Gpu { gpu, .. }) => Some(&gpu.adapter),
@@ -26,15 +26,16 @@ pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
     }
 }
 
-/// The value of the first line `KEY separator VALUE` of a file of the system.
+/// Returns the value of the first line `KEY separator VALUE` in a system file.
 fn line_after(path: &str, key: &str, separator: char) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
     let mut values = text.lines().filter_map(|line| line.split_once(separator)).filter(|(k, _)| k.trim() == key);
     values.next().map(|(_, value)| value.trim().trim_matches('"').to_owned())
 }
 
-/// The command line of these arguments, the first of which is the program: absolute paths become names, for where a file
-/// is on this machine says nothing on another.
+/// Formats `arguments`, of which the first is the program, as an epsplat command line.
+///
+/// Absolute paths become file names, as a local folder means nothing on another machine.
 ///
 /// ```
 /// let typed = ["/usr/bin/epsplat", "bench", "benches/kernels.toml", "--out", "/home/me/out"];
@@ -51,7 +52,7 @@ pub fn command(arguments: impl IntoIterator<Item = String>) -> String {
     std::iter::once("epsplat".to_owned()).chain(rest).collect::<Vec<_>>().join(" ")
 }
 
-/// An absolute path's last part; anything else as it is.
+/// Returns the file name of an absolute path; any other word unchanged.
 fn name_of(word: &str) -> String {
     let path = Path::new(word);
     match path.file_name() {
@@ -60,7 +61,7 @@ fn name_of(word: &str) -> String {
     }
 }
 
-/// The day and minute, UTC, of a time since 1970: `2025-01-31 23:59 UTC`.
+/// Formats `time` to the minute in UTC: `2025-01-31 23:59 UTC`.
 pub fn date(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let (days, second) = (seconds / 86_400, seconds % 86_400);
@@ -68,8 +69,10 @@ pub fn date(time: SystemTime) -> String {
     format!("{year:04}-{month:02}-{day:02} {:02}:{:02} UTC", second / 3600, second / 60 % 60)
 }
 
-/// Year, month and day of the Gregorian calendar, from the days since 1970-01-01: years begin in March, so that the day that
-/// some lack is their last (Hinnant, "chrono-compatible low-level date algorithms").
+/// Returns year, month and day in the Gregorian calendar for the days since 1970-01-01.
+///
+/// Years start in March, so that the leap day is the last day of its year (Hinnant,
+/// "chrono-compatible low-level date algorithms").
 fn civil(days: u64) -> (u64, u64, u64) {
     let days = days + 719_468;
     let (era, of_era) = (days / 146_097, days % 146_097);

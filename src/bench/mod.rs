@@ -1,7 +1,8 @@
-//! Benchmark studies: what each speed costs in error, measured on scenes and configurations that a TOML file lists.
+//! Benchmark studies: speed and error of the configurations and scenes listed in a TOML file.
 //!
-//! [`Definition`] is such a file, [`run`] renders it, [`report::write`](crate::report::write) makes files of the outcome
-//! and [`table`] text. [`card`] is one run of all that shows what an adapter does.
+//! A [`Definition`] is such a file. [`run`] renders it, [`report::write`](crate::report::write)
+//! writes the outcome as files, and [`table`] formats it as text. [`card`] runs accuracy,
+//! determinism, throughput and studies on one adapter.
 
 pub mod bandwidth;
 pub mod card;

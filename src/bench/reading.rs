@@ -1,4 +1,4 @@
-//! A study from a TOML file; a file that is none is refused in one sentence that names the file and the key.
+//! Reads and validates a study from a TOML file; an error names the file and the key.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,21 +12,22 @@ use crate::scene::camera::check_size;
 use crate::scene::{Detail, Shading};
 
 impl Definition {
-    /// Reads a definition.
+    /// Reads the definition at `path`.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] if there is none, [`Error::Malformed`] if it is no study; the message names the key.
+    /// [`Error::Read`] if the file cannot be read, [`Error::Malformed`] if it does not define a
+    /// study; the message names the key.
     pub fn read(path: &Path) -> Result<Self> {
         let text = text(path)?;
         Self::parse(&text, path)
     }
 
-    /// A definition from its text; `path` is where it came from.
+    /// Parses a definition; `path` is its file, for messages and for the paths in it.
     ///
     /// # Errors
     ///
-    /// As [`read`](Self::read).
+    /// [`Error::Malformed`], as for [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let mut definition: Self = toml::from_str(text).map_err(|e| Error::malformed(path, located(text, &e)))?;
         definition.folder = path.parent().unwrap_or(Path::new("")).to_owned();
@@ -34,7 +35,7 @@ impl Definition {
         Ok(definition)
     }
 
-    /// What TOML's types do not say.
+    /// Checks the rules that the types of the TOML keys do not express.
     fn check(&self) -> Result<(), String> {
         sized("size", Some(self.size))?;
         sized("quick.size", self.quick.size)?;
@@ -57,7 +58,7 @@ impl Definition {
             if let Some(config) = other {
                 let (scene, config) = (&scene.name, &config.name);
                 return Err(format!(
-                    "scene {scene:?}: surfels: of a file that is read in parts cuts of a size are drawn, and config {config:?} draws none"
+                    "scene {scene:?}: surfels: a file that is read in parts is drawn in cuts of a given size: give config {config:?} a lod size above 0"
                 ));
             }
         }
@@ -71,12 +72,12 @@ impl Definition {
     }
 }
 
-/// The names, which must be some, some of them for a quick run, and all different.
+/// Returns the names; fails if two are equal or none belongs to a quick run.
 fn unique<'a>(table: &str, names: impl Iterator<Item = (&'a String, bool)>) -> Result<BTreeSet<&'a String>, String> {
     let (mut seen, mut quick) = (BTreeSet::new(), false);
     for (name, of_quick) in names {
         if !seen.insert(name) {
-            return Err(format!("{table}: two are called {name:?}"));
+            return Err(format!("{table}: two are called {name:?}: rename one"));
         }
         quick |= of_quick;
     }
@@ -87,8 +88,8 @@ fn sized(key: &str, size: Option<[u32; 2]>) -> Result<(), String> {
     size.map_or(Ok(()), |[width, height]| check_size(width, height).map_err(|e| format!("{key}: {e}")))
 }
 
-/// The most runs, as of `epsplat bench --runs`, cameras of a scene, and rays across a pixel: their
-/// times and frames are kept.
+/// Upper limits of timed runs (also for `epsplat bench --runs`), cameras of a scene, and rays
+/// across a pixel: their times and frames are held in memory.
 const MOST_RUNS: u32 = 10_000;
 const MOST_VIEWS: u32 = 1000;
 const MOST_RAYS: u32 = 256;
@@ -105,7 +106,7 @@ fn positive(key: &str, value: Option<f64>) -> Result<(), String> {
 }
 
 fn not_beside(key: &str, given: bool, other: &str) -> Result<(), String> {
-    if given { Err(format!("{key}: it cannot be given beside {other}")) } else { Ok(()) }
+    if given { Err(format!("{key}: it cannot be combined with {other}")) } else { Ok(()) }
 }
 
 impl SceneEntry {
@@ -114,22 +115,22 @@ impl SceneEntry {
         self.check_sweeps()?;
         let placed = self.surfels.samples() && self.surfels != Making::Hybrid;
         if self.lookup && (self.texture.is_none() || !placed) {
-            return Err("lookup: it needs a texture, and surfels that are sampled with texture coordinates".into());
+            return Err("lookup: it needs a texture and surfels that are samples with texture coordinates".into());
         }
         if self.texture.is_some() && !self.surfels.samples() && !self.truth {
-            return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
+            return Err("texture: it needs a mesh that is sampled, or truth = true".into());
         }
         let stratified = [Making::Sample, Making::Projected, Making::Caps, Making::Scanned];
         if self.priority.is_some() && !(stratified.contains(&self.surfels) && self.file.is_some()) {
-            return Err("priority: it is of samples of a mesh that voxels hand out".into());
+            return Err("priority: it needs a mesh file and surfels = sample, projected, caps or scanned".into());
         }
         if self.simplify.is_some() && !(self.surfels.samples() && self.surfels != Making::Hybrid) {
-            return Err("simplify: it is of samples of a mesh".into());
+            return Err("simplify: it needs surfels that are samples of a mesh".into());
         }
         not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
         not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
         if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {
-            return Err("eye: target and up need it".into());
+            return Err("eye: it must be given if target or up is".into());
         }
         within("views", self.views, MOST_VIEWS)?;
         sized("size", self.size)?;
@@ -141,7 +142,7 @@ impl SceneEntry {
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
         if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {
-            return Err("opacity: it is 0 to 1".into());
+            return Err("opacity: it must be 0 to 1".into());
         }
         not_beside(
             "classes",
@@ -152,22 +153,22 @@ impl SceneEntry {
         positive("most_fragments", self.most_fragments)
     }
 
-    /// What surfels are made of, and what is said of that.
+    /// Checks `file` and `shape`, and the keys that go with only one of them.
     fn check_source(&self) -> Result<(), String> {
         match (&self.file, &self.shape) {
-            (Some(_), Some(_)) => return Err("shape: a scene has either a file or a shape".into()),
+            (Some(_), Some(_)) => return Err("shape: give the scene a file or a shape, not both".into()),
             (None, None) => return Err("shape: a scene needs a file or a shape".into()),
             (Some(file), None) => {
                 let counts = self.count.is_some() || self.quick_count.is_some();
                 if self.surfels.samples() && self.count.is_none() {
-                    return Err("count: a mesh is sampled at a number of points".into());
+                    return Err("count: sampled surfels need their number".into());
                 }
                 not_beside("count", counts && !self.surfels.samples(), "file, unless surfels are sampled")?;
-                not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
+                not_beside("radius", self.radius.is_some(), "file: use footprint_px")?;
                 not_beside("noise", self.noise.is_some(), "file")?;
                 not_beside("shirt", self.shirt.is_some(), "file")?;
                 let of_shape = matches!(self.surfels, Making::Gaussians | Making::Triangles);
-                not_beside("surfels = gaussians or triangles", of_shape, "file: they are made of a shape")?;
+                not_beside("surfels = gaussians or triangles", of_shape, "file: give a shape")?;
                 self.check_levels()?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
@@ -176,30 +177,30 @@ impl SceneEntry {
                 }
             }
             (None, Some(_)) if self.texture.is_some() || self.source.is_some() => {
-                return Err("texture, source: they are of a file".into());
+                return Err("texture, source: they need a file, not a shape".into());
             }
             (None, Some(_)) if !Making::OF_SHAPES.contains(&self.surfels) => {
-                return Err("surfels: of a shape they are scanned, gaussians, triangles, or as generated".into());
+                return Err("surfels: for a shape, leave it out or give scanned, gaussians or triangles".into());
             }
             (None, Some(_)) if self.surfels == Making::Triangles && self.ortho.is_none() => {
-                return Err("ortho: the triangles of a shape are seen in parallel".into());
+                return Err("ortho: surfels = triangles needs an orthographic camera".into());
             }
             (None, Some(_)) if self.surfels == Making::Triangles && (self.truth || self.triangles.is_some()) => {
-                return Err("truth, triangles: the triangles of a shape are drawn alone".into());
+                return Err("truth, triangles: they cannot be combined with surfels = triangles".into());
             }
             (None, Some(_)) if self.surfels == Making::Gaussians && self.shading != Some(Shading::Unlit) => {
-                return Err("shading: Gaussians have the colours that pictures of them show: it is unlit".into());
+                return Err("shading: Gaussians need shading = unlit, as their colours include the light".into());
             }
             (None, Some(_)) if self.surfels == Making::Gaussians && (self.noise.is_some() || self.radius.is_some()) => {
-                return Err("noise, radius: Gaussians are generated as they are".into());
+                return Err("noise, radius: they cannot be combined with surfels = gaussians".into());
             }
-            (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
+            (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs a number of surfels".into()),
             (None, Some(_)) => {}
         }
         Ok(())
     }
 
-    /// What is said of a file that is read in parts.
+    /// Checks the keys of a file that is read in parts.
     fn check_levels(&self) -> Result<(), String> {
         if self.surfels != Making::Levels {
             return Ok(());
@@ -213,15 +214,15 @@ impl SceneEntry {
             ("rims", self.rims != Rims::Curved),
         ];
         for (key, given) in of_all {
-            not_beside(key, given, "surfels = levels: it is of all surfels")?;
+            not_beside(key, given, "surfels = levels: it needs all surfels")?;
         }
         if self.eye.is_none() {
-            return Err("eye: of a file that is read in parts the view must be known".into());
+            return Err("eye: it must be given for a file that is read in parts".into());
         }
         Ok(())
     }
 
-    /// Numbers and sizes that a scene is rendered with, one after the other.
+    /// Checks the lists of a sweep: numbers of surfels and footprints.
     fn check_sweeps(&self) -> Result<(), String> {
         for (key, counts) in [("count", &self.count), ("quick_count", &self.quick_count)] {
             let counts = counts.as_ref().map(OneOrMany::values);
@@ -252,7 +253,7 @@ impl Config {
     }
 }
 
-/// What is wrong, and in which line and key of `text`.
+/// Formats a TOML error with the line and the key of `text` that it is in.
 fn located(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', ", ");
     let Some(span) = error.span() else { return message };
@@ -319,7 +320,7 @@ mod tests {
         assert_eq!(quick.scenes[0].count, Some(OneOrMany::One(5)));
     }
 
-    /// What is wrong is told with the file and the key.
+    /// Each error names the file and the key.
     #[test]
     fn bad_definitions_are_refused_by_file_and_key() {
         let cases: &[(&str, &[&str])] = &[

@@ -1,4 +1,4 @@
-//! Runs a study: on each scene all configurations take turns, so that a machine that slows down slows all of them.
+//! Runs a study. The configurations of a scene take turns, so that a slowdown affects all alike.
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -18,27 +18,30 @@ use crate::render::{Backend, Renderer};
 use crate::report::{Measurement, Study, Summary};
 use crate::scene::{Camera, Scene};
 
-/// What a study gave.
+/// The outcome of a study.
 #[derive(Debug)]
 pub struct Outcome {
-    /// The measurements. Command and date are the caller's to fill in.
+    /// The measurements. The caller sets the command and the date.
     pub study: Study,
-    /// What was left out or done otherwise, and why: a sentence each.
+    /// One sentence for each configuration that was skipped or rendered twice, with the reason.
     pub notes: Vec<String>,
-    /// Configurations that missed their error limit or gave different bits in two runs: a sentence each.
+    /// One sentence for each configuration that missed its error limit or was not reproducible.
     pub failures: Vec<String>,
 }
 
-/// Renders every configuration on every scene. Times are those of whole frames, from the uploaded scene to the frame in host
-/// memory; errors are against the f64 reference with the same options, over the pixels that it does not excuse
-/// ([`Comparison::rmse_decided`](crate::metrics::Comparison::rmse_decided)), and the worst of all cameras.
+/// Renders every configuration on every scene.
 ///
-/// Each configuration of a scene keeps its own buffers on the device while the scene is rendered. What the adapter cannot
-/// run is left out with a note.
+/// Times are of whole frames, from the uploaded scene to the frame in host memory. Errors are the
+/// worst over the cameras against the f64 reference with the same options; the pixels that it
+/// excuses do not count ([`Comparison::rmse_decided`](crate::metrics::Comparison::rmse_decided)).
+///
+/// All configurations of a scene hold their device buffers at the same time. Configurations that
+/// the adapter cannot run are skipped with a note.
 ///
 /// # Errors
 ///
-/// [`Error::NoAdapter`] if a configuration needs a `gpu` and there is none, and those of reading and rendering.
+/// [`Error::NoAdapter`] if a configuration needs an adapter and `gpu` is `None`, and any error of
+/// reading and rendering.
 pub fn run(definition: &Definition, gpu: Option<&Backend>, progress: &dyn Progress) -> Result<Outcome> {
     let mut outcome = begin(definition, gpu)?;
     for entry in &definition.scenes {
@@ -49,10 +52,10 @@ pub fn run(definition: &Definition, gpu: Option<&Backend>, progress: &dyn Progre
     Ok(outcome)
 }
 
-/// A study of which nothing is measured yet.
+/// Starts the outcome of a study, without measurements.
 pub(super) fn begin(definition: &Definition, gpu: Option<&Backend>) -> Result<Outcome> {
     if definition.needs_gpu() && gpu.is_none() {
-        return Err(Error::NoAdapter(format!("the study {} renders on an adapter", definition.name)));
+        return Err(Error::NoAdapter(format!("the study {} has configurations that need an adapter", definition.name)));
     }
     Ok(Outcome {
         study: Study {
@@ -70,7 +73,7 @@ pub(super) fn begin(definition: &Definition, gpu: Option<&Backend>) -> Result<Ou
     })
 }
 
-/// Adds what the configurations show on one point of a scene's sweep.
+/// Measures the configurations on one point of a scene's sweep and adds the results to `outcome`.
 pub(super) fn measure(
     definition: &Definition,
     (entry, point): (&SceneEntry, Point),
@@ -83,13 +86,13 @@ pub(super) fn measure(
 }
 
 impl<'a> Case<'a> {
-    /// How many surfels the scene has; of one that is read in part all of its file.
+    /// Number of surfels of the scene; if it is read in parts, of the whole file.
     fn surfels(&self) -> u64 {
         let scene = &self.staged.scene;
         scene.part_of.as_ref().map_or(scene.surfels.len() as u64, |whole| whole.surfels.into())
     }
 
-    /// How many surfels a device holds; of a scene that is read in part the nodes that were read, too.
+    /// Number of surfels on the device, plus the nodes that were read of a scene read in parts.
     fn held(&self) -> u64 {
         let Scene { surfels, hierarchy, part_of, .. } = &self.staged.scene;
         let nodes = hierarchy.as_ref().filter(|_| part_of.is_some()).map_or(0, |tree| tree.nodes.len());
@@ -103,7 +106,7 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// A configuration on this scene, in words.
+    /// Names a configuration with its scene, for messages.
     fn named(&self, config: &Config) -> String {
         let footprint = self.staged.footprint_px;
         format!("{} on {} ({} surfels of {footprint:.2} px)", config.name, self.entry.name, self.surfels())
@@ -143,7 +146,7 @@ impl<'a> Case<'a> {
         Ok(())
     }
 
-    /// One frame of each to warm up, then the runs, in each of which all take their turn.
+    /// Renders a warm-up turn of each configuration, then the timed runs, in which they take turns.
     fn time<'p>(
         &self,
         plans: &'p [(&'p Config, RenderOptions)],
@@ -170,7 +173,7 @@ impl<'a> Case<'a> {
             };
             if lap.overflows > 0 {
                 let count = lap.overflows;
-                notes.push(format!("{}: {count} sums overflowed, and frames were rendered twice", self.named(config)));
+                notes.push(format!("{}: {count} sums overflowed, so frames were rendered twice", self.named(config)));
             }
             let first: Vec<u64> = lap.frames.iter().map(fingerprint).collect();
             let timed = Timed {
@@ -188,7 +191,7 @@ impl<'a> Case<'a> {
         let beside = runners.len().saturating_sub(1);
         for _ in 0..self.definition.runs {
             for (renderer, first, timed) in &mut runners {
-                // Frames of the run before make room.
+                // Frees the frames of the previous run before the next.
                 timed.frames.clear();
                 let lap = self.turn(renderer).map_err(|unfit| self.failed(timed.config, beside, unfit.into()))?;
                 timed.total_ms.push(lap.total_ms);
@@ -204,7 +207,7 @@ impl<'a> Case<'a> {
         Ok(runners.into_iter().map(|(_, _, timed)| timed).collect())
     }
 
-    /// Whether the adapter has what a configuration needs.
+    /// Fails if the adapter lacks a feature or limit that the configuration needs.
     fn check(&self, config: &Config, options: &RenderOptions) -> Result<(), Unfit> {
         let Backend::Gpu { gpu, .. } = self.backend(config) else { return Ok(()) };
         let facts = Facts::of(&self.staged.scene);
@@ -215,7 +218,7 @@ impl<'a> Case<'a> {
         outcome.map_err(Unfit::Adapter)
     }
 
-    /// A frame from each camera.
+    /// Renders a frame from each camera.
     fn turn(&self, renderer: &mut Renderer<&Scene, &Backend>) -> Result<Lap, Unfit> {
         let cameras: &[Camera] = &self.staged.cameras;
         let mut lap = Lap::default();
@@ -238,11 +241,11 @@ impl<'a> Case<'a> {
         Ok(lap)
     }
 
-    /// An error of the graphics stack says which configuration met it, and that it was not alone.
+    /// Adds to a graphics error the configuration and how many others hold device buffers.
     fn failed(&self, config: &Config, beside: usize, error: Error) -> Error {
         match error {
             Error::Gpu { adapter, what } => {
-                let others = format!("beside {beside} configurations that hold their buffers");
+                let others = format!("while {beside} other configurations held their buffers");
                 Error::Gpu { adapter, what: format!("{what} ({}, {others})", self.named(config)) }
             }
             other => other,
@@ -256,9 +259,9 @@ impl<'a> Case<'a> {
         reconstruction: BTreeMap<String, f64>,
     ) -> Measurement {
         let config = timed.config;
-        // There is at least one camera, and all have one size.
+        // No default is used: there is at least one camera, and all have the same image size.
         let (width, height) = self.staged.cameras.first().map_or((0, 0), |camera| (camera.width, camera.height));
-        // There is at least one run.
+        // No default is used: there is at least one run.
         let total_ms = Summary::of(&timed.total_ms).unwrap_or_default();
         let passes = timed.passes.iter().filter_map(|(pass, ms)| Some((pass.clone(), Summary::of(ms)?)));
         let per_second = |count: f64| if total_ms.median > 0.0 { count / total_ms.median * 1e3 } else { 0.0 };
@@ -287,7 +290,7 @@ impl<'a> Case<'a> {
     }
 }
 
-/// What one turn of a configuration gave.
+/// The times and frames of one turn of a configuration over all cameras.
 #[derive(Default)]
 struct Lap {
     total_ms: f64,
@@ -297,11 +300,11 @@ struct Lap {
     cut: Option<f64>,
 }
 
-/// Why a configuration does not run.
+/// The reason why a configuration does not run.
 enum Unfit {
-    /// The adapter lacks a feature, or a limit is too small.
+    /// The adapter lacks a feature or exceeds a limit: the configuration is skipped.
     Adapter(Error),
-    /// Anything else.
+    /// Any other error, which ends the study.
     Failed(Error),
 }
 
@@ -313,7 +316,7 @@ impl From<Unfit> for Error {
     }
 }
 
-/// A hash of all bits of a frame.
+/// Returns a hash of all bits of a frame's colours and maps.
 fn fingerprint(frame: &Frame) -> u64 {
     let mut hasher = DefaultHasher::new();
     let mut add = |values: &[f32]| bytemuck::cast_slice::<f32, u8>(values).hash(&mut hasher);

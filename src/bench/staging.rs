@@ -1,4 +1,4 @@
-//! A scene of a study as it is rendered: surfels of the wanted size, cameras, and the surface that they stand for.
+//! Prepares a scene of a study: surfels of the wanted size, cameras, and the true surface.
 
 use std::f64::consts::{PI, TAU};
 
@@ -27,34 +27,34 @@ use crate::surfels::{
 };
 use crate::truth::Surface;
 
-/// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
+/// One point of a scene's sweep: the number of surfels, and their mean radius in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
-    /// None for a file.
+    /// Number of surfels of a shape or samples of a mesh; `None` if the scene gives no number.
     pub count: Option<u64>,
-    /// None for the radius that the surfels have.
+    /// Mean radius, pixels; `None` keeps the radii that the surfels have.
     pub footprint_px: Option<f64>,
 }
 
-/// A scene as it is rendered.
+/// A scene that is ready to render.
 pub(super) struct Staged {
-    /// The surfels.
+    /// The surfels and triangles.
     pub scene: Scene,
-    /// At least one.
+    /// The cameras; at least one.
     pub cameras: Vec<Camera>,
-    /// What the surfels stand for, and the triangles beside them, if the study asks for ground truth.
+    /// The true surface of the surfels and the triangles beside them; `None` without ground truth.
     pub surface: Option<Surface>,
-    /// Two inputs lie one over the other.
+    /// Whether a second input lies over the first ([`SceneEntry::shirt`]).
     pub dressed: bool,
-    /// Mean radius of the splats, pixels, as [`SceneEntry::footprint_px`] counts it.
+    /// Mean splat radius in pixels, defined as for [`SceneEntry::footprint_px`].
     pub footprint_px: f64,
 }
 
-/// Memory that a surfel of a shape takes until it is in a scene, and a pixel of a frame, bytes.
+/// Memory in bytes: per surfel of a shape until it is in a scene, and per pixel of a frame.
 const OF_SURFEL: u64 = 250;
 const OF_PIXEL: u64 = 16;
 
-/// The points of a scene's sweep, each count with each footprint.
+/// Returns the points of a scene's sweep: each count with each footprint, up to `most_fragments`.
 pub(super) fn points(entry: &SceneEntry) -> Vec<Point> {
     fn each<T: Copy>(values: &Option<OneOrMany<T>>) -> Vec<Option<T>> {
         values.as_ref().map_or_else(|| vec![None], |all| all.values().into_iter().map(Some).collect())
@@ -69,7 +69,7 @@ pub(super) fn points(entry: &SceneEntry) -> Vec<Point> {
     each(&entry.count).into_iter().flat_map(of).filter(small_enough).collect()
 }
 
-/// Makes the scene; of a file that has nothing to show its errors tell.
+/// Prepares `point` of the scene. If the file has nothing to show, the error names the file.
 pub(super) fn stage(
     definition: &Definition,
     entry: &SceneEntry,
@@ -111,7 +111,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
             let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
             (Points { radii, ..points }, surface, None)
         }
-        // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
+        // Unreachable: a definition without file and shape is refused. Here it is an empty scene.
         (None, None) => (Points::default(), None, None),
     };
     let points = match entry.simplify {
@@ -161,7 +161,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
 }
 
-/// Makes all disks so many times as large; levels of detail would be of the old ones.
+/// Scales all disks by `factor`. The levels of detail are dropped, as they have the old sizes.
 fn enlarge(scene: &mut Scene, factor: f32) {
     scene.hierarchy = None;
     let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
@@ -170,7 +170,7 @@ fn enlarge(scene: &mut Scene, factor: f32) {
     }
 }
 
-/// Points, and if a shirt is to be so far out along their normals, those of that.
+/// Returns `points` and, with a `shirt`, a copy that is moved along the normals by that distance.
 fn dressed(points: Points, shirt: Option<f64>) -> Vec<Points> {
     let Some(out) = shirt else { return vec![points] };
     let mut moved = points.clone();
@@ -180,7 +180,7 @@ fn dressed(points: Points, shirt: Option<f64>) -> Vec<Points> {
     vec![points, moved]
 }
 
-/// What `epsplat simplify --shape cap` leaves of points.
+/// Simplifies points as `epsplat simplify --shape cap` does.
 fn simplified(points: Points, tolerance: Tolerance, progress: &dyn Progress) -> Result<Points> {
     let (scene, _, coordinates) = build_at_vertices(vec![points], progress)?;
     let options = simplify::Options { tolerance, shape: SplatShape::Cap, relaxations: 0 };
@@ -188,7 +188,7 @@ fn simplified(points: Points, tolerance: Tolerance, progress: &dyn Progress) -> 
     Ok(simplify::points(&scene, coordinates, SplatShape::Cap))
 }
 
-/// The triangles beside surfels, and the surface that they stand for if rays are to meet it.
+/// Returns the triangles beside the surfels, and their true surface if `entry.truth` is set.
 fn beside(
     definition: &Definition,
     entry: &SceneEntry,
@@ -205,19 +205,21 @@ fn beside(
     }
 }
 
-/// The path of one of a scene's files.
+/// Returns the path of a scene's file; fails if it is missing and the scene names a source for it.
 pub(super) fn present(definition: &Definition, entry: &SceneEntry, file: &Path) -> Result<PathBuf> {
     let path = definition.path_of(file);
     match &entry.source {
         Some(source) if !path.exists() => {
-            let what = format!("the scene {:?} needs it, and it is not there: get it from {source}", entry.name);
+            let what = format!("the scene {:?} needs this missing file: get it from {source}", entry.name);
             Err(Error::malformed(&path, what))
         }
         _ => Ok(path),
     }
 }
 
-/// The surfels that a scene makes of its file, the triangles of the mesh if the scene asks for ground truth, and those that are drawn.
+/// Returns the surfels of a file, its true surface and the triangles to draw.
+///
+/// The surface is `None` unless the scene asks for ground truth; triangles remain for hybrids only.
 fn of_file(
     file: &Path,
     entry: &SceneEntry,
@@ -233,7 +235,7 @@ fn of_file(
         }
         false => None,
     };
-    // The whole file is measured.
+    // Strict: a file with unreadable parts is an error, as a study measures all of it.
     let read = |file| io::read_with(file, ReadOptions { strict: true, ..ReadOptions::default() }, progress);
     let normals = || {
         let kept = |Points { positions, up, normals, .. }| Points { positions, up, normals, ..Points::default() };
@@ -252,7 +254,8 @@ fn of_file(
     let mut left = None;
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
-        // Gaussians and triangles are made of shapes, as reading a definition makes sure, and parts of files are staged otherwise.
+        // Unreachable for gaussians and triangles, which a definition allows for shapes only, and
+        // for levels, which [`in_part::stage`] reads.
         Making::File | Making::Gaussians | Making::Triangles | Making::Levels => {
             let classes = entry.classes.unwrap_or_default();
             let points =
@@ -291,13 +294,13 @@ fn of_file(
     Ok((points, surface, left))
 }
 
-/// What `epsplat hybrid --pixels` makes of a mesh.
+/// Divides a mesh as `epsplat hybrid --pixels` does.
 fn divided(mesh: &Mesh, pixels: usize, progress: &dyn Progress) -> Result<Hybrid> {
     let pixel = hybrid::pixel(mesh, pixels as f64);
     pixel.map_or_else(|| Ok(Hybrid::default()), |pixel| hybrid::hybrid(mesh, pixel, progress))
 }
 
-/// What `epsplat generate` writes, with disks of `radius` mean spacings.
+/// Returns the points that `epsplat generate` writes, with disks of `radius` mean spacings.
 fn of_shape(shape: Shape, count: u64, radius: Option<f64>) -> Points {
     let samples = generate(shape, count);
     let factor = radius.map_or(1.0, |radius| radius / RADIUS_IN_SPACINGS) as f32;
@@ -311,19 +314,21 @@ fn of_shape(shape: Shape, count: u64, radius: Option<f64>) -> Points {
     }
 }
 
-/// Moves each point along its normal by a Gaussian of standard deviation `sigma`, world units: always by the same.
+/// Moves each point along its normal by a Gaussian of standard deviation `sigma`, world units.
+///
+/// The offset depends on the point's index only, so it is the same in every run.
 fn scatter(points: &mut Points, sigma: f64) {
     let normals = points.normals.iter().flatten();
     for (index, (position, normal)) in points.positions.iter_mut().zip(normals).enumerate() {
         let mut random = Random::stream(NOISE_SEED, index as u64);
-        // Box and Muller 1958; the logarithm is of no 0.
+        // Box and Muller 1958. `number()` is below 1, so the argument of the logarithm is positive.
         let (radius, turn) = ((-2.0 * (1.0 - random.number()).ln()).sqrt(), TAU * random.number());
         let offset = sigma * radius * turn.cos();
         *position = (DVec3::from(*position) + offset * DVec3::from(normal.map(f64::from))).to_array();
     }
 }
 
-/// Of the numbers that points are scattered by.
+/// Seed of the noise in [`scatter`].
 const NOISE_SEED: u64 = 4;
 
 #[cfg(test)]
@@ -361,7 +366,7 @@ mod tests {
         let (_, far) = staged("shape = \"sphere\"\ncount = 1000\nfill = 0.1");
         let ratio = |of: &[Staged]| of[0].footprint_px / plain[0].footprint_px;
         assert!((ratio(&thick) - 2.0).abs() < 1e-6);
-        // The nearer half is enlarged the more, the nearer the camera is.
+        // Only approximate: perspective enlarges the nearer half of the sphere.
         assert!((ratio(&far) - 0.1).abs() < 0.02, "{}", ratio(&far));
         let (_, flat) = staged("shape = \"plane\"\ncount = 100\northo = 4\nfill = 0.5");
         assert!((flat[0].footprint_px - 0.3 * 100.0 / 4.0 * 0.5).abs() < 1e-6);

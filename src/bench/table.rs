@@ -1,19 +1,23 @@
-//! A study's outcome as text: for a terminal, and as Markdown for a README.
+//! Formats the outcome of a study: aligned text for a terminal, Markdown for a README.
 
 use super::config::Config;
 use super::definition::Definition;
 use crate::plan::{BlendFormat, Features};
 use crate::report::{Measurement, Study};
 
-/// A column: its head, and its cell for a measurement.
+/// A column: its header, and a function that formats its cell for a measurement.
 type Column<'a> = (String, Box<dyn Fn(&Measurement) -> String + 'a>);
 
-/// What stands where nothing was measured.
+/// The cell of a value that was not measured.
 const NONE: &str = "-";
 
-/// Every measurement in a line: scene, configuration, milliseconds a frame (median ± median absolute deviation), the time as
-/// a multiple of the baseline's, largest error and RMSE against the f64 reference, PSNR, mean errors of depth and normal, holes and leaks against ground
-/// truth, PSNR against what it approximates, the surfels of a cut, and how many times as fast as the fastest rasteriser of the same error. Columns that would be empty are left out.
+/// Formats a table with one line per measurement.
+///
+/// Columns: scene, configuration, surfels, footprint, ms per frame (median ± median absolute
+/// deviation), time over the baseline's, largest error and RMSE against the f64 reference; against
+/// ground truth PSNR, SSIM, mean errors of depth and normal, holes and leaks; PSNR against the
+/// approximated configuration, surfels of a cut, speed over the fastest rasteriser of at most the
+/// same error, and error limit. Columns that would be empty are left out.
 pub fn text(definition: &Definition, study: &Study) -> String {
     let all = &study.measurements;
     let optional = |value: Option<f64>, digits: usize| value.map_or(NONE.to_owned(), |v| format!("{v:.digits$}"));
@@ -60,8 +64,10 @@ pub fn text(definition: &Definition, study: &Study) -> String {
     aligned(&std::iter::once(heads).chain(rows).collect::<Vec<Vec<String>>>())
 }
 
-/// A table in Markdown for each scene: configuration, time as a multiple of the baseline's, largest error and RMSE against
-/// the f64 reference, whether the bits are the same in any order, and which adapters run it.
+/// Formats a Markdown table per scene.
+///
+/// Columns: configuration, time over the baseline's, largest error and RMSE against the f64
+/// reference, whether the bits are the same in any surfel order, and which adapters run it.
 pub fn markdown(definition: &Definition, study: &Study) -> String {
     let baseline = definition.baseline.as_deref().unwrap_or("baseline");
     let mut text = String::new();
@@ -83,7 +89,7 @@ pub fn markdown(definition: &Definition, study: &Study) -> String {
     text
 }
 
-/// Which adapters run a configuration.
+/// Names the adapters that run `config`.
 fn runs_on(config: &Config) -> &'static str {
     let raster = config.settings(None).raster;
     match (raster.map(|raster| raster.format), config.accumulator().map(|sums| sums.row().features)) {
@@ -95,12 +101,12 @@ fn runs_on(config: &Config) -> &'static str {
     }
 }
 
-/// Whether two measurements differ in the configuration alone.
+/// Whether two measurements are of the same scene, surfel count and footprint.
 fn same_case(a: &Measurement, b: &Measurement) -> bool {
     a.scene == b.scene && a.surfels == b.surfels && a.footprint_px == b.footprint_px
 }
 
-/// The median time as a multiple of the baseline's on the same scene; none without a baseline there.
+/// Returns the median time over the baseline's in the same case; `None` without a baseline.
 pub(super) fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
     let baseline = definition.baseline.as_ref()?;
     let base = study.measurements.iter().find(|m| m.config == *baseline && same_case(m, of))?;
@@ -111,7 +117,7 @@ fn error(value: Option<f64>) -> String {
     value.map_or(NONE.to_owned(), |value| format!("{value:.1e}"))
 }
 
-/// Columns as wide as their widest cell; names to the left, numbers to the right.
+/// Pads the columns to their widest cell: the first two to the left, the others to the right.
 fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);

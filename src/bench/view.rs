@@ -1,4 +1,4 @@
-//! Where the scenes of a study are seen from, and how large.
+//! The cameras of a study's scenes, and the size of their splats in pixels.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Lens, Projection, Scene};
 
-/// The first camera as the scene's entry says, and the others around the scene's centre.
+/// Returns the cameras of `entry`: the first, and copies turned around the scene's centre.
 pub(super) fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Result<Vec<Camera>> {
     let lens = match entry.ortho {
         Some(height) => Lens::OrthographicHeight(height),
@@ -24,7 +24,7 @@ pub(super) fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Sce
     };
     let fill = entry.fill.unwrap_or(1.0);
     match first.projection {
-        // Along the line of sight, so that the target stays where it is in the image.
+        // Moves the eye along the line of sight, so that the target keeps its place in the image.
         Projection::Pinhole => first.eye = target + (first.eye - target) / fill,
         Projection::Orthographic => (first.fx, first.fy) = (first.fx * fill, first.fy * fill),
     }
@@ -36,8 +36,10 @@ pub(super) fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Sce
     Ok((0..entry.views).map(turned).collect())
 }
 
-/// The mean over surfels and cameras of the longer half-axis in pixels, at the depth of the centre and as if seen face-on;
-/// surfels behind the near depth have none. Added in order, so that it is always the same.
+/// The mean footprint: the longer half-axis of a splat in pixels, over all surfels and cameras.
+///
+/// Each surfel is taken as seen face-on at the depth of its centre. Surfels nearer than the near
+/// depth are skipped. The sum is in a fixed order, so the result is reproducible.
 pub(super) fn footprint(scene: &Scene, cameras: &[Camera]) -> f64 {
     let (mut sum, mut seen) = (0.0, 0u64);
     for camera in cameras {

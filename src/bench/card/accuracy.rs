@@ -1,4 +1,4 @@
-//! The hard cases on this adapter, as `epsplat hardcases` judges them.
+//! Runs the hard cases on the adapter, judged as by `epsplat hardcases`.
 
 use std::time::Instant;
 
@@ -8,47 +8,47 @@ use super::{Card, record};
 use crate::error::Result;
 use crate::hardcases::{self, Outcome, Row, Verdict};
 
-/// The part of the time left that it may take.
+/// The fraction of the remaining time that this step may use.
 const SHARE: f64 = 0.4;
 
-/// A quick run has one of so many cases, with the first accumulator.
+/// A quick run renders every eighth case, with the first accumulator only.
 const QUICK_STEP: usize = 8;
 
-/// The file of all rows, as `epsplat hardcases --json` writes it.
+/// The file with all rows, in the format of `epsplat hardcases --json`.
 pub(super) const FILE: &str = "hardcases.json";
 
-/// How the hard cases ended: a row is a case with an accumulator.
+/// The results of the hard cases. A row is a case rendered with one accumulator.
 #[derive(Clone, Debug, Serialize)]
 pub struct Accuracy {
-    /// Rows that keep their bounds.
+    /// Rows within their bounds.
     pub passed: usize,
-    /// Rows that exceed a bound as expected of their accumulator.
+    /// Rows that exceed a bound as expected for their accumulator.
     pub expected_failures: usize,
-    /// Rows that failed otherwise.
+    /// Rows that failed unexpectedly.
     pub failed: usize,
     /// Cases that were rendered.
     pub cases: usize,
-    /// The row that passed and used up most of a bound.
+    /// The row that came nearest to a bound and passed.
     pub worst: Option<Worst>,
-    /// Of each row that failed its case, its accumulator, and what.
+    /// One sentence per failed row: case, accumulator and reason.
     pub failures: Vec<String>,
 }
 
-/// How near an image came to its bound.
+/// The largest share of a bound that an image used.
 #[derive(Clone, Debug, Serialize)]
 pub struct Worst {
     /// The case's name.
     pub case: String,
     /// The accumulator's name.
     pub accumulator: &'static str,
-    /// The map.
+    /// The name of the map.
     pub map: &'static str,
-    /// Its largest error as a share of the same pixel's bound.
+    /// The largest error of the map as a share of the bound at the same pixel.
     pub used: f64,
 }
 
 impl Accuracy {
-    /// That of the `rows` of so many `cases`.
+    /// Summarises the `rows` of the `cases` cases.
     pub fn of(rows: &[Row], cases: usize) -> Self {
         let Outcome { passed, expected_failures, failed, .. } = Outcome::of("", rows);
         let worst = |row: &Row| {
@@ -71,7 +71,7 @@ impl Accuracy {
     }
 }
 
-/// Renders and judges the cases, as many as the time allows.
+/// Renders and judges as many cases as the time allows.
 pub(super) fn check(card: &mut Card<'_>) -> Result<()> {
     let deadline = card.budget.share(SHARE);
     let all = hardcases::cases()?;

@@ -1,10 +1,11 @@
-//! The least that the passes of a frame move, bytes.
+//! The least number of bytes that the passes of a frame move.
 //!
-//! A pass reads what the passes before it left and writes what the next ones read; each byte of that counts once, as if what is
-//! touched again came from a cache. So a pass moves more, by as much as caches miss, and where the data fit a cache it may be
-//! faster than memory.
+//! Every byte that a pass reads from earlier passes or writes for later ones counts once, as if
+//! repeated accesses hit a cache. A pass moves more where caches miss, and may be faster than
+//! memory where its data fit in a cache.
 //!
-//! With n surfels in b batches, d of them drawn, p pixels, c of them covered, S words of sums and W of the image a pixel:
+//! For n surfels in b batches, d of them drawn, p pixels, c of them covered, and per pixel S words
+//! of sums and W words of the image, in bytes:
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
@@ -15,50 +16,51 @@
 //! | resolve | 4 c + 4 S c | 4 W c |
 //! | accumulate where tiles gather and resolve | 4 c | 4 W c |
 //!
-//! A surfel has 36 bytes ([`Surfel`]), or 48 where its centre has trailing digits, its splat 64 ([`Splat`]), a batch's ball 16.
-//! Nearest depths, a word a pixel, are all read for what hides; their writing, by atomics, is left out, as is what was cleared
-//! before a pass. Colours and half-axes that accumulate reads of splats that are not hidden are left out too: how many those are is
-//! not known here.
+//! A surfel has 36 bytes ([`Surfel`]), or 48 if centres have low-order parts, its splat 64
+//! ([`Splat`]), and the bounding sphere of a batch 16. Visibility reads all nearest depths, one
+//! word per pixel, to find hidden splats. Three things are left out: the atomic writes of depths,
+//! the clears before a pass, and the colours and half-axes that accumulate reads of visible splats,
+//! whose number is not known here.
 
 use std::collections::BTreeMap;
 
 use crate::gpu::layout::{BATCH, Splat};
 use crate::scene::Surfel;
 
-/// Bytes of a word.
+/// Size of a word, bytes.
 const WORD: u64 = 4;
 
-/// Bytes of a batch's bounding ball.
+/// Size of a batch's bounding sphere, bytes.
 const BALL: u64 = 16;
 
-/// Bytes of the trailing digits of a centre.
+/// Size of the low-order part of a centre, bytes.
 const LOW: u64 = 12;
 
-/// What a frame's passes have to move, as numbers of records.
+/// The numbers of records that the passes of a frame read and write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
-    /// Surfels of the scene.
+    /// Number of surfels in the scene.
     pub surfels: u64,
-    /// Splats that may touch a pixel.
+    /// Number of splats that may touch a pixel.
     pub drawn: u64,
-    /// Pixels of the image.
+    /// Number of pixels in the image.
     pub pixels: u64,
-    /// Pixels that show something.
+    /// Number of pixels that are not background.
     pub covered: u64,
-    /// u32 words of a pixel's sums.
+    /// Size of a pixel's sums, u32 words.
     pub sum_words: u64,
-    /// u32 words of a pixel in the image.
+    /// Size of a pixel in the image, u32 words.
     pub image_words: u64,
-    /// Centres have trailing digits.
+    /// Whether centres have low-order parts, which double their precision.
     pub doubled: bool,
-    /// Batches are culled.
+    /// Whether batches are culled.
     pub culls: bool,
-    /// Tiles sum all splats and resolve their pixels: no sum is stored.
+    /// Whether tiles sum all splats and resolve their pixels, so that no sum is stored.
     pub gathers: bool,
 }
 
 impl Moved {
-    /// The least bytes of each pass, by its name.
+    /// Returns the least bytes that each pass moves, by its name.
     pub fn least(&self) -> BTreeMap<&'static str, u64> {
         let surfel = size_of::<Surfel>() as u64 + if self.doubled { LOW } else { 0 };
         let splat = size_of::<Splat>() as u64;

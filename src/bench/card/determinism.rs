@@ -1,5 +1,8 @@
-//! Images whose bits must be equal: of two frames of each accumulator that promises it, and of `fixed` however splats are drawn,
-//! whatever is left out that makes frames faster, and in whatever order surfels come.
+//! Compares images that must be bit-identical.
+//!
+//! For each deterministic accumulator: two frames of one renderer, and a frame of another. For
+//! `fixed`: its image under each organisation, without each optimisation, and from reversed
+//! surfels.
 
 use std::time::Instant;
 
@@ -12,34 +15,35 @@ use crate::plan::{ACCUMULATORS, Accumulator, Optimisation, Organisation, RenderO
 use crate::render::{Backend, Renderer};
 use crate::scene::{Colors, Maps, Scene};
 
-/// The part of the time left that it may take.
+/// The fraction of the remaining time that this step may use.
 const SHARE: f64 = 0.4;
 
-/// Surfels, and the image's side in pixels; of a quick run. There are enough surfels for batches of them to be culled.
+/// Number of surfels, and side of the image in pixels: full run, quick run. The full run has enough
+/// surfels for batches to be culled.
 const SIZES: [(u64, u32); 2] = [(200_000, 1024), (5_000, 160)];
 
-/// Mean radii of splats, pixels: small ones, and ones that tiles or workgroups draw.
+/// Mean splat radii in pixels: a small one, and one that tiles or workgroups draw.
 const FOOTPRINTS: [f64; 2] = [1.5, 12.0];
 
-/// Two images that must have the same bits.
+/// A comparison of two images that must be bit-identical.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
-    /// What is shown.
+    /// The scene, in words.
     pub scene: String,
-    /// How sums are kept.
+    /// The name of the accumulator.
     pub accumulator: &'static str,
-    /// What the second image was made with; the first is the plain one of the accumulator.
+    /// How the second image was made; the first is a plain frame with the same accumulator.
     pub what: String,
-    /// Values that are compared: four of the colour, and those of the maps, of each pixel.
+    /// Number of compared values: four of the colour and those of the maps, over all pixels.
     pub values: u64,
-    /// Values whose bits differ.
+    /// Number of values whose bits differ; all, if sizes or maps differ.
     pub differing: u64,
-    /// Whether none does.
+    /// Whether no value differs.
     pub equal: bool,
 }
 
 impl Comparison {
-    /// Of an image with another that must be the same.
+    /// Compares an image, made as `what` says, with the `expected` one.
     pub fn of(
         (scene, accumulator): (&str, Accumulator),
         what: impl Into<String>,
@@ -61,13 +65,13 @@ impl Comparison {
     }
 }
 
-/// All bits of a frame: equality of floats would take -0 for 0 and no NaN for itself.
+/// Iterates over all bits of a frame: as floats, -0 would equal 0 and NaN would differ from itself.
 fn bits(frame: &Frame) -> impl Iterator<Item = u32> + '_ {
     let maps = frame.maps().iter().collect::<Vec<_>>().into_iter().filter_map(|map| frame.map(map));
     frame.color.iter().flatten().chain(maps.flatten()).map(|value| value.to_bits())
 }
 
-/// Renders and compares, as much as the time allows.
+/// Renders and compares as many images as the time allows.
 pub(super) fn check(card: &mut Card<'_>) -> Result<()> {
     let deadline = card.budget.share(SHARE);
     let (count, side) = SIZES[usize::from(card.asked.quick)];
@@ -87,7 +91,7 @@ pub(super) fn check(card: &mut Card<'_>) -> Result<()> {
     Ok(())
 }
 
-/// Why an accumulator is not compared.
+/// Returns the reason why the adapter cannot run an accumulator, if there is one.
 fn lacks(adapter: &crate::gpu::AdapterDescription, accumulator: Accumulator) -> Option<String> {
     possible::sums(adapter, accumulator).err().map(|error| format!("determinism of {accumulator}: {error}"))
 }
@@ -139,7 +143,7 @@ fn of_scene(
     }
     told.progress.end();
     if !late.is_empty() {
-        card.leave_out(format!("determinism on {name}, as there was no time for it: {}", late.join(", ")));
+        card.leave_out(format!("determinism on {name}, as the time was over: {}", late.join(", ")));
     }
     Ok(())
 }
@@ -148,11 +152,11 @@ fn options(accumulator: Accumulator) -> RenderOptions {
     RenderOptions { accumulator, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
 }
 
-/// A way to make the image of `fixed`.
+/// A way to render that must give the image of `fixed`.
 struct Variant {
     what: String,
     options: RenderOptions,
-    /// The surfels come from last to first.
+    /// Whether the surfels are in reverse order.
     reverse: bool,
 }
 
@@ -170,13 +174,13 @@ fn variants() -> Vec<Variant> {
         variants.push(variant(&format!("without {name}"), without(vec![optimisation])));
     }
     variants.push(variant("without any optimisation", without(all)));
-    // With the optimisation both would be stored alike.
+    // Without the optimisation `order`, which would sort both scenes into the same order.
     let options = without(vec![Optimisation::Order]);
     variants.push(Variant { what: "surfels in reverse, without order".into(), options, reverse: true });
     variants
 }
 
-/// The same surfels from last to first.
+/// Returns the scene with its surfels in reverse order.
 fn reversed(scene: &Scene) -> Scene {
     let mut reversed = scene.clone();
     reversed.surfels.reverse();
@@ -184,7 +188,7 @@ fn reversed(scene: &Scene) -> Scene {
     match &mut reversed.colors {
         Colors::Srgb8(colors) => colors.reverse(),
         Colors::Linear(colors) => colors.reverse(),
-        // The first is of no surfel, the others of no generated scene.
+        // A constant colour needs no reversal; generated scenes have no textures or harmonics.
         Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
     }
     reversed
@@ -206,7 +210,7 @@ mod tests {
         let compare = |found: &Frame| Comparison::of(("s", Accumulator::Fixed), "w", &of(&staged.scene), found);
         let same = compare(&of(&staged.scene));
         assert!(same.equal && same.differing == 0 && same.values == 24 * 24 * (4 + 1 + 3 + 1 + 1), "{same:?}");
-        // One bit of a colour, one of each map, and the sign of a zero.
+        // Flips one bit of a colour, one bit of each map, and the sign of a zero.
         let flip = |value: &mut f32| *value = f32::from_bits(value.to_bits() ^ 1);
         let mut changed = of(&staged.scene);
         flip(&mut changed.color[300][1]);
@@ -220,7 +224,7 @@ mod tests {
         assert_eq!(changed.color[0], [0.0; 4]);
         changed.color[0][0] = -0.0;
         assert_eq!(compare(&changed).differing, 1);
-        // An image that lacks a map is another image.
+        // An image without one of the maps differs.
         assert!(!compare(&of(&staged.scene).without(Map::Depth)).equal);
     }
 

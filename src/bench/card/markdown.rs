@@ -1,17 +1,17 @@
-//! A record as a page that is read at a glance.
+//! Formats a record as a Markdown page.
 
 use super::{ConfigRecord, PassRecord, Record, StudyRecord, Throughput};
 use crate::report::Summary;
 
-/// The passes in the order of a frame.
+/// The passes with a column in the table, in the order of a frame.
 const PASSES: [&str; 5] = ["project", "bin", "visibility", "accumulate", "resolve"];
 
-/// A table of what was found; then what was wrong, the passes' times, and what was left out.
+/// Formats the overview, the failures, the times of the passes, the studies, and the skipped work.
 pub fn markdown(record: &Record) -> String {
     let adapter = &record.adapter;
     let mut text = format!("# {}\n\n", adapter.name);
     if record.quick {
-        text += "**A quick run: it shows that everything works, and no speed.**\n\n";
+        text += "**A quick run: it shows that everything works; its times mean little.**\n\n";
     }
     text += "| | |\n|---|---|\n";
     for (head, cell) in overview(record) {
@@ -70,7 +70,7 @@ fn list(head: &str, sentences: &[String]) -> String {
     if items.is_empty() { items } else { format!("\n## {head}\n\n{items}") }
 }
 
-/// A row for each number of surfels, with the passes that there were.
+/// Formats a table of frame times: a row per number of surfels, a column per pass that ran.
 fn throughput(record: &Record) -> String {
     let Some(first) = record.throughput.first() else { return String::new() };
     let [width, height] = first.size;
@@ -78,8 +78,8 @@ fn throughput(record: &Record) -> String {
     let passes: Vec<&str> = PASSES.iter().filter(there).copied().collect();
     let mut text = format!(
         "\n## Frames of a lit sphere, {width}x{height}\n\n\
-         Medians in ms (passes by {}). In brackets the least bytes that a pass moves, as GB/s and as a share of the copy\n\
-         bandwidth; more than 100 % is a cache's work.\n\n",
+         Medians in ms (clock of the passes: {}). In brackets: the least bytes that a pass moves, in GB/s and as a share of\n\
+         the copy bandwidth; caches make shares above 100 % possible.\n\n",
         first.clock,
     );
     let heads = passes.iter().map(|pass| format!(" {pass} |")).collect::<String>();
@@ -110,7 +110,7 @@ fn cell(pass: Option<&PassRecord>) -> String {
     }
 }
 
-/// A table of the studies, and of each what its configurations took and erred.
+/// Formats a table of the studies, and for each a table of its configurations' times and errors.
 fn studies(record: &Record) -> String {
     if record.studies.is_empty() {
         return String::new();

@@ -1,8 +1,8 @@
-//! What one adapter does, in one run of limited time: is it right, does it repeat itself, how fast is it, and how much of its
-//! memory's speed is that.
+//! Tests accuracy, determinism, speed and copy bandwidth of one adapter within a time limit.
 //!
-//! [`run`] takes its steps in an order in which each makes sense of the next, and writes [`FILES`] after each, so that a run that
-//! is cut short keeps what it has. A step that fails is told in the [`Record`], and the next begins on the adapter opened anew.
+//! [`run`] performs the steps in an order in which each helps to interpret the next. It writes
+//! [`FILES`] after each step, so that an interrupted run keeps its results. If a step fails, the
+//! error is added to the [`Record`] and the next step opens the adapter again.
 
 mod accuracy;
 mod bytes;
@@ -31,33 +31,33 @@ use crate::gpu::Gpu;
 use crate::progress::Progress;
 use crate::render::Backend;
 
-/// What a run is asked for.
+/// The arguments of a run.
 #[derive(Clone, Debug)]
 pub struct Asked {
-    /// The adapter, as [`Gpu::open`] takes it.
+    /// The name of the adapter, as for [`Gpu::open`].
     pub adapter: Option<String>,
-    /// A shortened form, which tries everything in less than a minute.
+    /// Whether to run the short form, which tries everything in less than a minute.
     pub quick: bool,
-    /// Minutes that it may take; what does not fit is left out, and told.
+    /// Time limit in minutes. Work that does not fit is skipped and listed in [`Record::left_out`].
     pub minutes: f64,
-    /// The studies, in their quick forms if that is wanted.
+    /// The studies; the caller takes their quick forms in a quick run.
     pub studies: Vec<Definition>,
-    /// The command line, as the records tell it.
+    /// The command line, as it is recorded.
     pub command: String,
-    /// When it runs, as the reader should see it.
+    /// The date, as it is recorded.
     pub date: String,
 }
 
-/// Who is told how far it is.
+/// The callbacks that report how far a run is.
 #[derive(Clone, Copy)]
 pub struct Told<'a> {
-    /// About units of work.
+    /// Receives the progress within a step, in units of work.
     pub progress: &'a dyn Progress,
-    /// A line about each step.
+    /// Receives lines of text about each step.
     pub say: &'a dyn Fn(&str),
 }
 
-/// A step: its name, and what it does.
+/// A step: its name, and its function.
 type Work = (&'static str, fn(&mut Card<'_>) -> Result<()>);
 
 /// The steps after the first, which opens the adapter.
@@ -69,15 +69,15 @@ const STEPS: [Work; 5] = [
     ("studies", studies::run),
 ];
 
-/// Bytes of the buffer that is copied, and the runs that are timed; of a quick run.
+/// Buffer size in bytes and number of timed runs of the copy bandwidth: full run, quick run.
 const COPIED: [(u64, u32); 2] = [(256 << 20, 9), (32 << 20, 5)];
 
 /// Runs all steps and writes their records into `folder`, which is created if it is missing.
 ///
 /// # Errors
 ///
-/// If there is no such adapter, or not any more, and [`Error::Write`]. Whatever else fails is in the record
-/// ([`Record::failures`]).
+/// [`Error::NoAdapter`] if the adapter does not exist or cannot be opened again, and
+/// [`Error::Write`]. All other errors are in the record ([`Record::failures`]).
 pub fn run(asked: &Asked, folder: &Path, told: Told<'_>) -> Result<Record> {
     let start = Instant::now();
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
@@ -97,7 +97,7 @@ pub fn run(asked: &Asked, folder: &Path, told: Told<'_>) -> Result<Record> {
     Ok(card.record)
 }
 
-/// A run on its way.
+/// The state of a run.
 struct Card<'a> {
     asked: &'a Asked,
     folder: &'a Path,
@@ -111,14 +111,16 @@ impl Card<'_> {
     fn step(&mut self, number: &str, (name, work): Work) -> Result<()> {
         let start = Instant::now();
         let [spent, total] = [self.budget.start.elapsed(), self.budget.total].map(|time| time.as_secs());
-        (self.told.say)(&format!("{number} {name} ({spent} of {total} s are spent)"));
+        (self.told.say)(&format!("{number} {name} (after {spent} of {total} s)"));
         if let Err(error) = work(self) {
             self.problem(name, error)?;
         }
         self.end_step(name, start)
     }
 
-    /// Keeps what went wrong and opens the adapter anew, which may be lost. What cannot be written ends the run.
+    /// Records the error and opens the adapter again, as the device may be lost.
+    ///
+    /// A write error ends the run.
     fn problem(&mut self, what: &str, error: Error) -> Result<()> {
         self.told.progress.end();
         if let Error::Write { .. } = error {
@@ -142,7 +144,7 @@ impl Card<'_> {
         self.record.write(self.folder)
     }
 
-    /// Says that something is not in the record, and why.
+    /// Records work that is skipped, with the reason, and reports it.
     fn leave_out(&mut self, what: String) {
         (self.told.say)(&format!("  left out: {what}"));
         self.record.left_out.push(what);
@@ -159,7 +161,7 @@ fn bandwidth(card: &mut Card<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The time of a run.
+/// The time limit of a run.
 struct Budget {
     start: Instant,
     total: Duration,
@@ -170,13 +172,15 @@ impl Budget {
         self.total.saturating_sub(self.start.elapsed())
     }
 
-    /// When so much of what is left is over.
+    /// Returns the time at which the fraction `part` of the remaining time is over.
     fn share(&self, part: f64) -> Instant {
         Instant::now() + self.left().mul_f64(part)
     }
 }
 
-/// A generated sphere of `count` surfels, of this mean radius in pixels or of 1.5 spacings, in an image of `side` pixels squared.
+/// Prepares a sphere of `count` surfels in an image of `side` x `side` pixels.
+///
+/// `footprint_px` is the mean splat radius in pixels; without it, the radius is 1.5 spacings.
 fn sphere(count: u64, footprint_px: Option<f64>, side: u32, progress: &dyn Progress) -> Result<Staged> {
     let text = format!(
         "name = \"card\"\nabout = \"A sphere.\"\nsize = [{side}, {side}]\n\

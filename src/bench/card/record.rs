@@ -1,4 +1,4 @@
-//! What a run found, as files.
+//! The record of a run, and its files.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -14,55 +14,55 @@ use crate::io::atomic::{write_together, write_whole};
 use crate::render::Backend;
 use crate::report::Machine;
 
-/// The files that a run writes beside the folders of its studies: everything as JSON, a summary, and every row of the hard cases.
+/// The files of a run beside the studies' folders: record, summary, and rows of the hard cases.
 pub const FILES: [&str; 3] = ["card.json", "card.md", accuracy::FILE];
 
-/// What a run found.
+/// The results of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
-    /// The command line that repeats it.
+    /// The command line that repeats the run.
     pub command: String,
-    /// When it ran.
+    /// The date of the run.
     pub date: String,
-    /// Whether it was the shortened form.
+    /// Whether this was the short form.
     pub quick: bool,
-    /// Minutes that it might take.
+    /// Time limit in minutes.
     pub minutes: f64,
-    /// What it took so far, seconds.
+    /// Time so far, seconds.
     pub seconds: f64,
     /// The machine and the version of epsplat.
     pub machine: Machine,
     /// The adapter, its limits and features.
     pub adapter: AdapterDescription,
-    /// The steps that are done.
+    /// The finished steps.
     pub steps: Vec<Step>,
-    /// How fast memory is copied.
+    /// The copy bandwidth of the device; `None` until it is measured.
     pub copy_bandwidth: Option<CopyBandwidth>,
-    /// How the hard cases ended.
+    /// The results of the hard cases; `None` until they have run.
     pub accuracy: Option<Accuracy>,
-    /// Images that must have the same bits.
+    /// Comparisons of images that must be bit-identical.
     pub determinism: Vec<Comparison>,
-    /// Frames by numbers of surfels.
+    /// Frame times, one entry per number of surfels.
     pub throughput: Vec<Throughput>,
-    /// The studies that were run.
+    /// The studies that ran.
     pub studies: Vec<StudyRecord>,
-    /// What could not be done, and why: a sentence each.
+    /// Errors that ended a step or a part of it, one sentence each.
     pub problems: Vec<String>,
-    /// What was not tried, for lack of time or of the adapter's features.
+    /// Work skipped for lack of time or of a feature of the adapter, one sentence each.
     pub left_out: Vec<String>,
 }
 
-/// A step that is done.
+/// A finished step.
 #[derive(Clone, Debug, Serialize)]
 pub struct Step {
-    /// Its name.
+    /// The name.
     pub name: &'static str,
-    /// What it took, seconds.
+    /// Duration, seconds.
     pub seconds: f64,
 }
 
 impl Record {
-    /// That of a run that has begun.
+    /// Returns the empty record of a run that has just begun.
     pub(super) fn new(asked: &Asked, backend: &Backend, adapter: AdapterDescription) -> Self {
         Self {
             command: asked.command.clone(),
@@ -83,13 +83,13 @@ impl Record {
         }
     }
 
-    /// What was wrong: images that miss their bounds or differ, studies that fail, and what could not be done. A sentence each.
+    /// Returns a sentence for each failed hard case, image difference, failed study and error.
     pub fn failures(&self) -> Vec<String> {
         let hard = self.accuracy.iter().flat_map(|accuracy| &accuracy.failures);
         let hard = hard.map(|failure| format!("hard case {failure}"));
         let differ = self.determinism.iter().filter(|comparison| !comparison.equal).map(|comparison| {
             let Comparison { scene, accumulator, what, values, differing, .. } = comparison;
-            format!("{scene}, {accumulator}, {what}: {differing} of {values} values have other bits")
+            format!("{scene}, {accumulator}, {what}: {differing} of {values} values differ in bits")
         });
         let studies = self
             .studies
@@ -98,7 +98,7 @@ impl Record {
         hard.chain(differ).chain(studies).chain(self.problems.iter().cloned()).collect()
     }
 
-    /// Writes it as JSON and as Markdown into `folder`, both or none.
+    /// Writes the JSON and Markdown files into `folder`, both or neither.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         let [json_file, summary_file] = [FILES[0], FILES[1]].map(|name| folder.join(name));
         let (json, summary) = (json(&json_file, self)?, markdown(self));
@@ -142,13 +142,13 @@ mod tests {
             equal: differing == 0,
         };
         record.determinism.push(comparison(0));
-        record.left_out.push("frames of 10 surfels: the time left would not do".into());
+        record.left_out.push("frames of 10 surfels: the remaining time is too short".into());
         assert_eq!(record.failures(), Vec::<String>::new());
         let page = markdown(&record);
         assert!(page.contains("1 of 1 pairs of images |") && page.contains("## Left out\n\n- frames of 10"), "{page}");
         record.determinism.push(comparison(3));
         record.problems.push("throughput: the device was lost".into());
-        let failures = ["s, fixed, without order: 3 of 10 values have other bits", "throughput: the device was lost"];
+        let failures = ["s, fixed, without order: 3 of 10 values differ in bits", "throughput: the device was lost"];
         assert_eq!(record.failures(), failures);
         let page = markdown(&record);
         assert!(page.contains("1 of 2 pairs of images, **1 DIFFER**") && page.contains(failures[0]), "{page}");

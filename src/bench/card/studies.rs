@@ -1,4 +1,4 @@
-//! The studies of a run, each with its share of the time left and its report in a folder of its own.
+//! Runs the studies, each within a share of the remaining time. Each has a folder for its report.
 
 use std::path::{Component, Path};
 use std::time::{Duration, Instant};
@@ -13,46 +13,46 @@ use crate::bench::table::relative;
 use crate::error::{Error, Result};
 use crate::report::{self, Study, Summary};
 
-/// Seconds after which what a study has so far is written, though it goes on.
+/// Interval at which the report of an unfinished study is written.
 const WRITTEN_EVERY: Duration = Duration::from_secs(20);
 
-/// What became of a study.
+/// The outcome of a study in a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct StudyRecord {
-    /// Its name, and that of the folder of its report.
+    /// The name of the study and of its report's folder.
     pub name: String,
-    /// What it shows.
+    /// One sentence that says what the study shows.
     pub about: String,
-    /// What it took, seconds.
+    /// Duration, seconds.
     pub seconds: f64,
-    /// Configurations on scenes that were measured.
+    /// Number of measurements: configurations on points of scenes.
     pub measurements: usize,
-    /// What times are given relative to, if anything.
+    /// The configuration whose time is the unit of relative times, if there is one.
     pub baseline: Option<String>,
-    /// Each configuration over all scenes.
+    /// The results of each configuration over all scenes.
     pub configs: Vec<ConfigRecord>,
-    /// What was left out as the adapter lacks something, or done otherwise.
+    /// Configurations that the adapter cannot run, and frames that were rendered twice.
     pub notes: Vec<String>,
     /// Missed error limits, and configurations that gave different bits in two runs.
     pub failures: Vec<String>,
-    /// Scenes for which there was no time, or that would have come after an error.
+    /// Scenes that were skipped because time was short or after an error.
     pub left_out: Vec<String>,
 }
 
-/// A configuration over all scenes of a study.
+/// The results of a configuration over all scenes of a study.
 #[derive(Clone, Debug, Serialize)]
 pub struct ConfigRecord {
-    /// Its name.
+    /// The name.
     pub config: String,
-    /// Scenes that it was measured on.
+    /// Number of scenes and points of sweeps that it was measured on.
     pub scenes: usize,
-    /// Its time as a multiple of the baseline's on the same scene; none without a baseline.
+    /// Time over the baseline's on the same scene; `None` without a baseline.
     pub time_over_baseline: Option<Summary>,
     /// The largest RMSE against the f64 reference.
     pub worst_rmse: Option<f64>,
 }
 
-/// What each configuration showed on all scenes, in the order of the definition.
+/// Summarises each configuration over all scenes, in the order of the definition.
 fn digest(definition: &Definition, study: &Study) -> Vec<ConfigRecord> {
     let of = |config: &str| {
         let all: Vec<_> = study.measurements.iter().filter(|m| m.config == config).collect();
@@ -67,33 +67,33 @@ fn digest(definition: &Definition, study: &Study) -> Vec<ConfigRecord> {
     definition.configs.iter().filter_map(|config| of(&config.name)).collect()
 }
 
-/// Refuses studies whose reports cannot have folders of their names.
+/// Checks that each study has a name that can be a folder of its own.
 ///
 /// # Errors
-/// [`Error::Usage`].
+/// [`Error::Usage`] if a name is not a plain folder name, or if two studies share it.
 pub fn check_names(studies: &[Definition]) -> Result<()> {
     for (number, study) in studies.iter().enumerate() {
         let name = &study.name;
         let parts: Vec<_> = Path::new(name).components().collect();
         if !matches!(parts[..], [Component::Normal(part)] if part == name.as_str()) {
-            return Err(Error::Usage(format!("the study {name:?} cannot have a folder of its name: give it another")));
+            return Err(Error::Usage(format!("the study name {name:?} cannot be a folder name: choose another")));
         }
         if studies[..number].iter().any(|other| other.name == *name) {
-            return Err(Error::Usage(format!("two studies are called {name:?}: their reports would share a folder")));
+            return Err(Error::Usage(format!("two studies are called {name:?} and would share a folder: rename one")));
         }
     }
     Ok(())
 }
 
-/// Runs the studies, as far as the time allows.
+/// Runs as many studies as the time allows.
 pub(super) fn run(card: &mut Card<'_>) -> Result<()> {
     let asked = card.asked;
     for (number, definition) in asked.studies.iter().enumerate() {
         let left = asked.studies.len() - number;
-        // What one does not need the others have.
+        // Time that a study leaves unused is shared among the following ones.
         let deadline = card.budget.share(1.0 / left as f64);
         if card.budget.left().is_zero() {
-            card.leave_out(format!("the study {}: the time is over", definition.name));
+            card.leave_out(format!("the study {}: the time was over", definition.name));
             continue;
         }
         (card.told.say)(&format!("  {} ({:.0} s for it)", definition.name, (deadline - Instant::now()).as_secs_f64()));
@@ -105,7 +105,7 @@ pub(super) fn run(card: &mut Card<'_>) -> Result<()> {
     Ok(())
 }
 
-/// One study. What it has is written, however it ends.
+/// Runs one study. Its results so far are written even if it fails.
 fn study(card: &mut Card<'_>, definition: &Definition, deadline: Instant) -> Result<()> {
     let (start, mut written) = (Instant::now(), Instant::now());
     let mut outcome = runner::begin(definition, Some(&card.backend))?;
@@ -135,14 +135,14 @@ fn study(card: &mut Card<'_>, definition: &Definition, deadline: Instant) -> Res
     failed.map_or(Ok(()), Err)
 }
 
-/// What the next point takes, by what the last took of how many surfels.
+/// Estimates the time of the next point: the last one's, times the ratio of surfels if above 1.
 fn expected(last: Option<(Option<u64>, Duration)>, next: Point) -> Duration {
     let Some((count, time)) = last else { return Duration::ZERO };
     let ratio = next.count.zip(count).map_or(1.0, |(next, last)| next as f64 / last.max(1) as f64);
     time.mul_f64(ratio.max(1.0))
 }
 
-/// A point of a sweep, in words.
+/// Names a point of a sweep, for messages.
 fn named(entry: &SceneEntry, point: Point) -> String {
     let count = point.count.map_or(String::new(), |count| format!(", {count} surfels"));
     let size = point.footprint_px.map_or(String::new(), |radius| format!(" of {radius} px"));

@@ -1,4 +1,4 @@
-//! Frames of spheres of more and more surfels: the time of each pass, and what it moves against what memory can.
+//! Times frames of growing spheres: each pass, and its bytes against the copy bandwidth.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -13,73 +13,73 @@ use crate::plan::{Facts, PixelLayout, RenderOptions, SceneNeeds};
 use crate::render::{Backend, Renderer, Report};
 use crate::report::Summary;
 
-/// The part of the time left that it may take.
+/// The fraction of the remaining time that this step may use.
 const SHARE: f64 = 0.4;
 
-/// Surfels of the spheres; of a quick run.
+/// Numbers of surfels: full run, quick run.
 const SIZES: [&[u64]; 2] = [&[10_000, 100_000, 1_000_000, 10_000_000], &[1_000, 10_000]];
 
-/// Timed frames, at most; of a quick run.
+/// The largest number of timed frames: full run, quick run.
 const FRAMES: [u32; 2] = [15, 3];
 
-/// Timed frames that there are however long they take.
+/// The smallest number of timed frames, however long they take.
 const FEWEST_FRAMES: usize = 3;
 
-/// Time that the frames of one size may take before there are no more of them than need be.
+/// Time after which a size gets no more frames than [`FEWEST_FRAMES`].
 const FRAMES_TIME: Duration = Duration::from_secs(10);
 
-/// Frames before the timed ones: the first finds how much room is needed, the second makes it.
+/// Untimed frames: the first finds the buffer sizes, the second allocates the buffers.
 const WARM_UP: usize = 2;
 
-/// The image's side, pixels.
+/// Side of the image, pixels.
 const SIDE: u32 = 1024;
 
-/// Frames of one size of scene, with the default options: lit by a headlight, without maps.
+/// Frame times of one sphere, with the default options: lit by a headlight, without maps.
 #[derive(Clone, Debug, Serialize)]
 pub struct Throughput {
-    /// Surfels in the scene.
+    /// Number of surfels in the scene.
     pub surfels: u64,
-    /// Splats that may touch a pixel and were not left out.
+    /// Number of splats that may touch a pixel and were not culled.
     pub splats_drawn: u64,
-    /// Mean radius of the splats, pixels.
+    /// Mean splat radius, pixels.
     pub footprint_px: f64,
-    /// The image's width and height, pixels.
+    /// Width and height of the image, pixels.
     pub size: [u32; 2],
-    /// Pixels that show something.
+    /// Number of pixels that are not background.
     pub covered_pixels: u64,
-    /// Timed frames.
+    /// Number of timed frames.
     pub frames: usize,
-    /// From the uploaded scene to the frame in host memory, milliseconds.
+    /// Time from the uploaded scene to the frame in host memory, milliseconds.
     pub total_ms: Summary,
-    /// What of that is in no pass, milliseconds, median: handing work over, reading back.
+    /// Median time outside all passes, milliseconds: submission and readback.
     pub rest_ms: f64,
-    /// Surfels per second of the median time.
+    /// Surfels of the scene per second of the median frame time.
     pub splats_per_second: f64,
-    /// Whose clock the passes' times are by: `timestamps` of the device, or `wall`.
+    /// The clock of the passes' times: `timestamps` (of the device) or `wall`.
     pub clock: &'static str,
     /// The passes by name.
     pub passes: BTreeMap<String, PassRecord>,
-    /// Device memory of the render, bytes.
+    /// Device memory that the renderer holds, bytes.
     pub device_bytes: u64,
-    /// What the scene needed.
+    /// Names of the [`SceneNeeds`] that chose the kernels.
     pub needs: Vec<&'static str>,
 }
 
-/// One pass.
+/// Time and bandwidth of one pass.
 #[derive(Clone, Debug, Serialize)]
 pub struct PassRecord {
-    /// Its time in a frame, milliseconds.
+    /// Time per frame, milliseconds.
     pub ms: Summary,
-    /// The least bytes that it moves ([`Moved`]); none for a pass without a formula.
+    /// The least bytes that the pass moves ([`Moved`]); `None` for a pass without a formula.
     pub least_bytes: Option<u64>,
-    /// These per second of the median time, 10^9 a second.
+    /// `least_bytes` per second of the median time, in GB/s (10^9 bytes).
     pub gb_per_second: Option<f64>,
-    /// That as a share of the copy bandwidth, if this was measured. More than 1 is a cache's work.
+    /// `gb_per_second` over the median copy bandwidth, if measured. Above 1 caches are at work.
     pub share_of_copy: Option<f64>,
 }
 
 impl PassRecord {
-    /// That of a pass that took `ms` and moves `least_bytes`, beside copies of `copy` 10^9 bytes a second.
+    /// Derives the bandwidth of a pass that took `ms`; `copy` is the copy bandwidth in GB/s.
     pub fn of(ms: Summary, least_bytes: Option<u64>, copy: Option<f64>) -> Self {
         let gb_per_second = least_bytes.filter(|_| ms.median > 0.0).map(|bytes| bytes as f64 * 1e-6 / ms.median);
         let share_of_copy = gb_per_second.zip(copy).filter(|(_, copy)| *copy > 0.0).map(|(own, copy)| own / copy);
@@ -87,15 +87,15 @@ impl PassRecord {
     }
 }
 
-/// Renders the spheres, as many as the time allows.
+/// Renders as many of the spheres as the time allows.
 pub(super) fn measure(card: &mut Card<'_>) -> Result<()> {
     let deadline = card.budget.share(SHARE);
     let mut last: Option<(u64, Duration)> = None;
     for &surfels in SIZES[usize::from(card.asked.quick)] {
-        // As long as the last, for each surfel.
+        // Estimate: the same time per surfel as for the last size.
         let expected = last.map(|(fewer, time)| time.mul_f64(surfels as f64 / fewer as f64));
         if Instant::now() + expected.unwrap_or_default() >= deadline {
-            card.leave_out(format!("frames of {surfels} surfels: the time left would not do"));
+            card.leave_out(format!("frames of {surfels} surfels: the remaining time is too short"));
             continue;
         }
         let start = Instant::now();
@@ -139,7 +139,7 @@ fn of_size(card: &Card<'_>, surfels: u64) -> Result<Throughput> {
     Ok(found)
 }
 
-/// What the `reports` of the same `frame` say together, of which there is at least one.
+/// Summarises the `reports` of the same `frame`; there is at least one.
 fn summarised(reports: &[Report], frame: &Frame, needs: &SceneNeeds, copy: Option<f64>) -> Throughput {
     let summary = |of: &dyn Fn(&Report) -> Option<f64>| {
         Summary::of(&reports.iter().filter_map(of).collect::<Vec<_>>()).unwrap_or_default()
@@ -148,7 +148,7 @@ fn summarised(reports: &[Report], frame: &Frame, needs: &SceneNeeds, copy: Optio
         .first()
         .map(|report| (report.surfels, report.splats_drawn, report.clock, report.needs.clone()))
         .unwrap_or_default();
-    // Nothing is behind the scene, so what is covered alone has alpha.
+    // The background is transparent, so only covered pixels have alpha.
     let covered_pixels = frame.color.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
     let pixel = PixelLayout::of(needs);
     let least = Moved {
@@ -224,7 +224,8 @@ mod tests {
         assert_eq!(found.passes["resolve"].ms.median, 3.0);
         assert!((found.splats_per_second - 200.0 / 6e-3).abs() < 1e-6);
         assert!(found.covered_pixels > 100 && found.covered_pixels < 256, "{}", found.covered_pixels);
-        // Weight, three colours and three of the normal, in pairs of two words each; and a colour of four words.
+        // Sums: weight, three colours and three normal components, stored in 8 pairs of words. The
+        // image has four words per pixel.
         let resolve = found.passes["resolve"].least_bytes;
         assert_eq!(resolve, Some(found.covered_pixels * 4 * (1 + 16 + 4)));
     }

@@ -9,7 +9,7 @@ override SIDES: bool;
 const SIDE_BIT: u32 = 1u;
 
 // Stores the side in the last bit of a depth, which moves it by at most one unit in the last place.
-// Of two depths that differ in this bit alone, the front's is nearer.
+// The front has the nearer of two depths that differ in this bit alone.
 fn sided(depth: f32, away: bool) -> f32 {
     let bits = (bitcast<u32>(depth) & ~SIDE_BIT) | select(0u, SIDE_BIT, away);
     return select(depth, bitcast<f32>(bits), SIDES);

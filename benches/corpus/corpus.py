@@ -112,7 +112,7 @@ def epsplat(options, *words):
     return done.stdout
 
 
-# What `epsplat info` says of a mesh whose colours are not those of its vertices.
+# `epsplat info` says this of a mesh whose colours are not those of its vertices.
 PAINTED = "of faces or materials"
 
 
@@ -127,7 +127,7 @@ def compare_info(info, theirs):
     kept = theirs.positions[usable(theirs.positions)]
     if info["points"] != len(theirs.positions):
         raise Difference(f"{info['points']} points, {theirs.reader} has {len(theirs.positions)}")
-    # A mesh is drawn by surfels on its faces; `epsplat surfels` writes its vertices, which compare_points compares.
+    # A mesh is drawn by surfels on its faces; compare_points compares its vertices.
     if not info.get("is_mesh") and info["preparation"]["surfels"] != len(kept):
         raise Difference(f"{info['preparation']['surfels']} usable points, {theirs.reader} has {len(kept)}")
     low, high = kept.min(axis=0), kept.max(axis=0)

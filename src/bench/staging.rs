@@ -85,35 +85,15 @@ pub(super) fn stage(
     })
 }
 
+/// Points, the surface that they stand for where ground truth is asked for, and triangles.
+type Made = (Points, Option<Surface>, Option<Mesh>);
+
 fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dyn Progress) -> Result<Staged> {
     if let Some(count) = point.count.filter(|_| entry.shape.is_some()) {
         memory::check(count.saturating_mul(OF_SURFEL), || format!("{count} surfels of the scene {:?}", entry.name))?;
     }
     let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
-    let (points, surface, left) = match (&entry.file, entry.shape) {
-        (Some(file), _) => {
-            let file = present(definition, entry, file)?;
-            of_file(&file, entry, point.count.unwrap_or(1) as usize, texture.as_ref(), progress)?
-        }
-        (None, Some(shape)) if entry.surfels == Making::Triangles => {
-            (Points::default(), None, Some(mesh(shape, point.count.unwrap_or(1))))
-        }
-        (None, Some(shape)) => {
-            let surface = entry.truth.then_some(Surface::Analytic(shape));
-            let count = point.count.unwrap_or(1);
-            let mut points = match entry.surfels {
-                Making::Gaussians => gaussians(shape, count),
-                _ => of_shape(shape, count, entry.radius),
-            };
-            if let Some(noise) = entry.noise {
-                scatter(&mut points, noise * (shape.area() / count as f64).sqrt());
-            }
-            let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
-            (Points { radii, ..points }, surface, None)
-        }
-        // Unreachable: a definition without file and shape is refused. Here it is an empty scene.
-        (None, None) => (Points::default(), None, None),
-    };
+    let (points, mut surface, left) = source(definition, entry, point, texture.as_ref(), progress)?;
     let points = match entry.simplify {
         Some(tolerance) => simplified(points, tolerance, progress)?,
         None => points,
@@ -133,7 +113,6 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     if entry.rims == Rims::Flat {
         scene.clips.clear();
     }
-    let mut surface = surface;
     if let Some(triangles) = &entry.triangles {
         let (mesh, of_triangles) = beside(definition, entry, triangles, progress)?;
         (scene, _) = with_triangles(Some(scene), &[mesh])?;
@@ -159,6 +138,40 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         (scene, _) = hierarchy::build(scene, progress)?;
     }
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
+}
+
+/// The points of a scene before they are simplified, their surface, and the triangles that stay.
+fn source(
+    definition: &Definition,
+    entry: &SceneEntry,
+    point: Point,
+    texture: Option<&Texture>,
+    progress: &dyn Progress,
+) -> Result<Made> {
+    Ok(match (&entry.file, entry.shape) {
+        (Some(file), _) => {
+            let file = present(definition, entry, file)?;
+            of_file(&file, entry, point.count.unwrap_or(1) as usize, texture, progress)?
+        }
+        (None, Some(shape)) if entry.surfels == Making::Triangles => {
+            (Points::default(), None, Some(mesh(shape, point.count.unwrap_or(1))))
+        }
+        (None, Some(shape)) => {
+            let surface = entry.truth.then_some(Surface::Analytic(shape));
+            let count = point.count.unwrap_or(1);
+            let mut points = match entry.surfels {
+                Making::Gaussians => gaussians(shape, count),
+                _ => of_shape(shape, count, entry.radius),
+            };
+            if let Some(noise) = entry.noise {
+                scatter(&mut points, noise * (shape.area() / count as f64).sqrt());
+            }
+            let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
+            (Points { radii, ..points }, surface, None)
+        }
+        // Unreachable: a definition without file and shape is refused. Here it is an empty scene.
+        (None, None) => (Points::default(), None, None),
+    })
 }
 
 /// Scales all disks by `factor`. The levels of detail are dropped, as they have the old sizes.
@@ -226,7 +239,7 @@ fn of_file(
     count: usize,
     texture: Option<&Texture>,
     progress: &dyn Progress,
-) -> Result<(Points, Option<Surface>, Option<Mesh>)> {
+) -> Result<Made> {
     let mesh = match entry.truth || entry.surfels.samples() {
         true => {
             let mut mesh = io::read_mesh(file, progress)?;
@@ -256,15 +269,7 @@ fn of_file(
     let points = match entry.surfels {
         // Unreachable for gaussians and triangles, which a definition allows for shapes only, and
         // for levels, which [`in_part::stage`] reads.
-        Making::File | Making::Gaussians | Making::Triangles | Making::Levels => {
-            let classes = entry.classes.unwrap_or_default();
-            let points =
-                io::read_with(file, ReadOptions { classes, strict: true, ..ReadOptions::default() }, progress)?;
-            if entry.classes.is_some() && points.classes.is_empty() {
-                return Err(Error::malformed(file, "its points have no classes, which LAS files have"));
-            }
-            points
-        }
+        Making::File | Making::Gaussians | Making::Triangles | Making::Levels => as_they_are(file, entry, progress)?,
         Making::Points => bare()?,
         Making::Normals => normals()?,
         Making::Knn => sized(Size::Knn)?,
@@ -292,6 +297,16 @@ fn of_file(
     };
     let surface = mesh.filter(|_| entry.truth).map(|mesh| Surface::mesh(&mesh)).transpose()?;
     Ok((points, surface, left))
+}
+
+/// Reads a file's points with all that they have.
+fn as_they_are(file: &Path, entry: &SceneEntry, progress: &dyn Progress) -> Result<Points> {
+    let classes = entry.classes.unwrap_or_default();
+    let points = io::read_with(file, ReadOptions { classes, strict: true, ..ReadOptions::default() }, progress)?;
+    if entry.classes.is_some() && points.classes.is_empty() {
+        return Err(Error::malformed(file, "its points have no classes, which LAS files have"));
+    }
+    Ok(points)
 }
 
 /// Divides a mesh as `epsplat hybrid --pixels` does.

@@ -87,7 +87,8 @@ mod tests {
     use super::*;
     use crate::options::Suggested;
 
-    /// What checking options that are set by name says, with the name of a backend.
+    /// The refusal of options that are set by name, for a backend by its name; none if they go
+    /// together.
     fn refusal(backend: &str, set: &[(&str, &str)]) -> Option<String> {
         let mut options = RenderOptions::default();
         set.iter().for_each(|(name, text)| options.set(name, &[(*text).to_owned()]).unwrap());
@@ -114,7 +115,7 @@ mod tests {
         for (backend, set) in clashes {
             assert!(refusal(backend, set).is_some(), "{backend} {set:?}");
         }
-        // What is the default anyway is no choice.
+        // Defaults that are given are no choice.
         let fine: [(&str, &[(&str, &str)]); 4] = [
             ("reference", &[("accumulator", "fixed"), ("organisation", "auto")]),
             ("auto", &[("tail", "sum")]),

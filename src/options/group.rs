@@ -50,7 +50,8 @@ pub(super) fn bad_value(name: &str, why: &str) -> Error {
     Error::Usage(format!("{name}: {why}"))
 }
 
-/// Declares a group: a struct with `Default`, the command line's arguments (feature `cli`) and [`Group`].
+/// Declares a group: a struct with `Default`, the command line's arguments (feature `cli`) and
+/// [`Group`].
 macro_rules! group {
     ($(#[$of_group:meta])* pub struct $group:ident { $($(#[$of_field:meta])* pub $field:ident: $type:ty,)* }) => {
         #[derive(Clone, Debug, Default, PartialEq)]

@@ -13,9 +13,9 @@ group! {
         /// Draw coarser levels of detail where nodes are smaller than this: 16px or 0.01%
         ///
         /// A node that is seen smaller is drawn in place of the surfels below it. The size is in
-        /// square pixels, 16px, or a share of the image, 0.01%; 0 draws all surfels. Levels that the
-        /// input lacks are made first; `epsplat lod` keeps them in a file. Of COPC files, and of
-        /// files of `epsplat lod` with 500,000 surfels or more, only the needed part is read
+        /// square pixels, 16px, or a share of the image, 0.01%; 0 draws all surfels. Levels that
+        /// the input lacks are made first; `epsplat lod` keeps them in a file. Of COPC files, and
+        /// of files of `epsplat lod` with 500,000 surfels or more, only the needed part is read
         #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", group = "cut"))]
         pub lod: Option<Detail>,
         /// Draw at most N surfels and nodes, by the --lod that each view needs

@@ -10,8 +10,9 @@ group! {
     pub struct LookOptions {
         /// Shading: unlit, lambert or phong [default: lambert; unlit where there are no normals]
         ///
-        /// unlit is the blended colour, lambert the colour times the lights' cosines, and phong adds
-        /// white highlights. Points that face the camera, --blend nearest and Gaussians are unlit
+        /// unlit is the blended colour, lambert the colour times the lights' cosines, and phong
+        /// adds white highlights. Points that face the camera, --blend nearest and Gaussians are
+        /// unlit
         #[cfg_attr(feature = "cli", arg(long, value_name = "MODEL"))]
         pub shading: Option<Shading>,
         /// A light in place of the headlight: headlight[:INTENSITY] or X,Y,Z[:INTENSITY]
@@ -19,8 +20,8 @@ group! {
         /// X,Y,Z is the direction toward the light. The option may be given several times
         #[cfg_attr(feature = "cli", arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true))]
         pub lights: Vec<Light>,
-        /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are
-        /// [default: 32]
+        /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they
+        /// are [default: 32]
         #[cfg_attr(feature = "cli", arg(long, value_name = "EXPONENT", hide_short_help = true))]
         pub shininess: Option<f32>,
         /// Colour behind the scene, linear [default: transparent]
@@ -29,7 +30,8 @@ group! {
         /// Samples of a pixel: 1, 4, 8 or 16 [default: 4, of Gaussians 1]
         ///
         /// More samples make smoother edges; maps are those of the pixel's centre. Samples are
-        /// averaged in linear light, those of Gaussians as the codes that their files are trained to
+        /// averaged in linear light, those of Gaussians as the codes that their files are trained
+        /// to
         #[cfg_attr(feature = "cli", arg(long, value_name = "N"))]
         pub samples: Option<Samples>,
     }

@@ -11,8 +11,8 @@ group! {
         ///
         /// index names the input and the point that show most, transmittance the light that all
         /// surfaces of a pixel let through, layers their number, tail the share behind --composite
-        /// layers:L, surfaces depth and alpha of the nearest eight, texz the place in a texture, and
-        /// decision, of the reference, the distance to the nearest yes-or-no
+        /// layers:L, surfaces depth and alpha of the nearest eight, texz the place in a texture,
+        /// and decision, of the reference, the distance to the nearest yes-or-no
         #[cfg_attr(feature = "cli", arg(long, value_name = "MAPS", value_delimiter = ','))]
         pub aov: Vec<Map>,
     }

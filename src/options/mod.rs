@@ -1,7 +1,8 @@
-//! The options of a picture, each declared once: for the command line, for studies and for callers of the library.
+//! The options of a picture, each declared once: for the command line, for studies and for callers
+//! of the library.
 //!
-//! An option that is `None` leaves the choice to the scene: Gaussians are drawn by other rules than surfels.
-//! [`RenderOptions::settle`] makes these choices.
+//! An option that is `None` leaves the choice to the scene: Gaussians are drawn by other rules than
+//! surfels. [`RenderOptions::settle`] makes these choices.
 
 mod check;
 mod group;
@@ -88,8 +89,8 @@ impl RenderOptions {
         }))
     }
 
-    /// A deserialiser of the value of the option `name`: text, a number, true or false, or a list of
-    /// these.
+    /// A deserialiser of the value of the option `name`: text, a number, true or false, or a list
+    /// of these.
     pub fn value_of<'a>(&'a mut self, name: &'a str) -> OptionValue<'a> {
         OptionValue { options: self, name }
     }

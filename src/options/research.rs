@@ -27,15 +27,15 @@ group! {
         /// [default: exact]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", hide_short_help = true))]
         pub raster_depth: Option<RasterDepth>,
-        /// Where light falls: pixel (at its blended normal) or splat (at its centre; lit colours are
-        /// blended) [default: pixel]
+        /// Where light falls: pixel (at its blended normal) or splat (at its centre; lit colours
+        /// are blended) [default: pixel]
         #[cfg_attr(feature = "cli", arg(long, value_name = "WHAT", hide_short_help = true))]
         pub shading_at: Option<ShadingAt>,
         /// Draw a polygon of N sides, 3 to 16, in each disk in place of the disk
         #[cfg_attr(feature = "cli", arg(long, value_name = "N", hide_short_help = true))]
         pub outline: Option<Outline>,
-        /// Measure of nodes for --lod: extent (the ball around all below a node) or area (its image,
-        /// as in Pajarola 2003) [default: extent]
+        /// Measure of nodes for --lod: extent (the ball around all below a node) or area (its
+        /// image, as in Pajarola 2003) [default: extent]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", requires = "cut", hide_short_help = true))]
         pub lod_measure: Option<DetailMeasure>,
         /// Shape of nodes: cap (curved as the surface below them) or disk [default: cap]

@@ -7,7 +7,7 @@ use crate::scene::{
     Blend, Composite, Detail, Facing, Kernel, LowPass, Maps, NodeShape, PointSize, Samples, Shading, gaussian,
 };
 
-/// What a scene and its use say of how it is drawn, where the options say nothing.
+/// The scene's and its use's answers to what the options leave open.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Suggested {
     /// The scene has Gaussians, which are drawn by the rules that their files are trained with.

@@ -24,10 +24,10 @@ group! {
         /// nearest (the nearest fragment alone, as with a depth test; unlit) [default: weighted]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", hide_short_help = true))]
         pub blend: Option<Blend>,
-        /// Filter for splats near a pixel in size: none (a pixel's centre lies in a disk or not), max
-        /// (every splat reaches a pixel; gaps between splats stay), ewa (splats are convolved with
-        /// the pixel; no aliasing) or gaussians (as 2D Gaussian splatting does it)
-        /// [default: none, of Gaussians gaussians]
+        /// Filter for splats near a pixel in size: none (a pixel's centre lies in a disk or not),
+        /// max (every splat reaches a pixel; gaps between splats stay), ewa (splats are convolved
+        /// with the pixel; no aliasing) or gaussians (as 2D Gaussian splatting does it) [default:
+        /// none, of Gaussians gaussians]
         #[cfg_attr(feature = "cli", arg(long, value_name = "FILTER", hide_short_help = true))]
         pub lowpass: Option<LowPass>,
         /// Surfels that are left out: auto (those that face away, where a closed mesh hides them),

@@ -13,7 +13,8 @@
 //!
 //!   Both are divided by the summed weight, so a cloud of alpha 0.5 has the opacity 0.5 at any
 //!   sampling density. The summed weight itself must not count as opacity: it is small between the
-//!   centres of disks that just meet, and surfaces would have holes there (the guide, transparency).
+//!   centres of disks that just meet, and surfaces would have holes
+//!   there (the guide, transparency).
 //! - in **sorted** mode: the opacity of one *fragment* at the surfel's centre, which falls off with
 //!   the kernel: `alpha_i = A w_i a_i`. A denser cloud is therefore more opaque.
 //!

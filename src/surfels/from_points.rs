@@ -1,25 +1,25 @@
 //! Computes surfels from points: the command `epsplat surfels`.
 
+mod sizes;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::caps::caps_of;
 use super::creases::clips;
-use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
+use super::estimate::{NORMAL_NEIGHBOURS, fitted_normal};
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
 use super::orient::{self, Orientation};
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::sheets;
-use super::sizes::{
-    RADIUS_NEIGHBOURS, Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius,
-    measure_triangles, offsets, open_radius,
-};
+use super::sizes::{RADIUS_NEIGHBOURS, Size, measure_triangles, offsets, open_radius};
 use super::{Limits, Preparation, guess_up, origin_for, painting, unit, usable_axes};
 use crate::io::Points;
 use crate::scene::{Bounds, Clip, Listed, Surfel, body, framed};
 use crate::{Error, Progress, Result};
+use sizes::Sizes;
 
 /// A disk that ends at an edge is enlarged by this factor, because neither cells nor planes are
 /// certain there. Of 4.0 million rays at 60,000 points of the fandisk with normals, 9 find a hole;
@@ -259,152 +259,6 @@ fn oriented(
             Some(parts)
         }
     }
-}
-
-/// The sizes of the surfels at positions, in the units of [`DistinctPositions`].
-struct Sizes {
-    size: Size,
-    /// The longer half-axis at each position, before it is limited.
-    radii: Vec<f64>,
-    /// The largest half-axis that the neighbours of each position allow.
-    limits: Vec<f64>,
-    /// The half-axes for the positions' own normals; empty for disks.
-    ellipses: Vec<[DVec3; 2]>,
-    /// The number of positions whose cluster of three points is collinear.
-    collinear: u64,
-    /// Scaled units per world unit.
-    scale: f64,
-}
-
-impl Sizes {
-    fn of(
-        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-        normals: &[[f32; 3]],
-        measured: Option<&[f32]>,
-        options: &FromPoints,
-        progress: &dyn Progress,
-    ) -> Self {
-        let (mut ellipses, mut collinear) = (Vec::new(), 0);
-        let radii: Vec<f64> = match options.size {
-            Size::Bsp(triangle) => {
-                let (radii, degenerate) = bsp_radii(distinct, triangle, progress);
-                collinear = degenerate;
-                radii
-            }
-            Size::BspGlobal(triangle) => vec![common_radius(distinct, triangle, progress); distinct.len()],
-            Size::Qsplat => {
-                let own = largest_at(distinct, measured.unwrap_or_default()).into_par_iter().enumerate();
-                // Vertices of no triangle are sized like points.
-                let cell = |position: usize| {
-                    let [s, _] = half_axes_at(Size::Knn, (distinct, graph), position as u32, normals[position]);
-                    s.length()
-                };
-                own.map(|(position, radius)| if radius > 0.0 { radius } else { cell(position) }).collect()
-            }
-            size @ (Size::Knn | Size::Ellipse) => {
-                let own = normals.par_iter().zip(0..distinct.len() as u32);
-                let at =
-                    |(normal, position): (&[f32; 3], u32)| half_axes_at(size, (distinct, graph), position, *normal);
-                ellipses = own.map(at).collect();
-                if size == Size::Knn {
-                    ellipses = roughened((distinct, graph), normals, ellipses);
-                }
-                ellipses.par_iter().map(|[s, _]| s.length()).collect()
-            }
-        };
-        let lone = |position: u32| {
-            let normal = |position: u32| DVec3::from_array(normals[position as usize].map(f64::from));
-            Some(position)
-                .filter(|_| options.size == Size::Knn)
-                .and_then(|at| lone_radius((distinct, graph), at, normal))
-        };
-        let limits = local_limits(graph, &radii, options.limits.largest_ratio, lone);
-        Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
-    }
-
-    /// The half-axes of points with the normals `point_normals`, None for disks, and the longer of
-    /// them, world units.
-    fn of_points(
-        &self,
-        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-        normals: &[[f32; 3]],
-        point_normals: &[[f32; 3]],
-    ) -> (Option<HalfAxes>, Vec<f32>) {
-        let positions = distinct.of_point().par_iter();
-        if self.ellipses.is_empty() {
-            return (None, positions.map(|&position| self.length(position) as f32).collect());
-        }
-        let ellipse = |(&position, &normal)| self.ellipse((distinct, graph), normals, position, normal);
-        let axes: HalfAxes = positions.zip(point_normals).map(ellipse).collect();
-        let radii = longer(&axes);
-        (Some(axes), radii)
-    }
-
-    /// The number of points, at these positions, whose surfels were made smaller because of their
-    /// neighbours.
-    fn limited(&self, of_point: &[u32]) -> u64 {
-        let limited = |position: usize| self.radii[position] > self.limits[position];
-        of_point.par_iter().filter(|position| limited(**position as usize)).count() as u64
-    }
-
-    fn world(&self, length: f64) -> f64 {
-        (length / self.scale).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1)
-    }
-
-    /// The longer half-axis at a position after limiting, world units.
-    fn length(&self, position: u32) -> f64 {
-        let radius = self.radii[position as usize].min(self.limits[position as usize]);
-        if radius > 0.0 { self.world(radius) } else { LONE_RADIUS }
-    }
-
-    /// The half-axes at a position for a point with the normal `normal`, world units. Even if that
-    /// is not the position's own normal, they are limited to the length of the position's own
-    /// ellipse.
-    fn ellipse(
-        &self,
-        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-        normals: &[[f32; 3]],
-        position: u32,
-        normal: [f32; 3],
-    ) -> [[f32; 3]; 2] {
-        let own = normal == normals[position as usize];
-        let at = || half_axes_at(self.size, (distinct, graph), position, normal);
-        let axes = if own { self.ellipses[position as usize] } else { at() };
-        let length = self.length(position);
-        let axes = if axes[0] == DVec3::ZERO {
-            let (a, b) = DVec3::from_array(normal.map(f64::from)).normalize().any_orthonormal_pair();
-            [a * length, b * length]
-        } else {
-            axes.map(|axis| axis.normalize() * self.world(axis.length()).min(length))
-        };
-        axes.map(|axis| axis.as_vec3().to_array())
-    }
-}
-
-/// The half-axes of all positions, longer where the surface is rough.
-fn roughened(
-    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-    normals: &[[f32; 3]],
-    axes: Vec<[DVec3; 2]>,
-) -> Vec<[DVec3; 2]> {
-    let at = |index: u32| {
-        let near: Vec<DVec3> = offsets(distinct, graph, index, RADIUS_NEIGHBOURS).collect();
-        Rough::of(&near, DVec3::from_array(normals[index as usize].map(f64::from)).normalize())
-    };
-    let rough: Vec<Rough> = (0..distinct.len() as u32).into_par_iter().map(at).collect();
-    let own = axes.into_par_iter().zip(0..distinct.len() as u32);
-    own.map(|(axes, index)| grown(axes, Rough::growth(graph, index, |other| rough[other as usize]))).collect()
-}
-
-/// The largest of the radii of the points at each position, scaled units; `radii` is in world
-/// units.
-fn largest_at(distinct: &DistinctPositions, radii: &[f32]) -> Vec<f64> {
-    let mut largest = vec![0.0f64; distinct.len()];
-    for (&position, radius) in distinct.of_point().iter().zip(radii) {
-        let own = &mut largest[position as usize];
-        *own = own.max(f64::from(*radius) * distinct.scale());
-    }
-    largest
 }
 
 fn check(options: &FromPoints) -> Result<()> {

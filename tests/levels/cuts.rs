@@ -97,7 +97,8 @@ fn a_device_makes_the_cut_of_its_twin() {
             let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
             assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
             assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
-            // The first adapter draws all of them, and the others a third each, as kernels take seconds to compile.
+            // The first adapter draws all of them, and the others a third each, as kernels take
+            // seconds to compile.
             let draws = |on: usize| name != "plain" || on == 0 || (on + step).is_multiple_of(3);
             for (_, (on, backend)) in backends.iter().take(adapters).enumerate().filter(|(on, _)| draws(*on)) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
@@ -162,7 +163,8 @@ fn cuts_are_composited_and_rasterised() {
         assert!(!matches!(composite, Composite::Layers(_)) || alike(), "{composite:?}");
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
         let wrong = differ(&frame(&scene, &camera, &options, &own), &reference);
-        // What lies at nearly one depth may be sorted the other way: as in a scene of the cut alone.
+        // Fragments at nearly one depth may be sorted the other way: as in a scene of the cut
+        // alone.
         let alone = differ(&frame(&twins, &camera, &flat, &own), &frame(&twins, &camera, &flat, &Backend::Reference));
         assert!(wrong < 5 + alone && alone < 10, "{composite:?}: {wrong} {alone}");
     }
@@ -171,7 +173,8 @@ fn cuts_are_composited_and_rasterised() {
     let disks = RenderOptions { raster: None, detail_caps: false, ..raster.clone() };
     let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
-    // By its own depths, moved by the radius of each surfel, it draws the twin's cut as it draws that alone.
+    // By its own depths, moved by the radius of each surfel, it draws the twin's cut as it draws
+    // that alone.
     let moved = Raster { depth: RasterDepth::Offset, ..Raster::default() };
     let moved = RenderOptions { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
     let (twins, flat) = cut(&scene, &camera, &moved);
@@ -188,7 +191,8 @@ fn differ(shown: &Frame, truth: &Frame) -> usize {
     shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
 }
 
-/// The same bits for any order of the surfels, on one thread or more, view after view, with room for them or without.
+/// The same bits for any order of the surfels, on one thread or more, view after view, with room
+/// for them or without.
 #[test]
 fn a_cut_depends_on_tree_and_camera_alone() {
     let Some(gpu) = common::gpu() else { return };
@@ -200,7 +204,8 @@ fn a_cut_depends_on_tree_and_camera_alone() {
     assert!(expected == bits(&frame(&levels(shuffled(&flat, 3)), &camera, &options, &backend)));
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(expected == one.install(|| bits(&frame(&levels(flat.clone()), &camera, &options, &backend))));
-    // From afar little is drawn, and from near more than there was room for; then there is too much.
+    // From afar little is drawn, and from near more than there was room for; then there is too
+    // much.
     let view = |distance: f64| {
         let eye = DVec3::new(1.2, 0.7, 2.4) * distance;
         Camera::look_at((100, 100), Lens::Fov(45.0), eye, DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
@@ -254,7 +259,8 @@ fn crowded_leaves_are_drawn_whole() {
     }
 }
 
-/// Several such leaves at depths of their own: loops of one invocation would take more rounds than llvmpipe ends them after.
+/// Several such leaves at depths of their own: loops of one invocation would take more rounds than
+/// llvmpipe ends them after.
 #[test]
 fn crowds_at_several_depths_are_drawn_whole() {
     const COPIES: usize = 33_000;
@@ -274,7 +280,8 @@ fn crowds_at_several_depths_are_drawn_whole() {
     assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
 }
 
-/// Views through which the camera's plane goes, in samples, far from the origin and of a number of splats: the twin's cut.
+/// Views through which the camera's plane goes, in samples, far from the origin and of a number of
+/// splats: the twin's cut.
 #[test]
 fn odd_views_have_the_cut_of_the_twin() {
     let Some(gpu) = common::gpu() else { return };
@@ -282,7 +289,8 @@ fn odd_views_have_the_cut_of_the_twin() {
     let plain = sphere(6000, 1.7);
     let mut far = plain.clone();
     far.low = vec![[0.0; 3]; 6000];
-    // Two spheres, of which the one that is looked at is so far off that f32 has no room for its digits.
+    // Two spheres, of which the one that is looked at is so far off that f32 has no room for its
+    // digits.
     for (index, surfel) in far.surfels.iter_mut().enumerate().skip(3000) {
         let x = f64::from(surfel.center[0]) + 3e7;
         surfel.center[0] = x as f32;
@@ -363,7 +371,8 @@ fn broken_kernels_are_noticed() {
     }
 }
 
-/// Of the first levels, which are a workgroup's, and of levels with so many nodes that an invocation sums the counts of several.
+/// For the first levels, which are a workgroup's, and for levels with so many nodes that an
+/// invocation sums the counts of several.
 #[test]
 fn large_levels_are_summed() {
     let Some(gpu) = common::gpu() else { return };
@@ -402,7 +411,8 @@ fn large_levels_are_summed() {
     }
 }
 
-/// Children that are drawn without being judged are those that would be, wherever nodes lie in the image and before it; and what tells so is needed.
+/// Children that are drawn without being judged are those that would be, wherever nodes lie in the
+/// image and before it; and what tells so is needed.
 #[test]
 fn children_are_drawn_together_where_each_would_be() {
     const TOGETHER: &str = "MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball)";
@@ -470,7 +480,8 @@ fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
     evaluate(gpu, &text, &View::zeroed(), inputs, inputs.len() as u64).unwrap()
 }
 
-/// Remainders are found by f32 and corrected: they are those of integers, up to the most runs that a page has.
+/// Remainders are found by f32 and corrected: they are those of integers, up to the most runs that
+/// a page has.
 #[test]
 fn places_are_dealt_out_exactly() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,4 +1,4 @@
-//! What pictures show.
+//! Pictures: the pixels of every mode and option.
 //! One program: shared code and kernels are compiled once.
 
 mod adapters;

@@ -98,30 +98,19 @@ impl Layout {
             columns.push(found.1);
             Some(columns.len() - 1)
         };
-        let position = [column(&["x"]), column(&["y"]), column(&["z"])];
-        let [Some(x), Some(y), Some(z)] = position else {
-            let missing: Vec<&str> = position
-                .iter()
-                .zip(["x", "y", "z"])
-                .filter(|(found, _)| found.is_none())
-                .map(|(_, name)| name)
-                .collect();
-            return Err(Fault::Malformed(format!("its vertices have no property {}", missing.join(", "))));
-        };
+        let position = whole_position(["x", "y", "z"].map(|name| column(&[name])))?;
         let has = |name: &str| places.iter().any(|(place, _)| *place == name);
         let scalar_of = |name: &str| places.iter().find(|(place, _)| *place == name).map(|(_, place)| place.scalar);
         let gaussian = GaussianLayout::of(has, |name| column(&[name]).zip(scalar_of(name)))?;
         if gaussian.is_some() {
-            let position = [x, y, z];
             return Ok(Self { columns, scalars, row_size, position, gaussian, ..Self::default() });
         }
         let names = places.iter().map(|(name, _)| *name);
         let Tints { own, ignore_alpha } = vertex.tints;
         let found = |slot: usize| [places[slot].0];
-        let normal = find_triple(attributes::NORMAL, names.clone());
-        let normal = normal.and_then(|slots| each(slots.map(|slot| column(&found(slot)))));
-        let color = find_triple(attributes::COLOR, names.clone());
-        let color = color.and_then(|slots| each(slots.map(|slot| column(&found(slot)))));
+        let mut triple = |slots: Option<[usize; 3]>| all(slots?.map(|slot| column(&found(slot))));
+        let normal = triple(find_triple(attributes::NORMAL, names.clone()));
+        let color = triple(find_triple(attributes::COLOR, names.clone()));
         let alpha = color.filter(|_| !ignore_alpha).and_then(|_| find(attributes::ALPHA, names.clone()));
         let alpha = alpha.and_then(|slot| column(&found(slot)));
         let intensity = find(attributes::INTENSITY, names.clone()).filter(|_| !own);
@@ -132,23 +121,18 @@ impl Layout {
         let cap = axes.and_then(|_| axis(CAP_NAMES));
         let [u_slopes, v_slopes] = SLOPE_NAMES.map(&mut axis);
         let texture_slopes = u_slopes.zip(v_slopes).map(<[_; 2]>::from);
-        let clip = axes.and_then(|_| {
-            let found: Vec<usize> = CLIP_NAMES.iter().filter_map(|name| column(&[name])).collect();
-            <[usize; 6]>::try_from(found).ok()
-        });
+        let clip = axes.and_then(|_| all(CLIP_NAMES.map(|name| column(&[name]))));
         let texture = TEXTURE_NAMES.iter().find_map(|[u, v]| Some([column(&[u])?, column(&[v])?]));
         let texture_number = texture.and_then(|_| column(&[NUMBER_NAME]));
-        let node = Some(NODE_NAMES).filter(|_| is_tree(vertex)).and_then(|names| {
-            let found: Vec<usize> = names.iter().filter_map(|name| column(&[name])).collect();
-            <[usize; 4]>::try_from(found).ok()
-        });
+        let node =
+            Some(NODE_NAMES).filter(|_| is_tree(vertex)).and_then(|names| all(names.map(|name| column(&[name]))));
         let scalar = |column: usize| columns[column].scalar;
         let tint = color.map(|color| Tint::of(color.map(scalar), alpha.map(scalar), own)).unwrap_or_default();
         Ok(Self {
             columns,
             scalars,
             row_size,
-            position: [x, y, z],
+            position,
             normal,
             radius,
             axes,
@@ -210,9 +194,21 @@ impl Layout {
     }
 }
 
-/// All three indices, or None if one is missing.
-fn each([a, b, c]: [Option<usize>; 3]) -> Option<[usize; 3]> {
-    Some([a?, b?, c?])
+/// All indices, or None if one is missing.
+fn all<const N: usize>(indices: [Option<usize>; N]) -> Option<[usize; N]> {
+    indices.iter().all(Option::is_some).then(|| indices.map(Option::unwrap_or_default))
+}
+
+/// The indices of x, y and z.
+///
+/// # Errors
+/// [`Fault::Malformed`] with the names of those that are missing.
+fn whole_position(position: [Option<usize>; 3]) -> Result<[usize; 3], Fault> {
+    all(position).ok_or_else(|| {
+        let names = ["x", "y", "z"].into_iter().zip(position);
+        let missing: Vec<&str> = names.filter(|(_, found)| found.is_none()).map(|(name, _)| name).collect();
+        Fault::Malformed(format!("its vertices have no property {}", missing.join(", ")))
+    })
 }
 
 /// Collects the points of a file block by block.

@@ -14,6 +14,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::SplatShape;
 use super::cells::{Cells, piece_of, tangent_basis};
+use super::ended::Ended;
 use super::paraboloid::Paraboloid;
 use super::samples::Samples;
 
@@ -21,37 +22,12 @@ use super::samples::Samples;
 const LARGEST_RATIO: f64 = 4.0;
 const SMALLEST_RATIO: f64 = 1.1;
 
-/// The cosine of the angle between two ends up to which one line clips a splat at both: 10 degrees.
-const ONE_LINE: f64 = 0.985;
-
 /// How often a cap is fitted to the points that it holds and grown again: so many times as a
 /// circle, then as many as an ellipse.
 const FITS: usize = 3;
 
 /// The cosine of the largest angle between the normals of a cap and of its points: 37 degrees.
 const STEEPEST: f64 = 0.8;
-
-/// A line in a splat's plane at which the splat will be clipped.
-struct Ended {
-    /// The unit direction from the splat's point to the line.
-    toward: DVec3,
-    /// The distance from the splat's point; the surface ends at the line, or before it.
-    distance: f64,
-    /// The largest distance from the line of an end that it stands for.
-    reach: f64,
-}
-
-impl Ended {
-    fn is_past(&self, offset: DVec3) -> bool {
-        offset.dot(self.toward) > self.distance
-    }
-
-    /// Whether the line stands for an end with about this unit direction, between two corners.
-    fn stands_for(&self, toward: DVec3, corners: [DVec3; 2]) -> bool {
-        let is_near = |corner: DVec3| (corner.dot(self.toward) - self.distance).abs() <= self.reach;
-        self.toward.dot(toward) > ONE_LINE && corners.into_iter().all(is_near)
-    }
-}
 
 /// A disk, ellipse or cap that grew around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,27 +56,17 @@ pub(super) struct Cover {
 }
 
 /// The distance of a point in a splat's plane, in units of the half-axes, so that the splat is a
-/// circle.
-#[derive(Clone, Copy, Debug)]
-struct Distance(f64);
+/// circle. It holds the bits of the f64, which order as numbers that are not negative do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Distance(u64);
 
-impl PartialEq for Distance {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
+impl Distance {
+    fn new(distance: f64) -> Self {
+        Self(distance.to_bits())
     }
-}
 
-impl Eq for Distance {}
-
-impl PartialOrd for Distance {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Distance {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0)
+    fn get(self) -> f64 {
+        f64::from_bits(self.0)
     }
 }
 
@@ -307,7 +273,7 @@ impl<'a> Grower<'a> {
         }
         let (low, high) = self.heights();
         let shift = 0.5 * (low + high);
-        let confront = self.confront.iter().map(|Reverse((Distance(distance), point))| (*distance, *point));
+        let confront = self.confront.iter().map(|Reverse((distance, point))| (distance.get(), *point));
         let deviation = confront
             .filter(|(distance, _)| *distance < radius)
             .map(|(_, point)| (self.over(normal, self.samples.positions.position(point) - center) - shift).abs())
@@ -346,8 +312,9 @@ impl<'a> Grower<'a> {
         let mut end = f64::INFINITY;
         let mut lines = Vec::with_capacity(2);
         self.seen[point as usize] = self.number;
-        self.confront.push(Reverse((Distance(0.0), point)));
-        while let Some(Reverse((Distance(distance), next))) = self.confront.pop() {
+        self.confront.push(Reverse((Distance::new(0.0), point)));
+        while let Some(Reverse((distance, next))) = self.confront.pop() {
+            let distance = distance.get();
             if distance >= end {
                 self.conquered.retain(|conquered| conquered.distance <= end);
                 return end;
@@ -359,7 +326,7 @@ impl<'a> Grower<'a> {
                 // A path along the graph may lead back inward: points farther out than this one are
                 // not inside.
                 self.conquered.retain(|conquered| conquered.distance < distance);
-                self.confront.push(Reverse((Distance(distance), next)));
+                self.confront.push(Reverse((Distance::new(distance), next)));
                 return distance;
             }
             if lines.iter().any(|line: &Ended| line.is_past(offset)) {
@@ -378,7 +345,7 @@ impl<'a> Grower<'a> {
                 let reached = DVec2::new(offset.dot(inverse[0]), offset.dot(inverse[1])).length();
                 if self.holds(point, neighbour) {
                     self.seen[neighbour as usize] = self.number;
-                    self.confront.push(Reverse((Distance(reached), neighbour)));
+                    self.confront.push(Reverse((Distance::new(reached), neighbour)));
                 } else {
                     // The surface turns away, though not yet by more than the tolerance.
                     end = end.min(self.turn_at(neighbour, offset, shape).unwrap_or(reached).max(distance));

@@ -47,6 +47,7 @@ mod borders;
 mod candidates;
 mod cells;
 mod cut;
+mod ended;
 mod growing;
 mod outcome;
 mod paraboloid;

@@ -33,7 +33,9 @@ fn place_of(index: u32) -> Place {
 fn accumulate_place(pixel: u32, weight: Term, place: Place, at: vec2<u32>, depth: f32) {
     let point = seen_at(at.x, at.y, depth);
     let step = (point - place.position) * held.world;
-    let seen = place.center + vec2<f32>(dot3(step, place.u_slope), dot3(step, place.v_slope));
+    // A low-pass filter draws fragments outside the disk, where coordinates may leave their range.
+    let beyond = place.center + vec2<f32>(dot3(step, place.u_slope), dot3(step, place.v_slope));
+    let seen = clamp(beyond, vec2<f32>(0.0), vec2<f32>(1.0));
     let offset = seen - 0.5;
     add_pair(pixel, PLACE_CHANNEL, term(weight, seen.x), term(weight, seen.y));
     // For coordinates in [0, 1] the squared distance from the middle is at most 1/2.

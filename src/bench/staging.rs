@@ -181,6 +181,9 @@ fn enlarge(scene: &mut Scene, factor: f32) {
     for surfel in &mut scene.surfels {
         *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
     }
+    if let Colors::Textured(textured) = &mut scene.colors {
+        *textured = textured.enlarged(factor);
+    }
 }
 
 /// Returns `points` and, with a `shirt`, a copy that is moved along the normals by that distance.

@@ -253,18 +253,30 @@ impl Textured {
         Self { mipmaps: Arc::clone(&self.mipmaps), atlas: self.atlas, places, colors, range }
     }
 
+    /// The same surfels with half-axes and reach multiplied by `factor`.
+    #[must_use]
+    pub fn enlarged(&self, factor: f32) -> Self {
+        let enlarged = |place: &Place| {
+            let Place { extent, reach, .. } = *place;
+            Place { extent: extent.map(|beside| factor * beside), reach: factor * reach, ..*place }
+        };
+        let places: Vec<_> = self.places.iter().map(enlarged).collect();
+        Self { range: PlaceRange::of(&places), places, ..self.clone() }
+    }
+
     /// The quantities of surfel `index` that are summed at the offset `step` (world units) from its
     /// centre.
     ///
     /// They are the coordinates (u, v) relative to the middle of their range, `u^2 + v^2` and the
     /// squared reach, all in units of the range's span; then `part`, the part of the texture that
-    /// the pixel covers, unchanged.
+    /// the pixel covers, unchanged. Coordinates beyond the range, which fragments outside the disk
+    /// may have under a low-pass filter, become those of its end.
     pub fn terms(&self, index: usize, step: DVec3, part: f64) -> [f64; 5] {
         let PlaceRange { middle, span, .. } = self.range;
         let Place { center, slopes, reach, .. } = self.places[index];
         let [u, v] = [0, 1].map(|k| {
             let gain = DVec3::from_array(slopes[k].map(f64::from)).dot(step);
-            (f64::from(center[k]) - f64::from(middle[k]) + gain) / f64::from(span)
+            ((f64::from(center[k]) - f64::from(middle[k]) + gain) / f64::from(span)).clamp(-0.5, 0.5)
         });
         let reach = (f64::from(reach) / f64::from(span)).max(LEAST_REACH);
         [u, v, u * u + v * v, reach * reach, part]

@@ -9,6 +9,7 @@ use epsplat::scene::{
     Shading, ShadingAt, Tail, gaussian,
 };
 
+use super::judge;
 use crate::common::Random;
 
 fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
@@ -65,6 +66,11 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
     }
     if random.one_in(6) {
         options.accumulator = pick(random, &[Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64]);
+    }
+    if options.facing.is_some() && judge::has_few_digits(options.accumulator) {
+        // The reference says what each sample weighs for one sample a pixel alone, as points are
+        // measured in pixels.
+        options.samples = Samples::ONE;
     }
     if random.one_in(4) {
         options.shading_at = ShadingAt::Splat;

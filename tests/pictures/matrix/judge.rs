@@ -2,7 +2,7 @@
 //! reference's values where it decides.
 
 use epsplat::frame::Frame;
-use epsplat::plan::{Accumulator, RenderOptions};
+use epsplat::plan::{Accumulator, AccumulatorRow};
 use epsplat::scene::Map;
 
 /// Pixels with a fragment nearer to a yes-or-no decision than this are left to rounding.
@@ -19,9 +19,6 @@ const APART_OF_TEXTURES: f32 = 3e-3;
 
 /// The share of decided pixels of painted surfels.
 const STRAYING: f64 = 0.03;
-
-/// The same of sums of 24 bits, of which weights of 2^-10 keep 14.
-const APART_OF_WORDS: f32 = 4e-3;
 
 /// All bits of a frame, by what they are of.
 fn parts(frame: &Frame, but: Option<Map>) -> Vec<(&'static str, Vec<u32>)> {
@@ -51,16 +48,44 @@ pub fn undecided(reference: &Frame) -> usize {
     reference.map(Map::Decision).unwrap().iter().filter(|decision| **decision < DECIDED).count()
 }
 
+/// Whether sums have one word, of which small weights leave little.
+pub fn has_few_digits(accumulator: Accumulator) -> bool {
+    matches!(accumulator, Accumulator::Fixed32 | Accumulator::Packed64)
+}
+
+/// How far the means of each pixel lie apart by [`AccumulatorRow::error_bound`], in a scene of
+/// `surfels` whose attributes span `span`.
+///
+/// `each` is the reference's frame of all samples, with maps of counts and weights, and `[across,
+/// down]` of its pixels are samples of one pixel. A mean of few weights is worth nothing: no mean is
+/// further apart than its span.
+pub fn of_sums(
+    each: &Frame,
+    [across, down]: [usize; 2],
+    (row, surfels, span): (&AccumulatorRow, u64, f64),
+) -> Vec<f32> {
+    let bits = row.fraction_bits(surfels);
+    let (counts, weights) = (each.map(Map::Count).unwrap(), each.map(Map::Weight).unwrap());
+    let width = each.width as usize / across;
+    let mut apart = vec![0.0; counts.len() / (across * down)];
+    for (k, (&count, &weight)) in counts.iter().zip(weights).enumerate().filter(|(_, (count, _))| **count > 0.0) {
+        let (x, y) = (k % each.width as usize / across, k / each.width as usize / down);
+        let bound = (row.error_bound)(f64::from(count), f64::from(weight), bits).min(1.0);
+        apart[y * width + x] += (span * bound / (across * down) as f64) as f32;
+    }
+    apart
+}
+
 /// In which decided pixels `frame` is not what the `reference` says; empty if in none.
-pub fn wrong(frame: &Frame, reference: &Frame, options: &RenderOptions, painted: bool) -> String {
+///
+/// `digits` is how far means lie apart at each pixel because of the digits of their sums
+/// ([`of_sums`]).
+pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) -> String {
     let decision = reference.map(Map::Decision).unwrap();
-    let of_words = matches!(options.accumulator, Accumulator::Fixed32 | Accumulator::Packed64);
-    let limit = match (of_words, painted) {
-        (true, _) => APART_OF_WORDS,
-        (false, true) => APART_OF_TEXTURES,
-        (false, false) => APART,
+    let limit = if painted { APART_OF_TEXTURES } else { APART };
+    let near = |pixel: usize, a: f32, b: f32| {
+        a == b || (b.is_finite() && (a - b).abs() <= limit * b.abs().max(1.0) + digits[pixel])
     };
-    let near = |a: f32, b: f32| a == b || (b.is_finite() && (a - b).abs() <= limit * b.abs().max(1.0));
     let shown = |[r, g, b, a]: [f32; 4]| [r * a, g * a, b * a, a];
     let mut told = Vec::new();
     let decided = |pixel: &usize| decision[*pixel] >= DECIDED;
@@ -76,7 +101,7 @@ pub fn wrong(frame: &Frame, reference: &Frame, options: &RenderOptions, painted:
     let colors = |pixel: usize| (shown(frame.color[pixel]), shown(reference.color[pixel]));
     let differs = |pixel: &usize| {
         let (ours, theirs) = colors(*pixel);
-        ours.into_iter().zip(theirs).any(|(a, b)| !near(a, b))
+        ours.into_iter().zip(theirs).any(|(a, b)| !near(*pixel, a, b))
     };
     let pixels = (0..decision.len()).filter(decided);
     tell("color", pixels.clone().filter(differs).collect(), &|pixel| format!("{:?}", colors(pixel)));
@@ -86,7 +111,7 @@ pub fn wrong(frame: &Frame, reference: &Frame, options: &RenderOptions, painted:
         let of = |frame: &Frame, pixel: usize| frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec();
         let differs = |pixel: &usize| {
             let (ours, theirs) = (of(frame, *pixel), of(reference, *pixel));
-            ours.into_iter().zip(theirs).any(|(a, b)| !near(a, b))
+            ours.into_iter().zip(theirs).any(|(a, b)| !near(*pixel, a, b))
         };
         let values = |pixel: usize| format!("{:?}", (of(frame, pixel), of(reference, pixel)));
         tell(map.row().name, pixels.clone().filter(differs).collect(), &values);

@@ -26,7 +26,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Map, Maps, Scene};
+use epsplat::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
 
 use crate::common;
 use common::Random;
@@ -204,7 +204,11 @@ fn wrong(
     tally.frames += 1;
     tally.pixels += own.color.len();
     tally.undecided += judge::undecided(&reference);
-    let apart = judge::wrong(&own, &reference, options, matches!(scene.colors, Colors::Textured(_)));
+    let digits = match digits(scene, camera, options) {
+        Ok(digits) => digits,
+        Err(why) => return vec![why],
+    };
+    let apart = judge::wrong(&own, &reference, &digits, matches!(scene.colors, Colors::Textured(_)));
     let mut wrong = Vec::new();
     wrong.extend((!apart.is_empty()).then(|| format!("reference: {apart}")));
     for (name, scene, options, gpu) in forms {
@@ -224,6 +228,30 @@ fn wrong(
         }
     }
     wrong
+}
+
+/// How far means may lie apart at each pixel because of the digits of their sums.
+fn digits(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Vec<f32>, String> {
+    if !judge::has_few_digits(options.accumulator) {
+        return Ok(vec![0.0; camera.pixels()]);
+    }
+    let Samples { across, down } = options.samples;
+    let maps = Maps::of(&[Map::Count, Map::Weight]);
+    let one = RenderOptions { samples: Samples::ONE, maps, accumulator: Accumulator::Fixed, ..options.clone() };
+    let sampled = camera.sampled(options.samples).map_err(|error| error.to_string())?;
+    let frame = render(scene, &sampled, &one, &Backend::Reference, &()).map_err(|error| error.to_string())?.0;
+    let (low, high) = scene.color_range();
+    let span = (0..4).map(|k| f64::from(high[k].max(0.0) - low[k].min(0.0))).fold(1.0, f64::max);
+    // Light multiplies colours; a highlight turns its power times as fast as the normal, whose
+    // components span 2.
+    let light: f64 = options.lights.iter().map(|light| f64::from(light.intensity())).sum();
+    let lit = match options.shading {
+        Shading::Unlit => span,
+        Shading::Lambert => span * (1.0 + 3.0 * light),
+        Shading::Phong => span * (1.0 + 3.0 * light) + 2.0 * light * f64::from(options.shininess),
+    };
+    let of_scene = (options.accumulator.row(), scene.surfels.len() as u64, lit.max(2.0));
+    Ok(judge::of_sums(&frame, [across as usize, down as usize], of_scene))
 }
 
 fn devices() -> Option<Devices> {

@@ -210,6 +210,9 @@ fn paintings(random: &mut Random) -> Base {
     for axis in scene.surfels.iter_mut().flat_map(|surfel| [&mut surfel.s, &mut surfel.t]) {
         *axis = axis.map(|c| 2.0 * c);
     }
+    if let Colors::Textured(textured) = &mut scene.colors {
+        *textured = textured.enlarged(2.0);
+    }
     let camera = view(DVec3::ZERO, random);
     let mesh = (direction(random) * random.between(0.0, 0.8), random.between(0.3, 1.1));
     Base { scene, camera, mesh, name: "painted" }

@@ -132,6 +132,34 @@ fn unlit() -> RenderOptions {
     RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
 }
 
+/// Coordinates of fragments outside the disks leave the scene's range: both take the range's end.
+#[test]
+fn filtered_surfels_are_painted_alike_outside_their_disks() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = camera(60, Projection::Pinhole);
+    let globe = globe(60, 0.4, waves(true));
+    let options = RenderOptions { low_pass: LowPass::Max, maps: Maps::of(&[Map::TexZ]), ..unlit() };
+    let exact = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let (twin, _) = render(&globe, &camera, &exact, &Backend::Reference, &()).unwrap();
+    let decided = |pixel: &usize| twin.map(Map::Decision).unwrap()[*pixel] > 1e-3;
+    let apart = |sources: Sources| {
+        let backend = Backend::Gpu { gpu: Box::new(gpu.clone()), sources };
+        let (frame, _) = render(&globe, &camera, &options, &backend, &()).unwrap();
+        let (ours, theirs) = (frame.map(Map::TexZ).unwrap(), twin.map(Map::TexZ).unwrap());
+        let step =
+            |pixel: usize| (0..2).map(|k| (ours[3 * pixel + k] - theirs[3 * pixel + k]).abs()).fold(0.0, f32::max);
+        (0..frame.color.len()).filter(decided).map(step).filter(|step| step.is_finite()).fold(0.0, f32::max)
+    };
+    let error = apart(Sources::default());
+    assert!(error < 1e-4, "{error}");
+    // Control: another end of the range.
+    let from = "let seen = clamp(beyond, vec2<f32>(0.0), vec2<f32>(1.0));";
+    let cut =
+        Sources::default().replace("texture.wgsl", from, "let seen = clamp(beyond, vec2<f32>(0.1), vec2<f32>(0.9));");
+    let error = apart(cut.unwrap());
+    assert!(error > 1e-3, "{error}");
+}
+
 #[test]
 fn the_device_paints_as_its_twin_does() {
     let Some(gpu) = common::gpu() else { return };

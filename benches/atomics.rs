@@ -22,7 +22,7 @@
 //! repetitions of all kernels alternate, so that a busy machine slows all of them alike; the median is printed with the
 //! median distance from it.
 
-use epsplat::gpu::device::{INSTALL_HINT, adapters};
+use epsplat::low_level::gpu::device::{INSTALL_HINT, adapters};
 use std::process::ExitCode;
 use std::time::Instant;
 

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use epsplat::Progress;
 use epsplat::io::Points;
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::{FromPoints, Size, from_points};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::{FromPoints, Size, from_points};
 
 /// What each part took, in seconds.
 #[derive(Default)]

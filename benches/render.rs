@@ -5,13 +5,13 @@
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use epsplat::gpu::Gpu;
 use epsplat::io::Points;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Lens};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{Camera, Lens};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
 
 fn sphere(count: u64, with_normals: bool) -> Points {
     let samples: Vec<_> = generate(Shape::Sphere, count).collect();

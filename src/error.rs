@@ -111,6 +111,15 @@ impl Error {
         Self::Write { path: path.to_owned(), source }
     }
 
+    /// Names the file of an [`Error::EmptyScene`] if there is exactly one input.
+    #[must_use]
+    pub fn of_inputs(self, inputs: &[PathBuf]) -> Self {
+        match (self, inputs) {
+            (Self::EmptyScene(what), [input]) => Self::malformed(input, what),
+            (error, _) => error,
+        }
+    }
+
     /// This failure, of the picture at `path` of many.
     pub fn of_view(self, path: &Path) -> Self {
         Self::View { path: path.to_owned(), source: Box::new(self) }

@@ -20,6 +20,12 @@ pub struct Frame {
     maps: BTreeMap<Map, Vec<f32>>,
 }
 
+/// The host memory of a frame while it is encoded and written, bytes per pixel: 48, and 8 for each
+/// value of a map.
+pub fn pixel_bytes(maps: Maps) -> u64 {
+    48 + 8 * maps.iter().map(|map| map.width() as u64).sum::<u64>()
+}
+
 /// Numbers are equal by their bits, which may be those of no f32.
 impl PartialEq for Frame {
     fn eq(&self, other: &Self) -> bool {

@@ -1,7 +1,7 @@
 //! Headless rendering of surfels and point clouds with compute kernels only.
 //!
 //! A surfel is an oriented elliptical disk. Rendering blends the disks that make up the nearest surface at each pixel
-//! (Pajarola et al. 2003, Botsch et al. 2005), in four stages, each a file of [`passes`] with a kernel and an f64 twin:
+//! (Pajarola et al. 2003, Botsch et al. 2005), in four stages, each a file of [`low_level::passes`] with a kernel and an f64 twin:
 //!
 //! ```text
 //! splats = project(surfels, camera)             (u, v, 1)/z = [s t p]^-1 K^-1 (x, y, 1)
@@ -13,53 +13,53 @@
 //! Four rules make it one design:
 //!
 //! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in any order.
-//! 2. Only what a scene needs exists: [`plan::SceneNeeds`] chooses the files that are joined into a kernel.
-//! 3. WGSL states a layout, [`gpu::layout`] mirrors it, a test decides.
+//! 2. Only what a scene needs exists: [`low_level::plan::SceneNeeds`] chooses the files that are joined into a kernel.
+//! 3. WGSL states a layout, [`low_level::gpu::layout`] mirrors it, a test decides.
 //! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend without an adapter.
 //!
 //! ```
-//! use epsplat::render::{Backend, render};
-//! use epsplat::plan::RenderOptions;
-//! use epsplat::scene::{Camera, Lens};
+//! use epsplat::{DeviceOptions, Map, Points, Renderer, RenderOptions, Scene, SceneOptions, View};
 //!
-//! let points = epsplat::io::Points {
-//!     positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
-//!     ..Default::default()
-//! };
-//! let (scene, _) = epsplat::surfels::build(vec![points], &())?;
-//! let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene))?;
-//! let (frame, report) = render(&scene, &camera, &RenderOptions::default(), &Backend::Reference, &())?;
-//! assert!(frame.color.iter().any(|pixel| pixel[3] > 0.0));
-//! assert_eq!(report.surfels, 4);
+//! let positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+//! let points = Points { positions, ..Points::default() };
+//! // Scene::open reads files.
+//! let scene = Scene::from_points(vec![points], &SceneOptions::default());
+//! let mut options = RenderOptions::default();
+//! options.maps.aov = vec![Map::Depth];
+//! // The best adapter that there is, or the f64 reference where there is none.
+//! let mut renderer = Renderer::new(&scene, &options, &DeviceOptions::default(), &())?;
+//! let picture = renderer.frame(&View::default(), &())?;
+//! assert!(picture.frame.color.iter().any(|pixel| pixel[3] > 0.0));
+//! assert_eq!(picture.frame.map(Map::Depth).map(<[f32]>::len), Some(1024 * 1024));
+//! assert_eq!(picture.report.surfels, 4);
 //! # Ok::<(), epsplat::Error>(())
 //! ```
 
-#[cfg(feature = "bench")]
-pub mod bench;
-pub mod error;
-pub mod frame;
-pub mod gpu;
+mod error;
 pub mod guide;
-#[cfg(feature = "bench")]
-pub mod hardcases;
 pub mod io;
+pub mod lod;
+pub mod low_level;
 mod memory;
-#[cfg(feature = "bench")]
-pub mod metrics;
 mod morton;
 pub mod options;
-pub mod passes;
-pub mod plan;
-pub mod progress;
+mod progress;
 mod random;
-pub mod render;
-#[cfg(feature = "bench")]
-pub mod report;
-pub mod scene;
 mod sets;
-pub mod surfels;
-pub mod truth;
+mod stage;
+
+pub use glam;
 
 pub use error::{Error, Result};
+pub use io::{Mesh, Points, Texture};
+pub use low_level::frame::Frame;
+pub use low_level::render::Report;
+pub use low_level::scene::{Bounds, Camera, Lens, Map, Maps, Up};
+pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
-pub use render::inspect;
+pub use stage::{Files, Picture, ReadReport, Renderer, Scene, View, ViewReport};
+
+// Inside the library modules are named from the root.
+#[cfg(feature = "bench")]
+use low_level::{bench, hardcases, metrics, report};
+use low_level::{frame, gpu, passes, plan, render, scene, surfels, truth};

@@ -8,6 +8,9 @@ pub trait Progress: Sync {
     fn advance(&self, units: u64);
     /// The stage is over.
     fn end(&self);
+    /// A sentence for the user: a default that was chosen, a part that was left out, a
+    /// warning. Ignored unless implemented.
+    fn note(&self, _line: &str) {}
 }
 
 /// Nobody watches.

@@ -15,15 +15,15 @@ mod program;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
-use epsplat::frame::Frame;
-use epsplat::gpu::Gpu;
 use epsplat::io::Points;
-use epsplat::metrics::compare;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, Renderer};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Scene, Shading};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::metrics::compare;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, Renderer};
+use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Lens, Scene, Shading};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
 use glam::DVec3;
 
 use program::{Program, THREADS, View};

@@ -15,11 +15,11 @@
 use std::sync::Mutex;
 use std::time::Instant;
 
-use epsplat::frame::Frame;
-use epsplat::passes::order::order;
-use epsplat::plan::RenderOptions;
-use epsplat::scene::color::SRGB8_TO_LINEAR;
-use epsplat::scene::{Camera, Colors, Scene, Surfel};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::passes::order::order;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::scene::color::SRGB8_TO_LINEAR;
+use epsplat::low_level::scene::{Camera, Colors, Scene, Surfel};
 use glam::{Mat3, Vec2, Vec3};
 
 /// Threads of the program.

@@ -39,7 +39,7 @@ fn line_after(path: &str, key: &str, separator: char) -> Option<String> {
 ///
 /// ```
 /// let typed = ["/usr/bin/epsplat", "bench", "benches/kernels.toml", "--out", "/home/me/out"];
-/// let command = epsplat::bench::machine::command(typed.map(str::to_owned));
+/// let command = epsplat::low_level::bench::machine::command(typed.map(str::to_owned));
 /// assert_eq!(command, "epsplat bench benches/kernels.toml --out out");
 /// ```
 pub fn command(arguments: impl IntoIterator<Item = String>) -> String {

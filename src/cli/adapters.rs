@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::gpu::{AdapterDescription, adapters};
+use epsplat::low_level::gpu::{AdapterDescription, adapters};
 use serde::Serialize;
 
 use super::{outputs, print, write_json};
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let _ = match auto {
         Some(name) => writeln!(text, "auto picks {name}"),
-        None => writeln!(text, "auto picks the f64 reference: {}", epsplat::gpu::device::INSTALL_HINT),
+        None => writeln!(text, "auto picks the f64 reference: {}", epsplat::low_level::gpu::device::INSTALL_HINT),
     };
     print(&text)
 }

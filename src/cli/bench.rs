@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::time::SystemTime;
 
 use clap::Args;
-use epsplat::bench::{self, Definition, machine, table};
-use epsplat::gpu::Gpu;
 use epsplat::io::atomic;
-use epsplat::render::Backend;
-use epsplat::{Error, Result, report};
+use epsplat::low_level::bench::{self, Definition, machine, table};
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::render::Backend;
+use epsplat::low_level::report;
+use epsplat::{Error, Result};
 
 use super::outputs::Source;
 use super::progress::Bars;

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use clap::Args;
-use epsplat::bench::card::{self, Asked, Told};
-use epsplat::bench::{Definition, machine};
 use epsplat::io::atomic;
-use epsplat::{Error, Result, report};
+use epsplat::low_level::bench::card::{self, Asked, Told};
+use epsplat::low_level::bench::{Definition, machine};
+use epsplat::low_level::report;
+use epsplat::{Error, Result};
 
 use super::outputs::Source;
 use super::progress::Bars;

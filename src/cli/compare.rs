@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use epsplat::frame::Frame;
-use epsplat::metrics::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, compare};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::metrics::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, compare};
 use epsplat::{Error, Result, io};
 
 use super::{outputs, print, write_json};

@@ -4,16 +4,17 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::metrics::SurfaceDistances;
-use epsplat::metrics::coverage::{Coverage, DEFAULT_SIDE, DEFAULT_VIEWS, coverage};
-use epsplat::surfels::build;
-use epsplat::truth::TriangleTree;
-use epsplat::{Error, Progress, Result, io};
+use epsplat::low_level::metrics::SurfaceDistances;
+use epsplat::low_level::metrics::coverage::{Coverage, DEFAULT_SIDE, DEFAULT_VIEWS, coverage};
+use epsplat::low_level::surfels::build;
+use epsplat::low_level::truth::TriangleTree;
+use epsplat::options::InputOptions;
+use epsplat::{Error, Files, Progress, Result, io};
 use serde::Serialize;
 
+use super::inputs::help_of_all;
 use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
 /// Measure holes of surfels that represent a mesh, and their distance from it.
@@ -25,10 +26,10 @@ use super::{note, outputs, print, write_json};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Files of surfels, or of points, whose radii are then estimated"))]
+    #[arg(required = true, help = help_of_all("Files of surfels, or of points, whose radii are then estimated"))]
     surfels: Vec<PathBuf>,
     #[command(flatten)]
-    reading: Reading,
+    reading: InputOptions,
     /// Mesh that the surfels represent: .obj or .ply
     #[arg(long)]
     mesh: PathBuf,
@@ -57,7 +58,8 @@ struct Outcome {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let read = arguments.reading.sources(&arguments.surfels).chain([Source::cloud(&arguments.mesh)]);
+    let files = Files::new(&arguments.surfels, &arguments.reading)?;
+    let read = Source::of(&files).chain([Source::cloud(&arguments.mesh)]);
     outputs::check(read, &arguments.json)?;
     let bars = Bars::new();
     let mesh = io::read_mesh(&arguments.mesh, &bars)?;
@@ -65,8 +67,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if triangles.is_empty() {
         return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
     }
-    let points = arguments.reading.all(&arguments.surfels, &bars)?;
-    let (scene, preparation) = build(points, &bars).map_err(|error| named(error, &arguments.surfels))?;
+    let points = files.read(&bars)?;
+    let (scene, preparation) = build(points, &bars).map_err(|error| files.named(error))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_radii > 0 {
         note(&format!("{} surfels have no radius: it is estimated from neighbours", preparation.estimated_radii));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::io::ply;
-use epsplat::surfels::analytic::{Shape, gaussians, generate};
+use epsplat::low_level::surfels::analytic::{Shape, gaussians, generate};
 use epsplat::{Progress, Result};
 
 use super::progress::Bars;

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use epsplat::gpu::Gpu;
-use epsplat::hardcases::{Outcome, Row, Verdict, cases, run as run_cases, supported};
-use epsplat::plan::{Accumulator, check};
-use epsplat::render::Backend;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::hardcases::{Outcome, Row, Verdict, cases, run as run_cases, supported};
+use epsplat::low_level::plan::{Accumulator, check};
+use epsplat::low_level::render::Backend;
 use epsplat::{Error, Result};
 
 use super::progress::Bars;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::io::{self, Material, Mesh, Texture};
-use epsplat::surfels::hybrid::{Report, hybrid, pixel};
+use epsplat::low_level::surfels::hybrid::{Report, hybrid, pixel};
+use epsplat::options::FormatOptions;
 use epsplat::{Error, Result};
 use serde::Serialize;
 
 use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{InputFormat, named};
 use super::{note, outputs, print, write_json};
 
 /// Divide a mesh into surfels, where its triangles are tiny, and triangles elsewhere.
@@ -27,7 +27,7 @@ pub struct Arguments {
     /// Mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
     #[command(flatten)]
-    input: InputFormat,
+    input: FormatOptions,
     /// Output file of the surfels: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -64,14 +64,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let read = || [&arguments.mesh].into_iter().chain(&arguments.texture).map(Source::other);
     let written = || [&arguments.output, &beside].into_iter().chain(&arguments.json);
     outputs::check(read(), written())?;
-    let second = outputs::all_named([arguments.input.source(&arguments.mesh)])?;
+    let second = outputs::all_named([Source::Cloud(&arguments.mesh, arguments.input.input_format)])?;
     let read = || read().chain(second.iter().map(Source::other));
     outputs::check_distinct(read(), written())?;
     let bars = Bars::new();
     let mesh = mesh(arguments, &bars)?;
     let pixel = pixel(&mesh, arguments.pixels)
         .ok_or_else(|| Error::malformed(&arguments.mesh, "it has no triangles whose corners are finite and apart"))?;
-    let divided = hybrid(&mesh, pixel, &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
+    let divided =
+        hybrid(&mesh, pixel, &bars).map_err(|error| error.of_inputs(std::slice::from_ref(&arguments.mesh)))?;
     let painted = divided.triangles.iter().filter(|mesh| mesh.texture.is_some());
     let images: Vec<_> = painted.flat_map(|mesh| &mesh.materials).filter_map(Material::painted).collect();
     let paths: Vec<PathBuf> = (1..=images.len()).map(|k| image(&arguments.output, k)).collect();

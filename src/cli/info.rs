@@ -5,14 +5,16 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::Result;
 use epsplat::io::{About, Points, class_name};
-use epsplat::scene::{Colors, Scene, gaussian};
-use epsplat::surfels::{self, ASLANT, Coverage, Preparation};
+use epsplat::low_level::scene::{Colors, Scene, gaussian};
+use epsplat::low_level::surfels::{self, ASLANT, Coverage, Preparation};
+use epsplat::options::InputOptions;
+use epsplat::{Files, Result};
 use serde::Serialize;
 
+use super::inputs::help_of;
+use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{Reading, help_of, named};
 use super::{outputs, print, write_json};
 
 /// Describe a file: its points, attributes, bounding box, coverage, and how they are rendered.
@@ -22,7 +24,7 @@ pub struct Arguments {
     #[arg(help = help_of("A point cloud or mesh"))]
     input: PathBuf,
     #[command(flatten)]
-    reading: Reading,
+    reading: InputOptions,
     /// Write the description as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
@@ -134,9 +136,10 @@ impl Gaussians {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check(arguments.reading.sources(std::slice::from_ref(&arguments.input)), &arguments.json)?;
+    let source = Source::Cloud(&arguments.input, arguments.reading.file.input_format);
+    outputs::check([source], &arguments.json)?;
     let bars = Bars::new();
-    let mut points = arguments.reading.described(&arguments.input, &bars)?;
+    let mut points = Files::described(&arguments.input, &arguments.reading, &bars)?;
     let about = points.about.take().map(|about| *about).unwrap_or_default();
     let beside = points.beside.clone();
     if let Some(triangles) = beside.clone().filter(|_| points.positions.is_empty()) {
@@ -158,7 +161,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let of_colors = if about.intensities.is_some() { "none" } else { colors(&points) };
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), of_colors);
     let (scene, preparation) =
-        surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
+        surfels::build(vec![points], &bars).map_err(|error| error.of_inputs(std::slice::from_ref(&arguments.input)))?;
     let gaussians = Gaussians::of(&scene);
     // Gaussians are no samples of a closed surface, so gaps between them mean nothing.
     let coverage = if gaussians.is_some() { None } else { surfels::coverage(&scene, &bars)? };

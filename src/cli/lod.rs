@@ -4,15 +4,17 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use epsplat::Result;
 use epsplat::io::{atomic, ply};
-use epsplat::scene::Cut;
-use epsplat::surfels::{self, hierarchy};
+use epsplat::low_level::scene::Cut;
+use epsplat::low_level::surfels::{self, hierarchy};
+use epsplat::options::parse::memory;
+use epsplat::options::{InputOptions, LimitOptions};
+use epsplat::{Files, Result};
 use serde::Serialize;
 
-use super::parse::parse_memory;
+use super::inputs::help_of_all;
+use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs, print, write_json};
 
 /// Build levels of detail for `render --lod`, written as PLY with the surfels.
@@ -28,14 +30,14 @@ use super::{note, outputs, print, write_json};
 )]
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Surfels, point clouds or meshes"))]
-    pub(super) inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     #[command(flatten)]
-    pub(super) reading: Reading,
+    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
     #[command(flatten)]
-    limits: LimitArguments,
+    limits: LimitOptions,
     /// Write a cut of the tree in place of the tree: nodes of up to this radius, world units
     ///
     /// A node replaces the surfels below it if all of them fit into a ball of this radius. A node
@@ -46,7 +48,7 @@ pub struct Arguments {
     ///
     /// Inputs must be binary PLY files with normals and radii, or half-axes. The temporary files
     /// are beside the output and up to twice its size. The output is the same as without the option
-    #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
+    #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
     memory: Option<u64>,
     /// Write the tree's counts and times as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
@@ -72,12 +74,13 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
+    let files = Files::new(&arguments.inputs, &arguments.reading)?;
     let written = [&arguments.output].into_iter().chain(&arguments.json);
-    outputs::check(arguments.reading.sources(&arguments.inputs), written)?;
+    outputs::check(Source::of(&files), written)?;
     let bars = Bars::new();
     let report = match arguments.memory {
-        Some(memory) => out_of_core(arguments, memory, &bars)?,
-        None => in_memory(arguments, &bars)?,
+        Some(memory) => out_of_core(arguments, &files, memory, &bars)?,
+        None => in_memory(arguments, &files, &bars)?,
     };
     match &arguments.json {
         Some(path) => write_json(path, &report),
@@ -85,17 +88,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-fn in_memory(arguments: &Arguments, bars: &Bars) -> Result<Report> {
+fn in_memory(arguments: &Arguments, files: &Files, bars: &Bars) -> Result<Report> {
     let mut started = Instant::now();
     let mut seconds = || std::mem::replace(&mut started, Instant::now()).elapsed().as_secs_f64();
-    let inputs = arguments.reading.all(&arguments.inputs, bars)?;
+    let inputs = files.read(bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;
     if inputs.iter().any(|points| points.texture.is_some()) {
         note("warning: texture coordinates are left out, as levels of detail do not support them");
     }
     let read = seconds();
     let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), bars)
-        .map_err(|error| named(error, &arguments.inputs))?;
+        .map_err(|error| files.named(error))?;
     preparation.notes().iter().for_each(|line| note(line));
     let made = seconds();
     let (scene, tree) = match scene.hierarchy.clone() {
@@ -118,9 +121,9 @@ fn in_memory(arguments: &Arguments, bars: &Bars) -> Result<Report> {
 }
 
 /// Builds the tree within `memory` bytes from points that are read piece by piece.
-fn out_of_core(arguments: &Arguments, memory: u64, bars: &Bars) -> Result<Report> {
+fn out_of_core(arguments: &Arguments, files: &Files, memory: u64, bars: &Bars) -> Result<Report> {
     let started = Instant::now();
-    let files = arguments.reading.rows(&arguments.inputs)?;
+    let files = files.rows(bars)?;
     let place = atomic::place_of(&arguments.output);
     let folder = place.as_deref().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_owned);
     let made = hierarchy::out_of_core::write_levels(&files, memory, (&arguments.output, &folder), bars)?;

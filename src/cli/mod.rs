@@ -9,11 +9,10 @@ mod generate;
 mod hardcases;
 mod hybrid;
 mod info;
+mod inputs;
 mod lod;
 mod outputs;
-mod parse;
 mod progress;
-mod reading;
 mod render;
 mod sample;
 mod signals;
@@ -27,8 +26,6 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use epsplat::{Error, Result};
 use serde::Serialize;
-
-use self::reading::with_folders;
 
 /// Render point clouds, surfels, meshes and Gaussian surfels without a display.
 #[derive(Parser)]
@@ -73,16 +70,11 @@ enum Command {
 pub fn run() -> ExitCode {
     signals::watch();
     let outcome = match Arguments::parse().command {
-        Command::Render(mut arguments) => {
-            let render::Arguments { inputs, reading, .. } = &mut *arguments;
-            with_folders(inputs, reading).and_then(|()| render::run(&arguments))
-        }
+        Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
-        Command::Surfels(mut arguments) => {
-            with_folders(&mut arguments.inputs, &mut arguments.reading).and_then(|()| surfels::run(&arguments))
-        }
+        Command::Surfels(arguments) => surfels::run(&arguments),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
@@ -91,9 +83,7 @@ pub fn run() -> ExitCode {
         Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
         Command::Hybrid(arguments) => hybrid::run(&arguments),
-        Command::Lod(mut arguments) => {
-            with_folders(&mut arguments.inputs, &mut arguments.reading).and_then(|()| lod::run(&arguments))
-        }
+        Command::Lod(arguments) => lod::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,7 +6,7 @@ use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
 use epsplat::io::{Format, Points, atomic, companions};
-use epsplat::{Error, Result};
+use epsplat::{Error, Files, Result};
 
 use super::note;
 
@@ -22,6 +22,12 @@ pub(super) enum Source<'a> {
 impl<'a> Source<'a> {
     pub(super) fn cloud(path: &'a (impl AsRef<Path> + ?Sized)) -> Self {
         Self::Cloud(path.as_ref(), None)
+    }
+
+    /// Returns the files of a scene.
+    pub(super) fn of(files: &'a Files) -> impl Iterator<Item = Self> {
+        let format = files.options().file.input_format;
+        files.paths().iter().map(move |path| Self::Cloud(path, format))
     }
 
     pub(super) fn other(path: &'a (impl AsRef<Path> + ?Sized)) -> Self {
@@ -58,7 +64,7 @@ pub(super) fn check_distinct<'a, O: AsRef<Path>>(
     inputs: impl IntoIterator<Item = Source<'a>>,
     outputs: impl IntoIterator<Item = O>,
 ) -> Result<()> {
-    let mut written = Files::default();
+    let mut written = Written::default();
     for output in outputs {
         let output = output.as_ref();
         if output == Path::new("-") {
@@ -134,14 +140,14 @@ pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>
 
 /// Files to be written, by their resolved path and, if they exist, by their identity on disk.
 #[derive(Default)]
-struct Files {
+struct Written {
     places: HashMap<PathBuf, PathBuf>,
     nodes: HashMap<Node, PathBuf>,
     /// Existing files behind streams, such as a redirected stdout.
     streams: HashMap<Node, PathBuf>,
 }
 
-impl Files {
+impl Written {
     /// Adds a file. If it is there already, returns the path under which it was added.
     fn add(&mut self, path: &Path) -> Option<PathBuf> {
         let Some(place) = atomic::place_of(path) else {

@@ -47,4 +47,21 @@ impl Progress for Bars {
     fn end(&self) {
         self.with(|bar| bar.finish_and_clear());
     }
+
+    fn note(&self, line: &str) {
+        super::note(line);
+    }
+}
+
+/// Notes without progress bars.
+pub struct Notes;
+
+impl Progress for Notes {
+    fn begin(&self, _what: &str, _units: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+
+    fn note(&self, line: &str) {
+        super::note(line);
+    }
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 use epsplat::io::{self, Material, Mesh, Texture};
-use epsplat::surfels::curve;
-use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
+use epsplat::low_level::surfels::curve;
+use epsplat::low_level::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
+use epsplat::options::FormatOptions;
 use epsplat::{Error, Result};
 
 use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{InputFormat, named};
 use super::{note, outputs};
 
 /// Cover a mesh with a given number of surfels, written as PLY.
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
     #[command(flatten)]
-    input: InputFormat,
+    input: FormatOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -74,7 +74,10 @@ enum Shape {
 pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
     let texture = arguments.texture.iter().map(Source::other);
-    outputs::check([arguments.input.source(&arguments.mesh)].into_iter().chain(texture), [&arguments.output])?;
+    outputs::check(
+        [Source::Cloud(&arguments.mesh, arguments.input.input_format)].into_iter().chain(texture),
+        [&arguments.output],
+    )?;
     let bars = Bars::new();
     if arguments.shape == Shape::Cap && matches!(arguments.method, Placement::Uniform) {
         return Err(Error::Usage("uniform samples have no half-axes to curve: leave --shape cap out".into()));
@@ -94,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Placement::Uniform => Method::Uniform,
     };
     let (points, sampling) = sample(&mesh, arguments.count as usize, &method, arguments.seed, &bars)
-        .map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
+        .map_err(|error| error.of_inputs(std::slice::from_ref(&arguments.mesh)))?;
     let points = if arguments.shape == Shape::Cap { curve(points, &bars)? } else { points };
     sampling.notes().iter().for_each(|line| note(line));
     io::ply::write_points(&arguments.output, &points, &bars)?;

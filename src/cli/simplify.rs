@@ -5,14 +5,16 @@ use std::str::FromStr;
 
 use clap::Args;
 use epsplat::io::{Points, ply};
-use epsplat::surfels::simplify::{
+use epsplat::low_level::surfels::simplify::{
     Options, Report, SplatShape, Tolerance, as_in_the_thesis, points, simplify_in_texture,
 };
-use epsplat::surfels::{self, Coordinates};
-use epsplat::{Error, Result};
+use epsplat::low_level::surfels::{self, Coordinates};
+use epsplat::options::InputOptions;
+use epsplat::{Error, Files, Result};
 
+use super::inputs::help_of_all;
+use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
 /// Replace surfels by fewer, larger ones within a tolerance, without holes.
@@ -26,10 +28,10 @@ use super::{note, outputs, print, write_json};
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
 )]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Point clouds or meshes, whose vertices are used"))]
+    #[arg(required = true, help = help_of_all("Point clouds or meshes, whose vertices are used"))]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
-    reading: Reading,
+    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -92,16 +94,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ));
     }
     let written = [&arguments.output].into_iter().chain(&arguments.json);
-    outputs::check(arguments.reading.sources(&arguments.inputs), written)?;
+    let files = Files::new(&arguments.inputs, &arguments.reading)?;
+    outputs::check(Source::of(&files), written)?;
     let bars = Bars::new();
-    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
+    let inputs = files.read(&bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;
     let with_places = inputs.iter().filter(|points| points.texture.is_some()).count();
     if with_places > 0 && inputs.iter().any(|points| points.texture.is_none() && !points.positions.is_empty()) {
         note("warning: texture coordinates are left out, as some inputs have none");
     }
     let (scene, preparation, coordinates) =
-        surfels::build_at_vertices(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
+        surfels::build_at_vertices(inputs, &bars).map_err(|error| files.named(error))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {
         note(&format!(

@@ -4,12 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::io::ply;
-use epsplat::surfels::{FromPoints, Orientation, Size, from_points};
-use epsplat::{Error, Result};
+use epsplat::low_level::surfels::{FromPoints, Orientation, Size, from_points};
+use epsplat::options::parse::orientation as orientation_of;
+use epsplat::options::{InputOptions, LimitOptions};
+use epsplat::{Error, Files, Result};
 
-use super::parse::parse_orientation;
+use super::inputs::help_of_all;
+use super::outputs::Source;
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs};
 
 /// Make surfels from points and write them as PLY: oriented normals, ellipses without gaps.
@@ -21,9 +23,9 @@ use super::{note, outputs};
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Point clouds, or meshes, whose vertices are used"))]
-    pub(super) inputs: Vec<PathBuf>,
+    inputs: Vec<PathBuf>,
     #[command(flatten)]
-    pub(super) reading: Reading,
+    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -40,14 +42,14 @@ pub struct Arguments {
     ///
     /// propagate carries the side from neighbour to neighbour. For several scanners give the option
     /// once for each: normals point to the nearest one
-    #[arg(long, value_name = "propagate|up|X,Y,Z", default_value = "propagate", value_parser = parse_orientation,
+    #[arg(long, value_name = "propagate|up|X,Y,Z", default_value = "propagate", value_parser = orientation_of,
         allow_hyphen_values = true)]
     orient: Vec<Orientation>,
     /// Estimate all normals, also those that the files have
     #[arg(long)]
     estimate_normals: bool,
     #[command(flatten)]
-    limits: LimitArguments,
+    limits: LimitOptions,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -58,11 +60,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         estimate_normals: arguments.estimate_normals,
         limits: arguments.limits.limits(),
     };
-    outputs::check(arguments.reading.sources(&arguments.inputs), [&arguments.output])?;
+    let files = Files::new(&arguments.inputs, &arguments.reading)?;
+    outputs::check(Source::of(&files), [&arguments.output])?;
     let bars = Bars::new();
-    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
+    let inputs = files.read(&bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;
-    let mut surfels = from_points(inputs, &options, &bars).map_err(|error| named(error, &arguments.inputs))?;
+    let mut surfels = from_points(inputs, &options, &bars).map_err(|error| files.named(error))?;
     surfels.points.beside = beside;
     ply::write_points(&arguments.output, &surfels.points, &bars)?;
     for line in surfels.notes() {

@@ -4,18 +4,27 @@
 //! An option that is `None` leaves the choice to the scene: Gaussians are drawn by other rules than
 //! surfels. [`RenderOptions::settle`] makes these choices.
 
+mod camera;
 mod check;
+mod device;
 mod group;
+mod input;
 mod levels;
 mod look;
 mod maps;
+pub mod parse;
 mod points;
 mod research;
 mod settle;
 mod surface;
+mod surfels;
 mod transparency;
+mod triangles;
 pub mod values;
 
+pub use camera::CameraOptions;
+pub use device::{Chosen, DeviceOptions};
+pub use input::{FormatOptions, InputOptions};
 pub use levels::LevelOptions;
 pub use look::LookOptions;
 pub use maps::MapOptions;
@@ -23,7 +32,9 @@ pub use points::PointOptions;
 pub use research::ResearchOptions;
 pub use settle::Suggested;
 pub use surface::SurfaceOptions;
+pub use surfels::{LimitOptions, SurfelOptions};
 pub use transparency::TransparencyOptions;
+pub use triangles::TriangleOptions;
 
 use std::fmt;
 
@@ -34,6 +45,21 @@ use group::Group;
 
 /// Names that options had before, and what is written in their place.
 const RENAMED: [(&str, &str); 2] = [("maps", "aov"), ("lod_caps", "lod_shape: cap or disk")];
+
+/// How files become a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+pub struct SceneOptions {
+    /// How files are read.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub input: InputOptions,
+    /// How points become surfels.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub surfels: SurfelOptions,
+    /// Meshes that are drawn as their triangles.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub triangles: TriangleOptions,
+}
 
 /// The options of a picture, scene, camera and backend apart.
 #[derive(Clone, Debug, Default, PartialEq)]

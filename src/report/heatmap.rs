@@ -57,7 +57,7 @@ impl Scale {
     /// scale have the colour of its end.
     ///
     /// ```
-    /// use epsplat::report::heatmap::Scale;
+    /// use epsplat::low_level::report::heatmap::Scale;
     /// let scale = Scale::over([1e-6, 1e-2]);
     /// assert_eq!(scale.color(0.0), [0x00, 0x00, 0x04]);
     /// assert_eq!(scale.color(1e-2), [0xfc, 0xfd, 0xbf]);

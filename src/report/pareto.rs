@@ -13,7 +13,7 @@ use super::text::{escape, significant, tick};
 /// none are on the front.
 ///
 /// ```
-/// use epsplat::report::pareto::front;
+/// use epsplat::low_level::report::pareto::front;
 /// // The third is slower than the first and no more exact.
 /// assert_eq!(front(&[(1.0, 0.1), (5.0, 0.0), (2.0, 0.1), (2.0, 0.01)]), [0, 3, 1]);
 /// ```

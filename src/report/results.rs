@@ -138,7 +138,7 @@ impl Summary {
     /// Summarises finite values; `None` if there are no values.
     ///
     /// ```
-    /// use epsplat::report::Summary;
+    /// use epsplat::low_level::report::Summary;
     /// let summary = Summary::of(&[4.0, 1.0, 2.0, 100.0]);
     /// assert_eq!(summary, Some(Summary { median: 3.0, mad: 1.5, min: 1.0, max: 100.0 }));
     /// ```

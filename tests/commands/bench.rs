@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use common::command::Folder;
-use epsplat::bench::{self, Definition};
-use epsplat::render::Backend;
+use epsplat::low_level::bench::{self, Definition};
+use epsplat::low_level::render::Backend;
 
 const STUDIES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/benches");
 

@@ -440,7 +440,7 @@ fn inputs_have_one_white_and_alphas_can_be_left_out() {
     let both = folder.path("both.ply");
     succeeds(&["surfels", text(&dark), text(&light), "-o", text(&both)]);
     let colors = epsplat::io::read(&both, &()).unwrap().colors.unwrap();
-    let epsplat::scene::Colors::Srgb8(codes) = colors else { panic!() };
+    let epsplat::low_level::scene::Colors::Srgb8(codes) = colors else { panic!() };
     assert_eq!((codes[799], codes[399][0].abs_diff(codes[440][0]) < 2), ([255; 4], true));
     let rows: String = (0..400).map(|i| format!("{} {} 0 200 100 50 {}\n", i % 20, i / 20, i % 7)).collect();
     let classes = folder.file("classes.ply", ply("x y z red green blue alpha", 400, &rows));

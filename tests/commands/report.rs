@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use base64::Engine;
-use epsplat::frame::Frame;
-use epsplat::metrics::compare;
-use epsplat::report::{ImageSet, Machine, Measurement, Numeric, Study, Summary, write};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::metrics::compare;
+use epsplat::low_level::report::{ImageSet, Machine, Measurement, Numeric, Study, Summary, write};
 
 /// A configuration: name, backend, accumulator, milliseconds for a million splats, milliseconds for a frame, error.
 type Config = (&'static str, &'static str, &'static str, f64, f64, Option<f64>);
@@ -254,7 +254,8 @@ fn failures_are_one_sentence_and_leave_no_page() {
 #[test]
 fn the_heat_map_and_the_comparison_agree_on_what_a_difference_is() {
     let (image, reference) = (frame(64, 1e-3), frame(64, 0.0));
-    let largest = epsplat::report::heatmap::differences(&image, &reference).unwrap().into_iter().fold(0.0, f64::max);
+    let largest =
+        epsplat::low_level::report::heatmap::differences(&image, &reference).unwrap().into_iter().fold(0.0, f64::max);
     assert!(largest > 0.0);
     assert_eq!(largest, compare(&image, &reference).unwrap().max_abs);
 }

@@ -2,13 +2,13 @@
 //! bounds leave undecided (at a rim, at epsilon, at the near depth) may be in or out, all others must be as the twin
 //! says. No pixel is excused; how many are left undecided is counted.
 
-use epsplat::passes::footprint::footprint;
-use epsplat::passes::splat::Splat;
-use epsplat::plan::{Facts, RenderOptions, Sides};
-use epsplat::scene::{Camera, Epsilon, Kernel, LowPass, Scene};
+use epsplat::low_level::passes::footprint::footprint;
+use epsplat::low_level::passes::splat::Splat;
+use epsplat::low_level::plan::{Facts, RenderOptions, Sides};
+use epsplat::low_level::scene::{Camera, Epsilon, Kernel, LowPass, Scene};
 
 use super::UNIT;
-use epsplat::hardcases::precision::{E, Precision};
+use epsplat::low_level::hardcases::precision::{E, Precision};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use epsplat::scene::Camera;
+use epsplat::low_level::scene::Camera;
 use glam::{DQuat, DVec3};
 
 use super::Random;

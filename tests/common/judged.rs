@@ -1,9 +1,9 @@
 //! Scenes of a test's own, judged pixel by pixel by the bounds of the hard cases.
 
-use epsplat::hardcases::{HardCase, Verdict};
-use epsplat::plan::{Accumulator, RenderOptions};
-use epsplat::render::Backend;
-use epsplat::scene::{Camera, Scene, Shading};
+use epsplat::low_level::hardcases::{HardCase, Verdict};
+use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::render::Backend;
+use epsplat::low_level::scene::{Camera, Scene, Shading};
 
 /// Fails if the device's image of `scene`, of which the reference covers such a share of pixels, exceeds its derived bound anywhere.
 pub fn judge(

@@ -2,13 +2,13 @@
 
 use std::borrow::Cow;
 
-use epsplat::frame::Frame;
-use epsplat::passes::select::{self, Wanted};
-use epsplat::passes::source::{Page, Source};
-use epsplat::plan::{Facts, RenderOptions, SceneNeeds};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Cull, Detail, Hierarchy, Mipmap, Provenance, Scene};
-use epsplat::surfels::hierarchy;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::passes::select::{self, Wanted};
+use epsplat::low_level::passes::source::{Page, Source};
+use epsplat::low_level::plan::{Facts, RenderOptions, SceneNeeds};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Cull, Detail, Hierarchy, Mipmap, Provenance, Scene};
+use epsplat::low_level::surfels::hierarchy;
 
 /// The twin's cut as a scene of its own, with what is known of all that it is a cut of: then kernels work in the same units.
 pub struct Cut {

@@ -16,15 +16,15 @@ pub use random::Random;
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use epsplat::frame::Frame;
-use epsplat::gpu::Gpu;
-use epsplat::gpu::layout::{ONE, View};
-use epsplat::plan::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::gpu::layout::{ONE, View};
+use epsplat::low_level::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, MeshNeeds, Oit,
     Raster, RasterDepth, RenderOptions, SceneNeeds, Sides, Winner, check,
 };
-use epsplat::scene::facing::POINT_SHAPES;
-use epsplat::scene::{Join, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
+use epsplat::low_level::scene::facing::POINT_SHAPES;
+use epsplat::low_level::scene::{Join, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;

@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use epsplat::gpu::Sources;
-use epsplat::gpu::interface::Bindings;
-use epsplat::gpu::interface::reflect;
-use epsplat::passes::modules;
-use epsplat::passes::select::CHOOSING;
-use epsplat::plan::SceneNeeds;
-use epsplat::plan::pass::Module;
-use epsplat::plan::steps::Kernel;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::gpu::interface::Bindings;
+use epsplat::low_level::gpu::interface::reflect;
+use epsplat::low_level::passes::modules;
+use epsplat::low_level::passes::select::CHOOSING;
+use epsplat::low_level::plan::SceneNeeds;
+use epsplat::low_level::plan::pass::Module;
+use epsplat::low_level::plan::steps::Kernel;
 use rayon::prelude::*;
 
 use super::all_needs;

@@ -1,10 +1,10 @@
 //! Seeded scenes of surfels of many kinds, made in camera space so that each kind is what its name says.
 
 use epsplat::io::{Points, Texture};
-use epsplat::scene::camera::Lens;
-use epsplat::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
-use epsplat::surfels::analytic::{Sample, Shape, generate};
-use epsplat::surfels::{build, build_textured};
+use epsplat::low_level::scene::camera::Lens;
+use epsplat::low_level::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
+use epsplat::low_level::surfels::analytic::{Sample, Shape, generate};
+use epsplat::low_level::surfels::{build, build_textured};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Random;

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use epsplat::io::ply::{self, Levels};
 use epsplat::io::{Input, Points};
-use epsplat::plan::RenderOptions;
-use epsplat::render::taken;
-use epsplat::scene::{Camera, Colors, Detail, Lens, Shading};
-use epsplat::surfels::{build, hierarchy};
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::taken;
+use epsplat::low_level::scene::{Camera, Colors, Detail, Lens, Shading};
+use epsplat::low_level::surfels::{build, hierarchy};
 
 use super::mutate::Grammar;
 use super::random::{Place, Random};
@@ -85,7 +85,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         box_.origin + glam::DVec3::new(0.1, 0.2, 4.0),
         box_.origin,
         None,
-        epsplat::scene::Up::Y,
+        epsplat::low_level::scene::Up::Y,
         1e-3,
     ) else {
         return Ok(whole);

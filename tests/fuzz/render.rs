@@ -2,12 +2,12 @@
 
 use super::Outcome;
 use super::session::sentence;
-use epsplat::frame::Frame;
 use epsplat::io::{Points, ReadOptions};
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian};
-use epsplat::surfels::{LARGEST_COORDINATE, build};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian};
+use epsplat::low_level::surfels::{LARGEST_COORDINATE, build};
 use epsplat::{Error, io};
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     // Gaussians may lack what cannot be estimated.
     let drawable = points.positions.iter().any(usable) && !points.encoded;
     // What is narrower has half-axes whose products an f32 cannot hold.
-    let narrow = epsplat::surfels::bounds(&points).extent().max_element() < 1e-15;
+    let narrow = epsplat::low_level::surfels::bounds(&points).extent().max_element() < 1e-15;
     let (scene, _) = match build(vec![points], &()) {
         Ok(built) => built,
         Err(error @ Error::EmptyScene(_)) if !drawable || narrow => {

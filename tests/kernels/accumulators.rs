@@ -9,14 +9,14 @@ use crate::common;
 use common::bits;
 use common::enclosure::{Pixel, enclose};
 use common::scenes::{sphere, sphere_camera, stack};
-use epsplat::frame::Frame;
-use epsplat::gpu::layout::View;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::hardcases::precision::E;
-use epsplat::passes::project::reference_all;
-use epsplat::plan::{Accumulator, AccumulatorRow, Facts, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::layout::View;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::hardcases::precision::E;
+use epsplat::low_level::passes::project::reference_all;
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Facts, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::{DVec3, Vec3};
 
 const KERNELS: [&str; 7] =

@@ -7,14 +7,16 @@ use crate::common;
 
 use common::scenes::{crowded, front, shuffled, sphere};
 use common::{Random, bits};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
-use epsplat::gpu::layout::Splat;
-use epsplat::hardcases::cases;
-use epsplat::inspect::stages;
-use epsplat::plan::{Accumulator, AccumulatorRow, Optimisation, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::gpu::layout::Splat;
+use epsplat::low_level::hardcases::cases;
+use epsplat::low_level::inspect::stages;
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Optimisation, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{
+    Camera, Colors, Epsilon, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up,
+};
 use glam::{DVec3, Vec3};
 
 /// Half a unit in the last place of 1 in f32.

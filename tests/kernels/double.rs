@@ -6,10 +6,10 @@ use crate::common;
 
 use bytemuck::Zeroable;
 use common::Random;
-use epsplat::gpu::Gpu;
-use epsplat::gpu::layout::View;
-use epsplat::gpu::sources::FILES;
-use epsplat::inspect::evaluate;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::gpu::layout::View;
+use epsplat::low_level::gpu::sources::FILES;
+use epsplat::low_level::inspect::evaluate;
 
 /// All functions on one pair of doubles each.
 const KERNEL: &str = "

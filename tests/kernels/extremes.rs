@@ -6,11 +6,11 @@ use crate::common;
 
 use common::judged::judge;
 use epsplat::io::Points;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Lens, Scene, Up};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Epsilon, Lens, Scene, Up};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
 use glam::DVec3;
 
 /// A unit sphere, scaled and shifted, with more points beside it.

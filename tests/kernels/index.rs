@@ -7,15 +7,15 @@ use crate::common;
 use common::Random;
 use common::command::{Folder, succeeds, text};
 use common::scenes::sphere_camera;
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{self, Points};
-use epsplat::passes::index::NOTHING;
-use epsplat::plan::{Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Colors, Kernel, LowPass, Map, Maps, Projection, Scene};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::passes::index::NOTHING;
+use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Colors, Kernel, LowPass, Map, Maps, Projection, Scene};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
 
 const WANTED: Maps = Maps::of(&[Map::Index, Map::Depth]);
 

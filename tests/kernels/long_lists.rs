@@ -7,14 +7,14 @@ use crate::common;
 use common::Random;
 use common::bits;
 use common::scenes::{front, shuffled};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::metrics::DECISION_MARGIN;
-use epsplat::passes::long_lists::most_at_once;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::composite::ALL_LAYERS;
-use epsplat::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::metrics::DECISION_MARGIN;
+use epsplat::low_level::passes::long_lists::most_at_once;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::composite::ALL_LAYERS;
+use epsplat::low_level::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
 use glam::Vec3;
 
 /// Eight pixels squared, in whose middle about `deep` disks lie behind one another, fronts and backs, and fewer toward the corners.

@@ -4,16 +4,16 @@
 
 use crate::common;
 
-use epsplat::gpu::Sources;
 use epsplat::io::Points;
-use epsplat::metrics::{Reconstruction, compare, reconstruction};
-use epsplat::passes::lowpass::RADIUS;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
-use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::metrics::{Reconstruction, compare, reconstruction};
+use epsplat::low_level::passes::lowpass::RADIUS;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
+use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::{DVec3, Vec3};
 
 /// `count` disks of `radius` spacings on `shape`.

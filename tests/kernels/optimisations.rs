@@ -6,11 +6,11 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{crowded, sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::plan::{Optimisation, RenderOptions};
-use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Camera, Epsilon, Maps, Projection, Scene};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::plan::{Optimisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Report, render};
+use epsplat::low_level::scene::{Camera, Epsilon, Maps, Projection, Scene};
 
 fn options(without: &[Optimisation]) -> RenderOptions {
     RenderOptions {

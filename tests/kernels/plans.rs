@@ -5,15 +5,15 @@
 use crate::common;
 
 use common::scenes::{sphere, sphere_camera};
-use epsplat::gpu::AdapterDescription;
-use epsplat::passes::fragments;
-use epsplat::plan::known::Listed;
-use epsplat::plan::steps::{Look, Over, Stage, Step};
-use epsplat::plan::{
+use epsplat::low_level::gpu::AdapterDescription;
+use epsplat::low_level::passes::fragments;
+use epsplat::low_level::plan::known::Listed;
+use epsplat::low_level::plan::steps::{Look, Over, Stage, Step};
+use epsplat::low_level::plan::{
     Accumulator, Band, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels,
 };
-use epsplat::render::sequence::steps;
-use epsplat::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
+use epsplat::low_level::render::sequence::steps;
+use epsplat::low_level::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
 
 /// A software adapter with all optional features, as Mesa's is.
 fn software() -> AdapterDescription {
@@ -318,12 +318,13 @@ fn what_does_not_go_together_is_refused_by_one_rule() {
     }
     let raster = Raster { format: "rgba32float".parse().unwrap(), ..Raster::default() };
     assert!(refused(RenderOptions { raster: Some(raster), ..RenderOptions::default() }).contains("32-bit floats"));
-    let check = |options: RenderOptions| epsplat::plan::check::options(&options, false).map_err(|e| e.to_string());
+    let check =
+        |options: RenderOptions| epsplat::low_level::plan::check::options(&options, false).map_err(|e| e.to_string());
     assert_eq!(check(RenderOptions::default()), Ok(()));
     let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
     assert_eq!(check(tile.clone()), Ok(()));
     let other = RenderOptions { accumulator: Accumulator::Cas, ..tile };
-    let of_study = epsplat::plan::check::by_tiles(&other).unwrap_err().to_string();
+    let of_study = epsplat::low_level::plan::check::by_tiles(&other).unwrap_err().to_string();
     assert!(check(other) == Ok(()) && of_study.contains("accumulator fixed"), "{of_study}");
     let phong = RenderOptions { shading: Shading::Phong, shininess: 1e6, ..RenderOptions::default() };
     assert!(check(phong).unwrap_err().contains("shininess"));

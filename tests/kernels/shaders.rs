@@ -7,17 +7,17 @@ use crate::common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use common::modules::{self, Made, Reflected};
-use epsplat::gpu::Sources;
-use epsplat::gpu::adapter::STORAGE_BUFFERS;
-use epsplat::gpu::interface::reflect;
-use epsplat::gpu::sources::FILES;
-use epsplat::passes;
-use epsplat::plan::pass::Making;
-use epsplat::plan::{
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::gpu::adapter::STORAGE_BUFFERS;
+use epsplat::low_level::gpu::interface::reflect;
+use epsplat::low_level::gpu::sources::FILES;
+use epsplat::low_level::passes;
+use epsplat::low_level::plan::pass::Making;
+use epsplat::low_level::plan::{
     Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, RenderOptions, SceneNeeds, Winner,
     color_channels,
 };
-use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
+use epsplat::low_level::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;

@@ -6,10 +6,10 @@ use crate::common;
 
 use common::bits;
 use common::scenes::sphere;
-use epsplat::gpu::Sources;
-use epsplat::plan::{Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Epsilon, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{Camera, Epsilon, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::DVec3;
 
 /// Where the second view is from.
@@ -26,7 +26,7 @@ fn scene() -> Scene {
     let index = scene.surfels.len() / 3;
     scene.surfels.swap(index, last);
     scene.surfels.truncate(199_999);
-    if let epsplat::scene::Colors::Srgb8(codes) = &mut scene.colors {
+    if let epsplat::low_level::scene::Colors::Srgb8(codes) = &mut scene.colors {
         codes.truncate(199_999);
     }
     scene

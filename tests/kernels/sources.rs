@@ -9,11 +9,11 @@ use std::ops::Range;
 
 use common::bits;
 use common::scenes::{sphere, sphere_camera};
-use epsplat::passes::index::NOTHING;
-use epsplat::passes::source::{Page, Source};
-use epsplat::plan::{Facts, Optimisation, RenderOptions, SceneNeeds};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
+use epsplat::low_level::passes::index::NOTHING;
+use epsplat::low_level::passes::source::{Page, Source};
+use epsplat::low_level::plan::{Facts, Optimisation, RenderOptions, SceneNeeds};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
 
 /// The surfels of `common::scenes::sphere`, made one by one.
 struct Made {

@@ -6,11 +6,11 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{cases, shuffled, sphere, sphere_camera};
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::plan::{Accumulator, Optimisation, Organisation, RenderOptions};
-use epsplat::render::sums::{Sums, resolve, sums};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Map, Maps, Projection, Scene, Shading};
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::plan::{Accumulator, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::sums::{Sums, resolve, sums};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Epsilon, Light, LowPass, Map, Maps, Projection, Scene, Shading};
 
 fn of(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Sums {
     sums(scene, camera, options, gpu, &Sources::default()).unwrap()

@@ -6,11 +6,13 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{cases, crowded, front, painted, sphere, stack};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::plan::{Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Scene, Shading, Surfel, Up};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, Report, render};
+use epsplat::low_level::scene::{
+    Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Scene, Shading, Surfel, Up,
+};
 use glam::{DVec3, Vec3};
 
 /// Kernels that take splats of more than `pixels` pixels for large.
@@ -181,7 +183,7 @@ fn a_view_that_needs_more_room_gets_it() {
     let scene = sphere(900, 2.5);
     let near = common::scenes::sphere_camera(160, Projection::Pinhole);
     // Another lens keeps the image's size, and with it the buffers.
-    let far = common::scenes::sphere_camera_with(160, epsplat::scene::Lens::Fov(170.0));
+    let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
     // Left to itself the far view, whose splats are tiny, is scattered; both ways of the sums then follow each other.
     for organisation in [Organisation::Tile, Organisation::Auto] {
         let options = RenderOptions { organisation, ..RenderOptions::default() };
@@ -206,7 +208,7 @@ fn bands_that_need_different_room_get_it() {
     let Some(gpu) = common::gpu() else { return };
     let backend = on(gpu.with_buffer_limit(120_000), large_from(30));
     let scene = sphere(900, 2.5);
-    let far = common::scenes::sphere_camera_with(160, epsplat::scene::Lens::Fov(170.0));
+    let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
     let near = common::scenes::sphere_camera(160, Projection::Pinhole);
     // In the first band, the last, and a sliver of it.
     let [up, down, sliver] = [-60.0, 60.0, 140.0].map(|moved| Camera { cy: near.cy + moved, ..near.clone() });

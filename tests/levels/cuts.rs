@@ -8,14 +8,14 @@ use bytemuck::Zeroable;
 use common::levels::{cut, frame, levels, tree};
 use common::scenes::{shuffled, sphere, sphere_camera};
 use common::{Random, bits};
-use epsplat::frame::Frame;
-use epsplat::gpu::layout::View;
-use epsplat::gpu::sources::FILES;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::inspect::evaluate;
-use epsplat::plan::{Raster, RasterDepth, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::layout::View;
+use epsplat::low_level::gpu::sources::FILES;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::inspect::evaluate;
+use epsplat::low_level::plan::{Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Epsilon, Lens, Map, Maps, Projection, Samples, Scene,
     Surfel, Up,
 };
@@ -235,7 +235,7 @@ fn crowded_leaves_are_drawn_whole() {
     assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 40_000));
     let camera = sphere_camera(90, Projection::Pinhole);
     // Copies of one surfel are one where all are drawn.
-    let options = RenderOptions { without: vec![epsplat::plan::Optimisation::Copies], ..at(1e-6) };
+    let options = RenderOptions { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
     assert_eq!(twins.scene.surfels.len(), 42_000);
     for backend in [Backend::gpu(gpu), Backend::gpu(common::gpu().unwrap().with_buffer_limit(200_000))] {
@@ -272,7 +272,7 @@ fn crowds_at_several_depths_are_drawn_whole() {
     let scene = levels(Scene { surfels, colors, ..Scene::default() });
     let (lens, eye) = (Lens::OrthographicHeight(2.2), DVec3::new(0.4, 0.0, 3.0));
     let camera = Camera::look_at((60, 60), lens, eye, DVec3::X * 0.4, None, Up::Y, 1e-3).unwrap();
-    let options = RenderOptions { without: vec![epsplat::plan::Optimisation::Copies], ..at(1e-6) };
+    let options = RenderOptions { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
     let backend = Backend::gpu(gpu);
     let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();

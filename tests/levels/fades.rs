@@ -10,15 +10,15 @@ use common::bits;
 use common::command::{Folder, fails, succeeds, text};
 use common::levels::{frame, levels};
 use common::scenes::{shuffled, sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
-use epsplat::plan::{ACCUMULATORS, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::plan::{ACCUMULATORS, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Cull, Detail, Fade, Lens, LowPass, Map, Maps, Projection, Samples, Scene,
     Shading, Surfel, Up,
 };
-use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
 use glam::{DVec3, Vec3};
 
 /// Nodes of up to so many square pixels, which fade.

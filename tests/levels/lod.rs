@@ -9,8 +9,8 @@ use std::process::Command;
 use std::sync::Arc;
 
 use epsplat::io::{self, Points, ply};
-use epsplat::scene::{Colors, Hierarchy, Scene};
-use epsplat::surfels::{build, hierarchy};
+use epsplat::low_level::scene::{Colors, Hierarchy, Scene};
+use epsplat::low_level::surfels::{build, hierarchy};
 
 fn epsplat(arguments: &[&str]) -> (i32, String, String) {
     let run = Command::new(env!("CARGO_BIN_EXE_epsplat")).args(arguments).output().unwrap();

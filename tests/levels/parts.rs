@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 use common::bits;
 use common::levels::levels;
 use common::scenes::sphere;
-use epsplat::frame::Frame;
 use epsplat::io::ply::{self, Levels};
 use epsplat::io::{self, Input};
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render, taken};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render, taken};
+use epsplat::low_level::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Lens, LowPass, Map, Maps, Samples, Scene, Surfel, Up,
     Whole,
 };
-use epsplat::surfels;
-use epsplat::surfels::part::{Taken, nothing};
+use epsplat::low_level::surfels;
+use epsplat::low_level::surfels::part::{Taken, nothing};
 use epsplat::{Error, Result};
 use glam::{DVec3, Vec3};
 
@@ -246,7 +246,7 @@ fn a_part_may_not_fit() {
     let (_, taken) = part(&path, &camera, &options).unwrap();
     let limited = |most: u64| {
         let fits = |taken: &Taken| if taken.nodes <= most { Ok(()) } else { Err(Error::Usage("too much".into())) };
-        epsplat::render::taken(&opened(&path), &[(&camera, &options)], fits, &()).map(|(_, taken)| taken)
+        epsplat::low_level::render::taken(&opened(&path), &[(&camera, &options)], fits, &()).map(|(_, taken)| taken)
     };
     assert_eq!(limited(taken.nodes).unwrap(), taken);
     assert!(matches!(limited(taken.nodes - 1), Err(Error::Usage(_))));

@@ -1,8 +1,8 @@
 //! Images too large are refused by their headers, and what the system has no room for ends in a sentence.
 
 use super::common::command::{Folder, epsplat, fails, ply, succeeds, text};
-use epsplat::frame::Frame;
-use epsplat::scene::Map;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::scene::Map;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

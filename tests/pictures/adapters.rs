@@ -7,10 +7,10 @@ use crate::common;
 use common::bits;
 use common::command::{DATA, Folder, epsplat, succeeds, text};
 use common::scenes::{crowded, sphere, sphere_camera};
-use epsplat::gpu::AdapterDescription;
-use epsplat::plan::{Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer};
-use epsplat::scene::Projection;
+use epsplat::low_level::gpu::AdapterDescription;
+use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer};
+use epsplat::low_level::scene::Projection;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -95,7 +95,7 @@ fn an_adapter_is_chosen_by_its_api_or_by_a_part_of_its_name() {
     let folder = Folder::new();
     let (scene, image) = (folder.path("s.ply"), folder.path("s.png"));
     succeeds(&["generate", "sphere", "--count", "10", "-o", text(&scene)]);
-    let all = epsplat::gpu::adapters();
+    let all = epsplat::low_level::gpu::adapters();
     let best = |chosen: &dyn Fn(&AdapterDescription) -> bool| {
         let found = all.iter().find(|adapter| adapter.usable && chosen(adapter));
         found.map(|adapter| format!("rendering on {} ({}, {})", adapter.name, adapter.api, adapter.kind))

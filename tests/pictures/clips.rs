@@ -4,18 +4,18 @@
 
 use common::Random;
 use common::scenes::{sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
 use epsplat::io::{self, Points};
-use epsplat::metrics::reconstruction;
-use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::metrics::reconstruction;
+use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{
     Camera, Clip, Colors, Cull, Facing, Lens, LowPass, Map, Maps, Outline, PointShape, Projection, Samples, Scene,
     Shading, Surfel,
 };
-use epsplat::surfels::build;
-use epsplat::truth::{DiskTree, Surface, Truth};
+use epsplat::low_level::surfels::build;
+use epsplat::low_level::truth::{DiskTree, Surface, Truth};
 use glam::{DVec3, Vec3};
 
 use crate::common;

@@ -6,12 +6,12 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{shuffled, sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
-use epsplat::metrics::compare;
-use epsplat::plan::{Optimisation, RenderOptions};
-use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Colors, LowPass, Map, Maps, Projection, Scene, Shading, Surfel};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::metrics::compare;
+use epsplat::low_level::plan::{Optimisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Report, render};
+use epsplat::low_level::scene::{Colors, LowPass, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::Vec3;
 
 /// A sphere of disks in all colours, with many copies of two disks, one of them in two colours, before it.

@@ -4,15 +4,15 @@
 
 use common::Random;
 use common::scenes::{sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
 use epsplat::io::{self, Points};
-use epsplat::metrics::reconstruction;
-use epsplat::plan::{Organisation, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Cap, Clip, Cull, Lens, LowPass, Map, Maps, Projection, Samples, Scene};
-use epsplat::surfels::{FromPoints, Limits, build, build_within, from_points};
-use epsplat::truth::{Surface, Truth};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::metrics::reconstruction;
+use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Cap, Clip, Cull, Lens, LowPass, Map, Maps, Projection, Samples, Scene};
+use epsplat::low_level::surfels::{FromPoints, Limits, build, build_within, from_points};
+use epsplat::low_level::truth::{Surface, Truth};
 use glam::Vec3;
 
 use crate::common;
@@ -25,7 +25,7 @@ fn curved() -> Scene {
         let thin = if random.between(0.0, 1.0) < 0.2 { 0.1 } else { random.between(0.4, 1.0) };
         surfel.t = surfel.t.map(|c| c * thin as f32);
     }
-    let cap = |(k, surfel): (usize, &epsplat::scene::Surfel)| {
+    let cap = |(k, surfel): (usize, &epsplat::low_level::scene::Surfel)| {
         let height = surfel.radius() * if k % 7 == 0 { 0.0 } else { 1.0 };
         let mut heights = || random.between(-0.4, 0.3) as f32 * height;
         Cap([heights(), 0.5 * heights(), heights()])

@@ -4,17 +4,17 @@
 
 use common::Random;
 use common::scenes::{sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
 use epsplat::io::Points;
-use epsplat::plan::{BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, check};
-use epsplat::render::{Backend, render};
-use epsplat::scene::facing::POINT_SHAPES;
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::plan::{BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::facing::POINT_SHAPES;
+use epsplat::low_level::scene::{
     Camera, Colors, Cull, Epsilon, Facing, Kernel, Lens, LowPass, Map, Maps, PointShape, PointSize, Projection,
     Samples, Scene, Shading, Surfel, Up,
 };
-use epsplat::surfels::{Limits, build_facing};
+use epsplat::low_level::surfels::{Limits, build_facing};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::common;

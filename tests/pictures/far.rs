@@ -6,14 +6,14 @@ use crate::common;
 
 use common::scenes::sphere;
 use common::{Random, meshes};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
 use epsplat::io::Mesh;
-use epsplat::metrics::DECISION_MARGIN;
-use epsplat::plan::{BlendFormat, Facts, Raster, RasterDepth, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Lens, Map, Maps, Scene, Triangle, Triangles, Up};
-use epsplat::surfels::with_triangles;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::metrics::DECISION_MARGIN;
+use epsplat::low_level::plan::{BlendFormat, Facts, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Lens, Map, Maps, Scene, Triangle, Triangles, Up};
+use epsplat::low_level::surfels::with_triangles;
 use glam::DVec3;
 
 fn gpu() -> Option<Backend> {

@@ -17,11 +17,11 @@ use std::sync::Arc;
 
 use common::bits;
 use common::scenes::{Case, cases, crowded, painted, sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Gpu;
-use epsplat::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
     Camera, Colors, Composite, Epsilon, Light, LowPass, MAPS, Map, Maps, Projection, Scene, Shading, Surfel,
 };
 use glam::{DVec3, Vec3};
@@ -168,7 +168,8 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
     }
     for depth in ["exact", "offset"] {
         for format in ["rgba16float", "rgba32float"] {
-            let raster = epsplat::plan::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
+            let raster =
+                epsplat::low_level::plan::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
             let options = RenderOptions { raster: Some(raster), ..with_maps() };
             add(format!("sphere, raster {depth} {format}"), &scenes.sphere, options);
         }

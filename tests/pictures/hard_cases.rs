@@ -5,11 +5,11 @@
 use crate::common;
 
 use common::judged::judge;
-use epsplat::gpu::Sources;
-use epsplat::hardcases::{self, Verdict};
-use epsplat::plan::{Accumulator, RenderOptions};
-use epsplat::render::Backend;
-use epsplat::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::hardcases::{self, Verdict};
+use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::render::Backend;
+use epsplat::low_level::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 /// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.

@@ -7,14 +7,14 @@
 
 use std::path::{Path, PathBuf};
 
-use epsplat::frame::Frame;
 use epsplat::io;
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::color::linear_to_srgb;
-use epsplat::scene::{Camera, Colors, Lens, Light, Scene, Shading};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::color::linear_to_srgb;
+use epsplat::low_level::scene::{Camera, Colors, Lens, Light, Scene, Shading};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
 use glam::Vec3;
 
 fn generated(shape: Shape, count: u64) -> Scene {

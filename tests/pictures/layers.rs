@@ -8,15 +8,15 @@ use std::path::Path;
 
 use common::scenes::generated;
 use epsplat::io::{self, Points};
-use epsplat::passes::layers::{Parting, part};
-use epsplat::passes::{Strip, fragments, project};
-use epsplat::plan::{Facts, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::composite::ALL_LAYERS;
-use epsplat::scene::{Camera, Composite, Lens, Map, Maps, Scene, Shading, Surfel, Tail, Up};
-use epsplat::surfels::analytic::Shape;
-use epsplat::surfels::build;
-use epsplat::truth::Surface;
+use epsplat::low_level::passes::layers::{Parting, part};
+use epsplat::low_level::passes::{Strip, fragments, project};
+use epsplat::low_level::plan::{Facts, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::composite::ALL_LAYERS;
+use epsplat::low_level::scene::{Camera, Composite, Lens, Map, Maps, Scene, Shading, Surfel, Tail, Up};
+use epsplat::low_level::surfels::analytic::Shape;
+use epsplat::low_level::surfels::build;
+use epsplat::low_level::truth::Surface;
 use glam::DVec3;
 use rayon::prelude::*;
 

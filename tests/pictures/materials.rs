@@ -6,12 +6,12 @@
 use crate::common;
 
 use common::command::{Folder, succeeds, text};
-use epsplat::frame::Frame;
 use epsplat::io::{self, Texture, png};
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Scene, Shading, Up};
-use epsplat::surfels::{Limits, build, build_painted, build_textured, with_triangles};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Scene, Shading, Up};
+use epsplat::low_level::surfels::{Limits, build, build_painted, build_textured, with_triangles};
 use glam::DVec3;
 use std::path::Path;
 
@@ -45,7 +45,7 @@ fn as_triangles(path: &Path) -> Scene {
 }
 
 fn seen(scene: &Scene, eye: DVec3) -> Frame {
-    let lens = epsplat::scene::Lens::Fov(40.0);
+    let lens = epsplat::low_level::scene::Lens::Fov(40.0);
     let camera = Camera::look_at((SIZE, SIZE), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
     let options = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
     render(scene, &camera, &options, &Backend::Reference, &()).unwrap().0
@@ -66,7 +66,7 @@ fn at(frame: &Frame, x: f64, y: f64) -> [u8; 4] {
     // The square is 2 wide, seen from 4 away.
     let scale = 0.5 * f64::from(SIZE) / (20f64.to_radians().tan() * 4.0);
     let pixel = |c: f64| (0.5 * f64::from(SIZE) + scale * c) as usize;
-    epsplat::scene::color::srgb8(frame.color[pixel(-y) * SIZE as usize + pixel(x)])
+    epsplat::low_level::scene::color::srgb8(frame.color[pixel(-y) * SIZE as usize + pixel(x)])
 }
 
 const FRONT: DVec3 = DVec3::new(0.0, 0.0, 4.0);
@@ -187,7 +187,7 @@ fn surfels_look_as_triangles_do() {
         // The same on the device, as its twin has it.
         let scene = painted(&path);
         if let Some(gpu) = common::gpu() {
-            let lens = epsplat::scene::Lens::Fov(40.0);
+            let lens = epsplat::low_level::scene::Lens::Fov(40.0);
             let camera = Camera::look_at((SIZE, SIZE), lens, ASLANT, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
             let options = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
             let drawn = render(&scene, &camera, &options, &Backend::gpu(gpu), &()).unwrap().0;
@@ -280,7 +280,7 @@ fn face_colours_of_a_ply_file_show() {
         let mut shown: Vec<[u8; 4]> = [ASLANT, -ASLANT]
             .iter()
             .flat_map(|eye| seen(&painted(&path), *eye).color)
-            .map(epsplat::scene::color::srgb8)
+            .map(epsplat::low_level::scene::color::srgb8)
             .collect();
         shown.retain(|color| codes.iter().any(|[r, g, b]| *color == [*r as u8, *g as u8, *b as u8, 255]));
         shown.sort_unstable();

@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use common::scenes::{sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
-use epsplat::plan::{Accumulator, BlendFormat, Optimisation, Raster, RasterDepth, RenderOptions, check};
-use epsplat::render::{Backend, render};
-use epsplat::scene::facing::POINT_SHAPES;
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::plan::{Accumulator, BlendFormat, Optimisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::facing::POINT_SHAPES;
+use epsplat::low_level::scene::{
     Blend, Colors, Facing, LowPass, Map, Maps, PointShape, Projection, Samples, Scene, Shading, Surfel,
 };
 use glam::Vec3;

@@ -6,12 +6,12 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{cases, crowded, shuffled, sphere, sphere_camera, stack};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::metrics::{DECISION_MARGIN, compare};
-use epsplat::plan::{Accumulator, Facts, Raster, RenderOptions, depths};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Composite, Kernel, Map, Maps, Projection, Samples, Scene, Shading};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::metrics::{DECISION_MARGIN, compare};
+use epsplat::low_level::plan::{Accumulator, Facts, Raster, RenderOptions, depths};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Composite, Kernel, Map, Maps, Projection, Samples, Scene, Shading};
 
 const BOTH: [Composite; 2] = [Composite::Weighted, Composite::Moments];
 

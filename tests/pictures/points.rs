@@ -8,9 +8,9 @@ use std::path::Path;
 
 use epsplat::Error;
 use epsplat::io::{self, Points};
-use epsplat::scene::{Colors, Scene};
-use epsplat::surfels::analytic::{Sample, Shape, generate};
-use epsplat::surfels::{
+use epsplat::low_level::scene::{Colors, Scene};
+use epsplat::low_level::surfels::analytic::{Sample, Shape, generate};
+use epsplat::low_level::surfels::{
     FromPoints, Limits, Orientation, Preparation, Size, Surfels, Triangle, build, build_within, from_points,
 };
 use glam::DVec3;
@@ -477,13 +477,13 @@ fn georeferenced_coordinates_stay_to_the_last_digit() {
 
 #[test]
 fn surfels_of_given_normals_end_at_sharp_edges() {
-    use epsplat::metrics::{SurfaceDistances, coverage};
-    use epsplat::surfels::sampling::voxels::Voxel;
-    use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
+    use epsplat::low_level::metrics::{SurfaceDistances, coverage};
+    use epsplat::low_level::surfels::sampling::voxels::Voxel;
+    use epsplat::low_level::surfels::sampling::{MeshSurface, Method, Priority, sample};
     let mesh = common::meshes::bar(4);
     let evenly = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Area.of(surface, voxels);
     let (sampled, _) = sample(&mesh, 4000, &Method::Stratified { priority: &evenly, depth: None }, 0, &()).unwrap();
-    let tree = epsplat::truth::TriangleTree::new(&mesh).unwrap();
+    let tree = epsplat::low_level::truth::TriangleTree::new(&mesh).unwrap();
     for size in [Size::Knn, Size::Ellipse] {
         let options = FromPoints { size, ..FromPoints::default() };
         let of = |normals: Option<Vec<[f32; 3]>>| {

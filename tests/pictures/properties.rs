@@ -7,12 +7,12 @@ use crate::common;
 
 use std::cell::Cell;
 
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
-use epsplat::hardcases::{HardCase, judge};
-use epsplat::plan::{ACCUMULATORS, RenderOptions, check};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Map, Maps, Scene, Shading, Surfel, Up};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::hardcases::{HardCase, judge};
+use epsplat::low_level::plan::{ACCUMULATORS, RenderOptions, check};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Map, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};

@@ -4,12 +4,14 @@
 
 use crate::common;
 
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
-use epsplat::plan::{Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, RenderOptions};
-use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Camera, Epsilon, Map, Maps, Shading};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::hardcases::{HardCase, Row, Truth, cases, judge};
+use epsplat::low_level::plan::{
+    Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, RenderOptions,
+};
+use epsplat::low_level::render::{Backend, Report, render};
+use epsplat::low_level::scene::{Camera, Epsilon, Map, Maps, Shading};
 
 /// Cases with every kind of footprint and attribute, and depths of many magnitudes.
 const CASES: [&str; 6] = [

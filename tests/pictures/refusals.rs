@@ -7,13 +7,15 @@ use crate::common;
 use common::command::{Folder, fails, ply, succeeds, text};
 use common::scenes::{painted, sphere, sphere_camera};
 use common::{Random, bits, meshes};
-use epsplat::frame::Frame;
 use epsplat::io::{self, Mesh, Texture};
-use epsplat::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::color::{decoded, srgb8};
-use epsplat::scene::{Blend, Camera, Colors, Composite, Join, Map, Maps, Projection, Scene, Shading, gaussian};
-use epsplat::surfels::with_triangles;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::color::{decoded, srgb8};
+use epsplat::low_level::scene::{
+    Blend, Camera, Colors, Composite, Join, Map, Maps, Projection, Scene, Shading, gaussian,
+};
+use epsplat::low_level::surfels::with_triangles;
 
 fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0

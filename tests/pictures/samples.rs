@@ -3,13 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use common::scenes::{sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Gpu;
-use epsplat::metrics::compare;
-use epsplat::passes::resolve::mean_of_samples;
-use epsplat::plan::{Accumulator, Organisation, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Clip, Colors, Map, Maps, Projection, Samples, Scene, Shading};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::metrics::compare;
+use epsplat::low_level::passes::resolve::mean_of_samples;
+use epsplat::low_level::plan::{Accumulator, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Clip, Colors, Map, Maps, Projection, Samples, Scene, Shading};
 
 use crate::common;
 

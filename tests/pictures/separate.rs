@@ -8,16 +8,16 @@ use std::f64::consts::PI;
 
 use common::scenes::sphere_camera;
 use common::{Random, bits, meshes};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{Mesh, Points};
-use epsplat::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Epsilon, Join, Kernel, LowPass, Map, Maps, Projection, Samples, Scene, Shading,
     Triangles,
 };
-use epsplat::surfels::{build, with_triangles};
+use epsplat::low_level::surfels::{build, with_triangles};
 use glam::DVec3;
 
 /// A sphere of `count` disks around `center`, each a little off it, in shades of `color`.

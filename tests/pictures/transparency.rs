@@ -6,19 +6,19 @@ use crate::common;
 
 use common::bits;
 use common::scenes::{cases, crowded, front, shuffled, sphere, sphere_camera, stack};
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
 use epsplat::io;
-use epsplat::metrics::{DECISION_MARGIN, compare};
-use epsplat::passes::layers::{Parting, part};
-use epsplat::passes::{Strip, fragments, project};
-use epsplat::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions};
-use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::composite::ALL_LAYERS;
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::metrics::{DECISION_MARGIN, compare};
+use epsplat::low_level::passes::layers::{Parting, part};
+use epsplat::low_level::passes::{Strip, fragments, project};
+use epsplat::low_level::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, Report, render};
+use epsplat::low_level::scene::composite::ALL_LAYERS;
+use epsplat::low_level::scene::{
     Camera, Colors, Composite, Epsilon, Kernel, Lens, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Tail,
 };
-use epsplat::surfels::build;
+use epsplat::low_level::surfels::build;
 use glam::Vec3;
 
 /// What every way to composite has.

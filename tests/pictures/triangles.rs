@@ -8,17 +8,17 @@ use common::scenes::{front, sphere, sphere_camera};
 use common::{Random, bits, meshes};
 use std::sync::Arc;
 
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{Mesh, Texture};
-use epsplat::metrics::DECISION_MARGIN;
-use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
-use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::metrics::DECISION_MARGIN;
+use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
     Camera, Epsilon, Join, Lens, Map, Maps, Projection, Samples, Scene, Shading, Triangle, Triangles, Up,
 };
-use epsplat::surfels::with_triangles;
-use epsplat::truth::Surface;
+use epsplat::low_level::surfels::with_triangles;
+use epsplat::low_level::truth::Surface;
 use glam::{DVec3, Vec3};
 
 fn gpu() -> Option<Backend> {
@@ -387,7 +387,8 @@ fn the_same_bits_however_it_is_drawn() {
     if let Some(gl) = gl {
         let plain = RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
         let shown = frame(&scene, &camera, &plain, &gl);
-        let rmse = epsplat::metrics::compare(&shown, &frame(&scene, &camera, &plain, &backend)).unwrap().rmse;
+        let rmse =
+            epsplat::low_level::metrics::compare(&shown, &frame(&scene, &camera, &plain, &backend)).unwrap().rmse;
         assert!(rmse < 1e-6, "{rmse}");
     }
 }

@@ -3,7 +3,7 @@
 use super::{Folder, Random, data, sentence};
 use epsplat::io::las::Copc;
 use epsplat::io::{self, Input, ReadOptions};
-use epsplat::scene::Colors;
+use epsplat::low_level::scene::Colors;
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -7,8 +7,8 @@ use e57::{
     Translation,
 };
 use epsplat::io::{self, Points, ReadOptions, Up};
-use epsplat::scene::Colors;
-use epsplat::scene::color::srgb_to_linear;
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::color::srgb_to_linear;
 use std::io::Cursor;
 
 /// A scan: its attributes, its pose, its points.

@@ -3,9 +3,9 @@
 use super::Folder;
 use super::ply::{ENCODINGS, file};
 use epsplat::io::{self, Points, ReadOptions};
-use epsplat::scene::Colors;
-use epsplat::scene::gaussian::EXTENT;
-use epsplat::surfels::build;
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::gaussian::EXTENT;
+use epsplat::low_level::surfels::build;
 
 /// The properties of a Gaussian of three axes, in the order of its values.
 const NAMES: [&str; 14] = [

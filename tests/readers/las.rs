@@ -3,8 +3,8 @@
 use super::las_forms::{laszip_record, of_las_1_5, pointwise};
 use super::{Folder, data};
 use epsplat::io::{self, ReadOptions, Up};
-use epsplat::scene::Colors;
-use epsplat::scene::color::srgb_to_linear;
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::color::srgb_to_linear;
 use las::point::{Classification, Format};
 use las::{Builder, Color, Point, Transform, Vector, Writer};
 use std::io::Cursor;
@@ -168,7 +168,7 @@ fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
         }
     }
     let (_, preparation) =
-        epsplat::surfels::build(vec![folder.read("a.las", &whole_and_deleted()).unwrap()], &()).unwrap();
+        epsplat::low_level::surfels::build(vec![folder.read("a.las", &whole_and_deleted()).unwrap()], &()).unwrap();
     assert_eq!((preparation.points, preparation.withheld, preparation.surfels), (10, 895, 10));
     assert!(preparation.notes()[0].starts_with("895 points were left out: they are marked as withheld"));
 }
@@ -202,10 +202,12 @@ fn classes_have_opacities() {
         assert!(alphas.iter().zip([1.0, 0.4, 0.4, 1.0].iter().cycle()).all(|(a, b)| (a - b).abs() < 1e-6), "{format}");
     }
     let (_, preparation) =
-        epsplat::surfels::build(vec![io::read_with(&folder.path("a.las"), rules, &()).unwrap()], &()).unwrap();
+        epsplat::low_level::surfels::build(vec![io::read_with(&folder.path("a.las"), rules, &()).unwrap()], &())
+            .unwrap();
     assert!(preparation.notes().iter().any(|note| note == "10 points were left out: their class has the opacity 0"));
     let none = ReadOptions { classes: "0-255:0".parse().unwrap(), ..ReadOptions::default() };
-    let nothing = epsplat::surfels::build(vec![io::read_with(&folder.path("a.las"), none, &()).unwrap()], &());
+    let nothing =
+        epsplat::low_level::surfels::build(vec![io::read_with(&folder.path("a.las"), none, &()).unwrap()], &());
     assert!(
         nothing
             .unwrap_err()

@@ -3,7 +3,7 @@
 use super::ply::{ENCODINGS, file};
 use super::{Folder, sentence};
 use epsplat::io::{self, Mesh};
-use epsplat::scene::Colors;
+use epsplat::low_level::scene::Colors;
 
 const XYZ: [(&str, &str); 3] = [("float", "x"), ("float", "y"), ("float", "z")];
 
@@ -92,7 +92,7 @@ fn faces_that_cannot_be_are_said() {
 #[test]
 fn materials_textures_and_what_of_them_is_missing() {
     let folder = Folder::new();
-    let image = epsplat::frame::Frame::of_colors(1, 1, vec![[0.0, 1.0, 0.0, 1.0]]);
+    let image = epsplat::low_level::frame::Frame::of_colors(1, 1, vec![[0.0, 1.0, 0.0, 1.0]]);
     io::png::write(&folder.path("a green.png"), &image).unwrap();
     let library = "newmtl red\nKd 0.5 0 0\nd 0.25\n\nnewmtl painted\nKd 1 0.5 1\nmap_Kd a green.png\nnewmtl lost\nmap_Kd none.png\n";
     std::fs::write(folder.path("my colours.mtl"), library).unwrap();

@@ -2,8 +2,8 @@
 
 use super::{Folder, Random, data, sentence};
 use epsplat::io::{self, Up};
-use epsplat::scene::Colors;
-use epsplat::scene::color::{DEFAULT_COLOR, srgb_to_linear};
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 
 fn close(a: [f32; 3], b: [f32; 3]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6)

@@ -2,7 +2,7 @@
 
 use super::{Folder, Random, sentence};
 use epsplat::io::Points;
-use epsplat::scene::Colors;
+use epsplat::low_level::scene::Colors;
 
 pub const DATA: [&str; 3] = ["ascii", "binary", "binary_compressed"];
 

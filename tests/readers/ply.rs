@@ -3,8 +3,8 @@
 use super::Folder;
 use epsplat::io::Points;
 use epsplat::io::ply::{Color, ColorProperties, Properties, Vertex, write, write_points};
-use epsplat::scene::Colors;
-use epsplat::scene::color::srgb_to_linear;
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::color::srgb_to_linear;
 
 /// A number of a PLY file: text, or the bytes of its type.
 fn encode(value: f64, kind: &str, encoding: &str) -> Vec<u8> {

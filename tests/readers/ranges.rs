@@ -4,8 +4,8 @@
 use super::las::{file as las_file, point};
 use super::{Folder, data};
 use epsplat::io::{self, Points, ReadOptions, settle_colors};
-use epsplat::scene::Colors;
-use epsplat::scene::color::srgb_to_linear;
+use epsplat::low_level::scene::Colors;
+use epsplat::low_level::scene::color::srgb_to_linear;
 use las::{Color, Point};
 use std::fmt::Write;
 
@@ -350,7 +350,8 @@ fn dark_pictures_are_told() {
         let notes = folder.read(name, &bytes).unwrap().notes;
         let told = notes.len() == 1 && notes[0].starts_with(&format!("warning: {name}: its colours are nearly black"));
         assert!(told, "{name}: {notes:?}");
-        let (_, preparation) = epsplat::surfels::build(vec![folder.read(name, &bytes).unwrap()], &()).unwrap();
+        let (_, preparation) =
+            epsplat::low_level::surfels::build(vec![folder.read(name, &bytes).unwrap()], &()).unwrap();
         assert!(preparation.notes().contains(&notes[0]));
     }
 }

@@ -8,10 +8,10 @@ use std::f64::consts::PI;
 use common::meshes::sphere;
 use common::scenes::generated;
 use epsplat::io::Mesh;
-use epsplat::metrics::{Coverage, SurfaceDistances, coverage};
-use epsplat::scene::Scene;
-use epsplat::surfels::analytic::Shape;
-use epsplat::truth::TriangleTree;
+use epsplat::low_level::metrics::{Coverage, SurfaceDistances, coverage};
+use epsplat::low_level::scene::Scene;
+use epsplat::low_level::surfels::analytic::Shape;
+use epsplat::low_level::truth::TriangleTree;
 
 fn square() -> Mesh {
     Mesh {

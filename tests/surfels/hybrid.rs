@@ -9,10 +9,10 @@ use std::sync::Arc;
 use common::command::{DATA, Folder, fails, succeeds, text};
 use common::meshes::sphere;
 use epsplat::io::{self, Material, Mesh, Texture};
-use epsplat::metrics::compare;
-use epsplat::scene::{Colors, Scene};
-use epsplat::surfels::hybrid::{hybrid, pixel};
-use epsplat::surfels::with_triangles;
+use epsplat::low_level::metrics::compare;
+use epsplat::low_level::scene::{Colors, Scene};
+use epsplat::low_level::surfels::hybrid::{hybrid, pixel};
+use epsplat::low_level::surfels::with_triangles;
 
 const VIEW: [&str; 8] = ["--size", "96x96", "--eye=20,15,50", "--target=0,5,0", "--fov", "30", "--shading", "unlit"];
 

@@ -9,12 +9,12 @@ use std::path::Path;
 use common::meshes::{bar, sphere};
 use epsplat::Error;
 use epsplat::io::{Mesh, Points, Texture};
-use epsplat::metrics::{SurfaceDistances, coverage};
-use epsplat::scene::{Cap, Clip, Colors, Scene};
-use epsplat::surfels::sampling::voxels::Voxel;
-use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
-use epsplat::surfels::{build, curve};
-use epsplat::truth::TriangleTree;
+use epsplat::low_level::metrics::{SurfaceDistances, coverage};
+use epsplat::low_level::scene::{Cap, Clip, Colors, Scene};
+use epsplat::low_level::surfels::sampling::voxels::Voxel;
+use epsplat::low_level::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
+use epsplat::low_level::surfels::{build, curve};
+use epsplat::low_level::truth::TriangleTree;
 use glam::DVec3;
 
 fn stratified(mesh: &Mesh, count: usize, priority: Priority, depth: Option<u32>, seed: u64) -> (Points, Sampling) {

@@ -12,15 +12,17 @@ use common::meshes::bar;
 use common::scenes::generated;
 use epsplat::Error;
 use epsplat::io::{Mesh, Points};
-use epsplat::metrics::SurfaceDistances;
-use epsplat::metrics::coverage::coverage;
-use epsplat::scene::{Clip, Colors, Scene, Surfel};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::build;
-use epsplat::surfels::sampling::voxels::Voxel;
-use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
-use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, as_in_the_thesis, grown, simplify, written};
-use epsplat::truth::{DiskTree, TriangleTree};
+use epsplat::low_level::metrics::SurfaceDistances;
+use epsplat::low_level::metrics::coverage::coverage;
+use epsplat::low_level::scene::{Clip, Colors, Scene, Surfel};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::build;
+use epsplat::low_level::surfels::sampling::voxels::Voxel;
+use epsplat::low_level::surfels::sampling::{MeshSurface, Method, Priority, sample};
+use epsplat::low_level::surfels::simplify::{
+    Options, Report, SplatShape, Tolerance, as_in_the_thesis, grown, simplify, written,
+};
+use epsplat::low_level::truth::{DiskTree, TriangleTree};
 use glam::{DVec3, Vec3};
 
 const DISKS: Options = Options { tolerance: Tolerance::Absolute(0.0), shape: SplatShape::Disk, relaxations: 0 };

@@ -8,12 +8,12 @@ use crate::common;
 use common::bits;
 use common::scenes::shuffled;
 use epsplat::io::Points;
-use epsplat::metrics::{Comparison, compare};
-use epsplat::plan::{Organisation, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Cull, Epsilon, Lens, LowPass, Map, Maps, Scene, Texture, Up};
-use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::surfels::{Preparation, build, build_textured};
+use epsplat::low_level::metrics::{Comparison, compare};
+use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Cull, Epsilon, Lens, LowPass, Map, Maps, Scene, Texture, Up};
+use epsplat::low_level::surfels::analytic::{Shape, generate};
+use epsplat::low_level::surfels::{Preparation, build, build_textured};
 use glam::DVec3;
 
 /// A corner of the world in UTM.

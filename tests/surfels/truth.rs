@@ -8,13 +8,13 @@ use std::path::Path;
 
 use common::meshes::sphere;
 use epsplat::io::Mesh;
-use epsplat::metrics::{Reconstruction, reconstruction};
-use epsplat::plan::RenderOptions;
-use epsplat::render::{Backend, render};
-use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Camera, Colors, Lens, Light, Map, Maps, Shading, Up};
-use epsplat::surfels::analytic::Shape;
-use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
+use epsplat::low_level::metrics::{Reconstruction, reconstruction};
+use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::options::HIGHLIGHT;
+use epsplat::low_level::scene::{Camera, Colors, Lens, Light, Map, Maps, Shading, Up};
+use epsplat::low_level::surfels::analytic::Shape;
+use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::DVec3;
 
 /// Looks at the origin from `eye`, with an odd number of pixels so that one has its centre on the axis.
@@ -314,7 +314,7 @@ fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     let points = epsplat::io::read(&path, &()).unwrap();
     let mut mesh = epsplat::io::read_mesh(&path, &()).unwrap();
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1839, 3674));
-    let (scene, _) = epsplat::surfels::build(vec![points.clone()], &()).unwrap();
+    let (scene, _) = epsplat::low_level::surfels::build(vec![points.clone()], &()).unwrap();
     let camera = Camera::framing((200, 200), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
     let maps = Maps::of(&[Map::Depth, Map::Normal]);
     let options = RenderOptions { maps, ..RenderOptions::default() };

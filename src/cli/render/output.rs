@@ -4,8 +4,8 @@ use std::num::NonZeroU64;
 use std::path::Path;
 
 use clap::ValueEnum;
-use epsplat::frame::Frame;
-use epsplat::render::Report;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::render::Report;
 use epsplat::{Error, Result, io};
 
 use super::super::note;

@@ -13,7 +13,7 @@ const EDGE: f64 = 0.866_025_403_784_438_6;
 /// The largest distance of a disk from the triangles that it stands for, as a fraction of the
 /// mesh's diagonal. Among 1 to 5 times 1e-4, on eleven models, 2e-4 is where pictures of 1024x1024
 /// hardly gain from more surfels.
-pub(in crate::surfels) const TOLERANCE: f64 = 2e-4;
+pub(in crate::low_level::surfels) const TOLERANCE: f64 = 2e-4;
 
 /// An ellipse may be this many times larger than the area that it must cover: first where the
 /// surface ends, then where it continues.

@@ -18,7 +18,7 @@ use crate::surfels::build::LARGEST_PLACE;
 
 /// The images that surfels are painted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::surfels) enum Painting {
+pub(in crate::low_level::surfels) enum Painting {
     /// None: a surfel has the mean colour of its triangles' images.
     Means,
     /// One image that is given for all triangles.
@@ -224,7 +224,7 @@ fn times(color: [f32; 4], factor: Option<[f32; 4]>) -> [f32; 4] {
 
 /// Sets the colours of a mesh's vertices to the mean look of the triangles there, which are not
 /// drawn.
-pub(in crate::surfels) fn color_vertices(points: &mut Points) {
+pub(in crate::low_level::surfels) fn color_vertices(points: &mut Points) {
     let Some((paint, triangles)) =
         points.faces.as_mut().and_then(|faces| Some((faces.paint.take()?, &faces.triangles)))
     else {

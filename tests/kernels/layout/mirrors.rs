@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
 
-use epsplat::gpu::layout::{Band, Branch, Filter, Page, Splat, TreeNode, View};
-use epsplat::passes::triangles::CORNER_WORDS;
-use epsplat::plan::SceneNeeds;
-use epsplat::scene::Surfel;
+use epsplat::low_level::gpu::layout::{Band, Branch, Filter, Page, Splat, TreeNode, View};
+use epsplat::low_level::passes::triangles::CORNER_WORDS;
+use epsplat::low_level::plan::SceneNeeds;
+use epsplat::low_level::scene::Surfel;
 use naga::{AddressSpace, ArraySize, Module, ScalarKind, TypeInner};
 
 /// A type as host and device can compare it: so many scalars of one kind.

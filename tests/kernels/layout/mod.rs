@@ -10,18 +10,18 @@ use crate::common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use common::modules;
-use epsplat::gpu::Sources;
-use epsplat::gpu::interface::reflect;
-use epsplat::gpu::layout::{
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::gpu::interface::reflect;
+use epsplat::low_level::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, JUDGED, KIND_SHIFT,
     LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
     QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
 };
-use epsplat::gpu::sources::FILES;
-use epsplat::passes;
-use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
-use epsplat::scene::camera::MAX_SIDE;
-use epsplat::scene::kernel::{LEAST_AT_RIM, LEAST_WEIGHT};
+use epsplat::low_level::gpu::sources::FILES;
+use epsplat::low_level::passes;
+use epsplat::low_level::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
+use epsplat::low_level::scene::camera::MAX_SIDE;
+use epsplat::low_level::scene::kernel::{LEAST_AT_RIM, LEAST_WEIGHT};
 use mirrors::{differences, elements, kept_as, mirrors, sums_of};
 use naga::{AddressSpace, Expression, Literal, Module};
 

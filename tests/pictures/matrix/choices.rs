@@ -1,10 +1,10 @@
 //! Options for the matrix: each is left as it is most of the time, so that several meet in one
 //! picture and few pictures are refused.
 
-use epsplat::plan::{Accumulator, Optimisation, RenderOptions};
-use epsplat::scene::composite::ALL_LAYERS;
-use epsplat::scene::facing::POINT_SHAPES;
-use epsplat::scene::{
+use epsplat::low_level::plan::{Accumulator, Optimisation, RenderOptions};
+use epsplat::low_level::scene::composite::ALL_LAYERS;
+use epsplat::low_level::scene::facing::POINT_SHAPES;
+use epsplat::low_level::scene::{
     Blend, Composite, Cull, Epsilon, Facing, Join, Kernel, Light, LowPass, MAPS, Map, Maps, Outline, Samples, Scene,
     Shading, ShadingAt, Tail, gaussian,
 };

@@ -1,9 +1,9 @@
 //! The demands on the frames of one combination: the same bits however they are drawn, and the
 //! reference's values where it decides.
 
-use epsplat::frame::Frame;
-use epsplat::plan::{Accumulator, AccumulatorRow};
-use epsplat::scene::Map;
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow};
+use epsplat::low_level::scene::Map;
 
 /// Pixels with a fragment nearer to a yes-or-no decision than this are left to rounding.
 const DECIDED: f32 = 1e-4;

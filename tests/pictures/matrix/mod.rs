@@ -22,11 +22,11 @@ mod scenes;
 
 use std::collections::BTreeMap;
 
-use epsplat::frame::Frame;
-use epsplat::gpu::{Gpu, Sources};
-use epsplat::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
 
 use crate::common;
 use common::Random;
@@ -300,7 +300,7 @@ fn every_combination_is_drawn_alike_and_right() {
 fn a_fault_in_one_organisation_is_found() {
     let Some(devices) = devices() else { return };
     let curved = |of: &Combination| {
-        let filtered = of.options.low_pass == epsplat::scene::LowPass::Max && of.options.maps != Maps::NONE;
+        let filtered = of.options.low_pass == epsplat::low_level::scene::LowPass::Max && of.options.maps != Maps::NONE;
         filtered && of.sampled.about.contains(&"caps") && of.sampled.scene.oriented
     };
     type Fits<'a> = &'a dyn Fn(&Combination) -> bool;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use epsplat::io::{Material, Mesh, Texture};
-use epsplat::scene::{Camera, Cap, Clip, Colors, Harmonics, Lens, Scene, Surfel, Up};
-use epsplat::surfels::with_triangles;
+use epsplat::low_level::scene::{Camera, Cap, Clip, Colors, Harmonics, Lens, Scene, Surfel, Up};
+use epsplat::low_level::surfels::with_triangles;
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::common::scenes::{cases, painted, sphere};

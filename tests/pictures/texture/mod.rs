@@ -11,16 +11,18 @@ use std::process::Command;
 
 use common::bits;
 use common::scenes::{shuffled, sphere, sphere_camera};
-use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
 use epsplat::io::{self, Points, Texture};
-use epsplat::passes::project::reference_all;
-use epsplat::passes::{accumulate, visibility};
-use epsplat::plan::{Accumulator, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Maps, Place, Projection, Scene, Shading, Textured, Up};
-use epsplat::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
-use epsplat::surfels::{Coordinates, build_at_vertices, build_textured};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::passes::project::reference_all;
+use epsplat::low_level::passes::{accumulate, visibility};
+use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::render::{Backend, render};
+use epsplat::low_level::scene::{
+    Camera, Colors, Lens, LowPass, Map, Maps, Place, Projection, Scene, Shading, Textured, Up,
+};
+use epsplat::low_level::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
+use epsplat::low_level::surfels::{Coordinates, build_at_vertices, build_textured};
 use glam::{DVec3, Vec3};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");

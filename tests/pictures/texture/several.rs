@@ -2,8 +2,8 @@
 
 use super::*;
 use epsplat::io::ply;
-use epsplat::plan::Organisation;
-use epsplat::scene::{Triangle, Triangles};
+use epsplat::low_level::plan::Organisation;
+use epsplat::low_level::scene::{Triangle, Triangles};
 
 const BARE: [f32; 4] = [0.2, 0.5, 0.1, 1.0];
 

@@ -1,17 +1,16 @@
-//! `epsplat render --lod` of files with levels of detail: only the nodes that a picture needs are
-//! read.
+//! Files with levels of detail: only the nodes that a picture needs are read.
 
-use epsplat::plan::RenderOptions as Settings;
-use epsplat::scene::{Camera, Scene};
-use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
-use super::super::progress::Bars;
-use super::Arguments;
+use super::Request;
 use super::memory::Memory;
 use super::octrees::Octrees;
-use super::scene::Made;
 use super::tree::Tree;
+use super::whole::Made;
+use crate::error::{Error, Result};
+use crate::plan::RenderOptions as Settings;
+use crate::progress::Progress;
+use crate::scene::{Camera, Scene};
 
 /// Inputs that are read in part for each picture. The part does not depend on earlier pictures.
 pub(super) enum Parts {
@@ -26,13 +25,15 @@ pub(super) struct Part {
     pub made: Made,
     /// Settings to draw it with: without levels of detail if the part is to be drawn whole.
     pub settings: Settings,
-    pub read: Read,
+    pub read: ReadReport,
 }
 
 /// Counts of what a picture read, and totals: `[read, total]`, summed over all files.
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct Read {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ReadReport {
+    /// Nodes of the levels of detail.
     pub nodes: [u64; 2],
+    /// Points, or surfels.
     pub points: [u64; 2],
     /// Bytes of nodes and points in the files.
     pub bytes: [u64; 2],
@@ -43,19 +44,19 @@ impl Parts {
     ///
     /// # Errors
     /// [`Error::Usage`] if `--memory` is given and the inputs have to be read whole.
-    pub fn of(arguments: &Arguments, settings: &Settings, bars: &Bars) -> Result<Option<Self>> {
+    pub fn of(request: &Request<'_>, settings: &Settings, progress: &dyn Progress) -> Result<Option<Self>> {
         if settings.detail.is_finest() {
-            return match arguments.device.memory {
+            return match request.device.memory {
                 Some(_) => {
                     Err(Error::Usage("--memory needs levels of detail: give --lod a size that is above 0".into()))
                 }
                 None => Ok(None),
             };
         }
-        if let Some(tree) = Tree::of(arguments)? {
+        if let Some(tree) = Tree::of(request)? {
             return Ok(Some(Self::Tree(Box::new(tree))));
         }
-        Ok(Octrees::of(arguments, bars)?.map(|octrees| Self::Octrees(Box::new(octrees))))
+        Ok(Octrees::of(request, progress)?.map(|octrees| Self::Octrees(Box::new(octrees))))
     }
 
     /// A coarse scene from which the camera is framed before anything else is read.
@@ -71,20 +72,20 @@ impl Parts {
     /// `frames` is the number of frames in memory at once, for the limit of `--memory`.
     pub fn scene(
         &mut self,
-        arguments: &Arguments,
+        request: &Request<'_>,
         (camera, frames): (&Camera, u64),
         settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Part> {
-        let memory = arguments.device.memory.map(|most| Memory::of(most, camera, settings, frames)).transpose()?;
+        let memory = request.device.memory.map(|most| Memory::of(most, camera, settings, frames)).transpose()?;
         match self {
-            Self::Octrees(octrees) => octrees.scene(arguments, camera, settings, progress),
+            Self::Octrees(octrees) => octrees.scene(request, camera, settings, progress),
             Self::Tree(tree) => tree.scene(memory, camera, settings, progress),
         }
     }
 }
 
-impl Read {
+impl ReadReport {
     /// Returns the counts as one line for people.
     pub fn sentence(&self) -> String {
         let Self { nodes: [nodes, all_nodes], points: [points, all_points], bytes } = self;

@@ -1,18 +1,18 @@
-//! `epsplat render --lod` of a file that `epsplat lod` wrote: a picture reads only the nodes and
-//! surfels that its cut may reach.
+//! A file that `epsplat lod` wrote: a picture reads only the nodes and surfels that its cut may
+//! reach.
 
-use epsplat::io::ply::Levels;
-use epsplat::plan::RenderOptions as Settings;
-use epsplat::render::taken;
-use epsplat::scene::hierarchy::Node;
-use epsplat::scene::{Camera, Scene, Surfel};
-use epsplat::surfels::part::{Taken, nothing};
-use epsplat::surfels::{Limits, Preparation};
-use epsplat::{Error, Progress, Result};
-
-use super::Arguments;
+use super::Request;
+use super::in_part::{Part, ReadReport};
 use super::memory::Memory;
-use super::parts::{Part, Read};
+use crate::error::{Error, Result};
+use crate::io::ply::Levels;
+use crate::plan::RenderOptions as Settings;
+use crate::progress::Progress;
+use crate::render::taken;
+use crate::scene::hierarchy::Node;
+use crate::scene::{Camera, Scene, Surfel};
+use crate::surfels::part::{Taken, nothing};
+use crate::surfels::{Limits, Preparation};
 
 /// Files with fewer surfels are read whole, as that takes little time.
 const FEWEST: u32 = 500_000;
@@ -35,16 +35,16 @@ impl Tree {
     ///
     /// # Errors
     /// [`Error::Usage`] if `--memory` is given and the input cannot be read in part.
-    pub fn of(arguments: &Arguments) -> Result<Option<Self>> {
-        let bounded = arguments.device.memory.is_some();
-        let levels = match (&arguments.inputs[..], asks_for_all(arguments)) {
-            (_, Some(option)) if bounded => {
+    pub fn of(request: &Request<'_>) -> Result<Option<Self>> {
+        let bounded = request.device.memory.is_some();
+        let levels = match asks_for_all(request) {
+            Some(option) if bounded => {
                 return Err(Error::Usage(format!(
                     "--memory reads a part of the file, and {option} needs all of it: leave one of them out"
                 )));
             }
-            ([input], None) => arguments.reading.levels(input)?,
-            _ => None,
+            Some(_) => None,
+            None => request.files().levels()?,
         };
         if bounded && levels.is_none() {
             return Err(Error::Usage(
@@ -82,7 +82,7 @@ impl Tree {
         let (scene, read) = taken(&self.levels, &[(camera, settings)], fits, progress)?;
         let (nodes, surfels) = (self.levels.whole.nodes.into(), self.levels.whole.surfels.into());
         let preparation = Preparation { points: surfels, surfels, ..Preparation::default() };
-        let read = Read {
+        let read = ReadReport {
             nodes: [read.nodes, nodes],
             points: [read.surfels, surfels],
             bytes: [read.bytes, self.levels.bytes(surfels, nodes)],
@@ -92,20 +92,20 @@ impl Tree {
 }
 
 /// Returns the first given option that needs all surfels of a file, other inputs or triangles.
-fn asks_for_all(arguments: &Arguments) -> Option<&'static str> {
-    let limits = arguments.limits.limits();
+fn asks_for_all(request: &Request<'_>) -> Option<&'static str> {
+    let (limits, read) = (request.surfels().limits.limits(), request.files().options());
     let all = [
         (limits.outliers.is_some(), "--outliers"),
         (limits.largest_ratio != Limits::default().largest_ratio, "--max-radius"),
-        (arguments.surfels.size.is_some(), "--surfel-size"),
-        (arguments.reading.class_opacity.is_some(), "--class-opacity"),
-        (arguments.reading.ignores_alpha(), "--ignore-alpha"),
-        (!arguments.triangles.meshes.is_empty(), "--triangles"),
-        (arguments.triangles.texture.is_some(), "--triangle-texture"),
-        (arguments.options.surface.join.is_some(), "--join"),
-        (!arguments.surfels.textures.is_empty(), "--texture"),
-        (arguments.options.points.facing.is_some(), "--facing"),
-        (arguments.options.surface.separate, "--separate"),
+        (request.surfels().size.is_some(), "--surfel-size"),
+        (read.class_opacity.is_some(), "--class-opacity"),
+        (read.file.ignore_alpha, "--ignore-alpha"),
+        (!request.triangles().meshes.is_empty(), "--triangles"),
+        (request.triangles().texture.is_some(), "--triangle-texture"),
+        (request.options.surface.join.is_some(), "--join"),
+        (!request.surfels().textures.is_empty(), "--texture"),
+        (request.options.points.facing.is_some(), "--facing"),
+        (request.options.surface.separate, "--separate"),
     ];
     all.into_iter().find_map(|(given, option)| given.then_some(option))
 }

@@ -1,20 +1,22 @@
 //! Parsers of argument values. Errors are sentences that say what is expected.
 
-use epsplat::options::values::numbers;
-use epsplat::surfels::Orientation;
 use glam::DVec3;
 
+use super::values::numbers;
+use crate::scene::camera::check_size;
+use crate::surfels::Orientation;
+
 /// Parses a size in pixels: `WIDTHxHEIGHT`.
-pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
     let (width, height) = (side(width)?, side(height)?);
-    epsplat::scene::camera::check_size(width, height).map_err(|e| e.to_string())?;
+    check_size(width, height).map_err(|e| e.to_string())?;
     Ok((width, height))
 }
 
 /// Parses a positive factor of the size of pictures.
-pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
+pub fn scale(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(factor),
         _ => Err("a factor is a positive number".into()),
@@ -22,7 +24,7 @@ pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
 }
 
 /// Parses a vector: `X,Y,Z`.
-pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
+pub fn vector(text: &str) -> Result<DVec3, String> {
     match numbers(text).map_err(|error| error.to_string())?[..] {
         [x, y, z] => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are needed: X,Y,Z".into()),
@@ -30,18 +32,18 @@ pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
 }
 
 /// Parses a direction: `X,Y,Z`, or the name of an axis: x, y, z, -x, -y or -z.
-pub(super) fn parse_up(text: &str) -> Result<DVec3, String> {
+pub fn up(text: &str) -> Result<DVec3, String> {
     let (name, sign) = text.strip_prefix('-').map_or((text, 1.0), |name| (name, -1.0));
     match name {
         "x" => Ok(DVec3::X * sign),
         "y" => Ok(DVec3::Y * sign),
         "z" => Ok(DVec3::Z * sign),
-        _ => parse_vector(text).map_err(|what| format!("it is none of x, y, z, -x, -y and -z, and {what}")),
+        _ => vector(text).map_err(|what| format!("it is none of x, y, z, -x, -y and -z, and {what}")),
     }
 }
 
-/// Formats a direction for [`parse_up`]: by its name if it is an axis.
-pub(super) fn up_argument(up: DVec3) -> String {
+/// Formats a direction for [`up`]: by its name if it is an axis.
+pub fn up_argument(up: DVec3) -> String {
     let axes = [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")];
     let named = |(axis, name): (DVec3, &str)| match up {
         _ if up == axis => Some(name.to_owned()),
@@ -51,24 +53,24 @@ pub(super) fn up_argument(up: DVec3) -> String {
     axes.into_iter().find_map(named).unwrap_or_else(|| vector_argument(up))
 }
 
-/// Formats a vector for [`parse_vector`], which restores it exactly.
-pub(super) fn vector_argument(v: DVec3) -> String {
+/// Formats a vector for [`vector`], which restores it exactly.
+pub fn vector_argument(v: DVec3) -> String {
     format!("{},{},{}", v.x, v.y, v.z)
 }
 
 /// Parses an orientation: `propagate`, `up`, or the position `X,Y,Z` of a scanner.
-pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
+pub fn orientation(text: &str) -> Result<Orientation, String> {
     match text {
         "propagate" => Ok(Orientation::Propagate),
         "up" => Ok(Orientation::Up),
-        _ => parse_vector(text)
+        _ => vector(text)
             .map(|scanner| Orientation::Toward(vec![scanner]))
             .map_err(|what| format!("it is neither propagate nor up nor the position of a scanner: {what}")),
     }
 }
 
 /// Parses a size of memory, such as `2GiB`, `512MiB` or `4GB`, and returns bytes.
-pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
+pub fn memory(text: &str) -> Result<u64, String> {
     let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("TiB", 40)].map(|(unit, power)| (unit, 2f64.powi(power)));
     let decimal = [("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
     let mut all = units.into_iter().chain(decimal);
@@ -81,7 +83,7 @@ pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
 }
 
 /// Parses intrinsics in pixels: `FX,FY,CX,CY`.
-pub(super) fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
+pub fn intrinsics(text: &str) -> Result<[f64; 4], String> {
     numbers(text)
         .map_err(|error| error.to_string())?
         .try_into()

@@ -1,19 +1,17 @@
-//! `epsplat render --lod` of COPC files: only the octree nodes that a picture needs are read.
+//! COPC files: only the octree nodes that a picture needs are read.
 
-use epsplat::io::las::Copc;
-use epsplat::io::{ColorRules, Points};
-use epsplat::options::values::Switch;
-use epsplat::plan::RenderOptions as Settings;
-use epsplat::scene::octree::{PointOctree, Thinned, taken};
-use epsplat::scene::{Bounds, Camera, Detail, Scene};
-use epsplat::surfels::borders;
-use epsplat::{Error, Progress, Result, surfels};
-
-use super::super::progress::Bars;
-use super::super::reading::named;
-use super::Arguments;
-use super::parts::{Part, Read};
-use super::scene::scene_of;
+use super::Request;
+use super::in_part::{Part, ReadReport};
+use super::whole::scene_of;
+use crate::error::{Error, Result};
+use crate::io::las::Copc;
+use crate::io::{ColorRules, Points};
+use crate::options::values::Switch;
+use crate::plan::RenderOptions as Settings;
+use crate::progress::Progress;
+use crate::scene::octree::{PointOctree, Thinned, taken};
+use crate::scene::{Bounds, Camera, Detail, Scene};
+use crate::surfels::{self, borders};
 
 /// COPC files, together one scene, and a coarse overview of it.
 pub(super) struct Octrees {
@@ -33,15 +31,15 @@ impl Octrees {
     /// # Errors
     ///
     /// [`Error::Usage`] if `--lod-fade on` is given, or an error of reading.
-    pub fn of(arguments: &Arguments, bars: &Bars) -> Result<Option<Self>> {
-        let all = arguments.limits.limits().outliers.is_some()
-            || arguments.surfels.size.is_some()
-            || !arguments.triangles.meshes.is_empty();
-        if arguments.inputs.is_empty() || all {
+    pub fn of(request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Self>> {
+        let all = request.surfels().limits.outliers.is_some()
+            || request.surfels().size.is_some()
+            || !request.triangles().meshes.is_empty();
+        if request.files().paths().is_empty() || all {
             return Ok(None);
         }
-        let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
-        if arguments.options.levels.lod_fade == Some(Switch(true)) {
+        let Some(mut files) = request.files().octrees(progress)? else { return Ok(None) };
+        if request.options.levels.lod_fade == Some(Switch(true)) {
             return Err(Error::Usage(
                 "the nodes of COPC files cannot fade into each other: set --lod-fade to off".into(),
             ));
@@ -49,16 +47,16 @@ impl Octrees {
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
         let mut rules = ColorRules::default();
-        let points = read(arguments, (&mut files, &mut rules), &nodes, bars)?;
-        let built = surfels::build_within(points, Vec::new(), &arguments.limits.limits(), bars);
-        let (overview, _) = built.map_err(|error| named(error, &arguments.inputs))?;
+        let points = read(request, (&mut files, &mut rules), &nodes, progress)?;
+        let built = surfels::build_within(points, Vec::new(), &request.surfels().limits.limits(), progress);
+        let (overview, _) = built.map_err(|error| request.files().named(error))?;
         Ok(Some(Self { files, octrees, rules, overview }))
     }
 
     /// Reads the nodes that the picture of `camera` needs, or the overview's if they have no point.
     pub fn scene(
         &mut self,
-        arguments: &Arguments,
+        request: &Request<'_>,
         camera: &Camera,
         settings: &Settings,
         progress: &dyn Progress,
@@ -67,8 +65,8 @@ impl Octrees {
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let points = read(arguments, (&mut self.files, &mut self.rules), &nodes, progress)?;
-        let mut made = scene_of(arguments, points, progress)?;
+        let points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        let mut made = scene_of(request, points, progress)?;
         self.end(&mut made.0, &nodes);
         // All read points are drawn.
         let settings = Settings { detail: Detail::FINEST, ..settings.clone() };
@@ -93,8 +91,8 @@ impl Octrees {
 }
 
 /// Counts these nodes, their points and bytes, and the totals of the files.
-fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
-    let mut sum = Read { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
+fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> ReadReport {
+    let mut sum = ReadReport { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
     for (file, taken) in files.iter().zip(nodes) {
         let all = [file.octree.nodes.len() as u64, file.count(), file.bytes()];
         let taken = [taken.len() as u64, file.octree.points(taken), file.bytes_read(taken)];
@@ -109,10 +107,10 @@ fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
 
 /// Reads the points of these nodes of each file.
 fn read(
-    arguments: &Arguments,
+    request: &Request<'_>,
     (files, rules): (&mut [Copc], &mut ColorRules),
     nodes: &[Vec<usize>],
     progress: &dyn Progress,
 ) -> Result<Vec<Points>> {
-    arguments.reading.nodes(files.iter_mut().zip(nodes), rules, progress)
+    request.files().nodes(files.iter_mut().zip(nodes), rules, progress)
 }

@@ -1,13 +1,12 @@
-//! `epsplat render --memory`: a limit of host and device memory together.
+//! A limit of host and device memory together.
 
-use epsplat::plan::RenderOptions as Settings;
-use epsplat::scene::{Camera, Composite};
-use epsplat::surfels::part::Taken;
-use epsplat::{Error, Result};
+use crate::error::{Error, Result};
+use crate::frame::pixel_bytes;
+use crate::plan::RenderOptions as Settings;
+use crate::scene::{Camera, Composite};
+use crate::surfels::part::Taken;
 
-use super::views::pixel_bytes;
-
-/// Buffer size limit with `--memory`, bytes: that of the smallest devices. Images are rendered in
+/// Buffer size limit with a limit of memory, bytes: that of the smallest devices. Images are rendered in
 /// bands that fit.
 pub(super) const BUFFER: u64 = 128 << 20;
 

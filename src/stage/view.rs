@@ -1,28 +1,40 @@
-//! The camera of a picture, from the arguments, camera files and, by default, the scene.
+//! The camera of a picture, from options, camera files and, by default, the scene.
 
 use std::fmt::Display;
 use std::path::Path;
 
-use epsplat::io::camera::{self, CameraFile, Pose};
-use epsplat::scene::camera::{DEFAULT_FOV, check_near};
-use epsplat::scene::{Camera, Lens, Scene, Up};
-use epsplat::{Error, Result};
 use glam::DVec3;
 use serde::Serialize;
 
-use super::super::parse::{up_argument, vector_argument};
-use super::Arguments;
+use crate::error::{Error, Result};
+use crate::io::camera::{self, CameraFile, Pose};
+use crate::options::CameraOptions;
+use crate::options::parse::{up_argument, vector_argument};
+use crate::scene::camera::{DEFAULT_FOV, check_near};
+use crate::scene::{Camera, Lens, Scene, Up};
 
-pub(super) const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
+/// A view: complete but for values from the scene, such as its centre.
+///
+/// `View::default()` shows the whole scene.
+#[derive(Clone, Debug)]
+pub struct View(Kind);
 
-/// A view as given by arguments or a camera file: complete but for values from the scene.
-pub(super) struct View {
+#[derive(Clone, Debug)]
+enum Kind {
+    Given(Given),
+    Camera(Camera),
+}
+
+/// A view as options or a camera file give it.
+#[derive(Clone, Debug)]
+struct Given {
     size: (u32, u32),
     lens: Lens,
     place: Place,
     near: Option<f64>,
 }
 
+#[derive(Clone, Debug)]
 enum Place {
     /// Framed to show the whole scene, with this direction of up if it is given.
     Framed(Option<DVec3>),
@@ -32,31 +44,54 @@ enum Place {
     Pose(Pose),
 }
 
+impl Default for View {
+    fn default() -> Self {
+        let (size, lens) = (Self::DEFAULT_SIZE, Lens::Fov(DEFAULT_FOV));
+        Self(Kind::Given(Given { size, lens, place: Place::Framed(None), near: None }))
+    }
+}
+
+impl From<Camera> for View {
+    fn from(camera: Camera) -> Self {
+        Self(Kind::Camera(camera))
+    }
+}
+
 impl View {
-    /// Returns the view that the arguments describe, `--camera` included and `--cameras` not.
-    pub(super) fn of(arguments: &Arguments) -> Result<Self> {
-        if let Some(path) = &arguments.camera.file {
-            return Self::of_file(arguments, camera::read(path)?, path);
+    /// The size of a picture that nothing gives a size, pixels.
+    pub const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
+
+    /// Returns the view that the options describe.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for options that give no camera, or an error of reading a camera file.
+    pub fn new(options: &CameraOptions) -> Result<Self> {
+        if let Some(path) = &options.file {
+            return Self::of_file(options, camera::read(path)?, path, None);
         }
-        let (lens, option) = match (arguments.camera.intrinsics, arguments.camera.ortho) {
+        let (lens, option) = match (options.intrinsics, options.ortho) {
             (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
             (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
-            (None, None) => (Lens::Fov(arguments.camera.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
+            (None, None) => (Lens::Fov(options.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
         };
-        let size = arguments.camera.size.unwrap_or(DEFAULT_SIZE);
+        let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
-        check_near_argument(arguments)?;
-        let place = match (arguments.camera.eye, arguments.camera.target) {
-            (None, _) => Place::Framed(arguments.camera.up),
-            (Some(eye), None) => Place::Eye(eye, arguments.camera.up),
-            (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.camera.up)),
+        check_near_option(options)?;
+        let place = match (options.eye, options.target) {
+            (None, _) => Place::Framed(options.up),
+            (Some(eye), None) => Place::Eye(eye, options.up),
+            (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, options.up)),
         };
-        Self { size, lens, place, near: arguments.camera.near }.checked()
+        Given { size, lens, place, near: options.near }.checked()
     }
 
-    /// Returns the view of a camera of the file at `path`, completed by the arguments.
-    pub(super) fn of_file(arguments: &Arguments, file: CameraFile, path: &Path) -> Result<Self> {
-        if let (Some(size), Some(own)) = (arguments.camera.size, file.size)
+    /// Returns the view of a camera of the file at `path`, completed by the options' size and near
+    /// depth. Its size is multiplied by `scale`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if file and options contradict each other or give no camera.
+    pub fn of_file(options: &CameraOptions, file: CameraFile, path: &Path, scale: Option<f64>) -> Result<Self> {
+        if let (Some(size), Some(own)) = (options.size, file.size)
             && size != own
         {
             return Err(Error::Usage(format!(
@@ -68,24 +103,43 @@ impl View {
                 own.1
             )));
         }
-        if arguments.camera.scale.is_some() && file.size.is_none() {
+        if scale.is_some() && file.size.is_none() {
             let path = path.display();
             return Err(Error::Usage(format!(
                 "--scale needs pictures of known size, which {path} does not give: take --size"
             )));
         }
-        check_near_argument(arguments)?;
-        let file = file.scaled(arguments.camera.scale.unwrap_or(1.0));
-        let size = file.size.or(arguments.camera.size).unwrap_or(DEFAULT_SIZE);
-        let near = arguments.camera.near.or(file.near);
-        let view = Self { size, lens: file.lens, place: Place::Pose(file.pose), near };
+        check_near_option(options)?;
+        let file = file.scaled(scale.unwrap_or(1.0));
+        let size = file.size.or(options.size).unwrap_or(Self::DEFAULT_SIZE);
+        let near = options.near.or(file.near);
+        let view = Given { size, lens: file.lens, place: Place::Pose(file.pose), near };
         view.checked().map_err(|error| said_by(path.display(), error))
     }
 
+    /// Returns the camera of the view and the point that it looks at.
+    pub(super) fn camera(&self, scene: &Scene) -> Result<(Camera, Seen)> {
+        match &self.0 {
+            Kind::Given(given) => given.camera(scene, Camera::default_near(scene)),
+            Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, scene))),
+        }
+    }
+
+    /// Returns the number of pixels of the picture.
+    pub fn pixels(&self) -> u64 {
+        let (width, height) = match &self.0 {
+            Kind::Given(given) => given.size,
+            Kind::Camera(camera) => (camera.width, camera.height),
+        };
+        u64::from(width) * u64::from(height)
+    }
+}
+
+impl Given {
     /// Checks the view with stand-ins for values from the scene, such as its centre.
     ///
     /// Errors thus come before the inputs are read, which may take minutes.
-    fn checked(self) -> Result<Self> {
+    fn checked(self) -> Result<View> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
             Place::Framed(up) => {
@@ -95,7 +149,7 @@ impl View {
             Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
         };
         self.posed(&stand_in, Up::Z, self.near.unwrap_or(1.0))?;
-        Ok(self)
+        Ok(View(Kind::Given(self)))
     }
 
     fn posed(&self, pose: &Pose, up: Up, near: f64) -> Result<Camera> {
@@ -108,7 +162,7 @@ impl View {
     /// Returns the camera of the view and the point that it looks at.
     ///
     /// `default_near` is [`Camera::default_near`] of the scene.
-    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
+    fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or(default_near);
         let (pose, up, by) = match &self.place {
             Place::Framed(up) => {
@@ -125,17 +179,11 @@ impl View {
         let camera = self.posed(pose, scene.up, near)?;
         Ok(match *pose {
             Pose::LookAt(_, target, _) => (camera, Seen { target, up, by }),
-            Pose::Rigid(rotation, eye) => {
-                let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(near);
-                let target = eye + camera.rotation.row(2) * distance;
-                (camera, Seen { target, up: Some(-rotation.row(1)), by })
+            Pose::Rigid(..) => {
+                let seen = Seen::of_pose(&camera, scene);
+                (camera, seen)
             }
         })
-    }
-
-    /// Returns the number of pixels of the picture.
-    pub(super) fn pixels(&self) -> u64 {
-        u64::from(self.size.0) * u64::from(self.size.1)
     }
 }
 
@@ -143,10 +191,19 @@ impl View {
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// The point, world coordinates. For a pose of a file it is at the depth of the scene's centre.
-    pub target: DVec3,
+    target: DVec3,
     /// Direction of up as given or as the pose has it; None for the scene's.
     up: Option<DVec3>,
     by: By,
+}
+
+impl Seen {
+    /// The point that a camera looks at whose rotation and eye are given.
+    fn of_pose(camera: &Camera, scene: &Scene) -> Self {
+        let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(camera.near);
+        let target = camera.eye + camera.rotation.row(2) * distance;
+        Self { target, up: Some(-camera.rotation.row(1)), by: By::File }
+    }
 }
 
 /// Source of a view's pose.
@@ -166,12 +223,15 @@ const NEARLY_UP: f64 = 5.0;
 /// Roll of a picture, degrees, up to which no warning is printed.
 const TURNED: f64 = 1.0;
 
-/// A view as the options that reproduce it.
-#[derive(Serialize)]
-pub(super) struct ToldView {
-    eye: [f64; 3],
-    target: [f64; 3],
-    up: [f64; 3],
+/// A view as the options that reproduce it, world coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ViewReport {
+    /// Position of the camera.
+    pub eye: [f64; 3],
+    /// Point that the camera looks at.
+    pub target: [f64; 3],
+    /// Direction of up.
+    pub up: [f64; 3],
     /// Source of the direction of up.
     because: &'static str,
     /// Warning about the picture's roll, if the line of sight is nearly along up.
@@ -179,7 +239,7 @@ pub(super) struct ToldView {
     turned: Option<String>,
 }
 
-impl ToldView {
+impl ViewReport {
     /// Describes `camera`, which looks at `seen`. `guessed` is true if the scene's up is a guess.
     pub(super) fn new(camera: &Camera, seen: &Seen, scene: &Scene, guessed: bool) -> Self {
         let because = match (seen.up, guessed, scene.up) {
@@ -199,13 +259,13 @@ impl ToldView {
     }
 
     /// Returns the options in one line, with the source of up.
-    pub(super) fn sentence(&self) -> String {
+    pub fn sentence(&self) -> String {
         let [eye, target] = [self.eye, self.target].map(|v| vector_argument(v.into()));
         format!("view: --eye {eye} --target {target} --up {} ({})", up_argument(self.up.into()), self.because)
     }
 
     /// Returns the warning about the picture's roll, if there is one.
-    pub(super) fn warning(&self) -> Option<String> {
+    pub fn warning(&self) -> Option<String> {
         self.turned.as_ref().map(|turned| format!("warning: {turned}"))
     }
 }
@@ -239,6 +299,6 @@ fn said_by(who: impl Display, error: Error) -> Error {
     Error::Usage(format!("{who}: {error}"))
 }
 
-fn check_near_argument(arguments: &Arguments) -> Result<()> {
-    arguments.camera.near.map_or(Ok(()), check_near).map_err(|error| said_by("--near", error))
+fn check_near_option(options: &CameraOptions) -> Result<()> {
+    options.near.map_or(Ok(()), check_near).map_err(|error| said_by("--near", error))
 }

@@ -1,0 +1,43 @@
+//! The view of a picture.
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+
+/// The view of a picture. Without an eye the whole scene is in view.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[cfg_attr(feature = "cli", command(next_help_heading = "Camera"))]
+// Help texts write defaults in brackets, which are no links.
+#[allow(rustdoc::broken_intra_doc_links)]
+pub struct CameraOptions {
+    /// Image size in pixels [default: 1024x1024, or the camera file's]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "WxH", value_parser = super::parse::size))]
+    pub size: Option<(u32, u32)>,
+    /// Position of the camera, world coordinates [default: a view of the whole scene]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true))]
+    pub eye: Option<DVec3>,
+    /// Point that the camera looks at [default: the scene's centre]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true, requires = "eye"))]
+    pub target: Option<DVec3>,
+    /// Direction of up in the image: x, y, z, -x, -y, -z or X,Y,Z [default: as the file says]
+    ///
+    /// LAS files and the PLY files of epsplat say it; in others up is z for flat clouds, else y
+    #[cfg_attr(feature = "cli", arg(long, value_name = "AXIS|X,Y,Z", value_parser = super::parse::up, allow_hyphen_values = true))]
+    pub up: Option<DVec3>,
+    /// Vertical field of view [default: 45]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", conflicts_with_all = ["ortho", "intrinsics"]))]
+    pub fov: Option<f64>,
+    /// Orthographic view of this height in world units
+    #[cfg_attr(feature = "cli", arg(long, value_name = "HEIGHT", conflicts_with = "intrinsics"))]
+    pub ortho: Option<f64>,
+    /// Focal lengths and principal point in pixels
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FX,FY,CX,CY", value_parser = super::parse::intrinsics, allow_hyphen_values = true, hide_short_help = true))]
+    pub intrinsics: Option<[f64; 4]>,
+    /// Camera file (see the guide), in place of all other camera options except --size
+    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
+    pub file: Option<PathBuf>,
+    /// Smallest depth drawn, world units [default: a millionth of the scene]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]
+    pub near: Option<f64>,
+}

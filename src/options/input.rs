@@ -1,0 +1,85 @@
+//! How input files are read.
+
+use crate::io::{self, ClassOpacities, Format};
+
+/// The format of input files, and attributes to ignore.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[cfg_attr(feature = "cli", command(next_help_heading = "Input"))]
+// Help texts write defaults in brackets, which are no links.
+#[allow(rustdoc::broken_intra_doc_links)]
+pub struct FormatOptions {
+    /// Format of the inputs [default: from their names, or else their first bytes]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FORMAT", value_parser = formats(), hide_short_help = true))]
+    pub input_format: Option<Format>,
+    /// Ignore the alphas of colours, where some programs store other values
+    ///
+    /// The opacities of Gaussians are still used
+    #[cfg_attr(feature = "cli", arg(long, hide_short_help = true))]
+    pub ignore_alpha: bool,
+}
+
+/// How point clouds are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+#[cfg_attr(feature = "cli", command(next_help_heading = "Input"))]
+pub struct InputOptions {
+    /// The format of the files, and attributes to ignore.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub file: FormatOptions,
+    /// Keep points that a LAS file marks as withheld (deleted), which are left out by default
+    #[cfg_attr(feature = "cli", arg(long, hide_short_help = true))]
+    pub keep_withheld: bool,
+    /// Opacities of LAS classes: CLASS:A or FIRST-LAST:A, such as 3-5:0.3,7:0
+    ///
+    /// The example makes vegetation (3 to 5) transparent and leaves out noise (7). Points of
+    /// opacity 0 are left out and counted; others are transparent with render --composite
+    #[cfg_attr(feature = "cli", arg(long, value_name = "RULES", hide_short_help = true))]
+    pub class_opacity: Option<ClassOpacities>,
+    /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis
+    #[cfg_attr(feature = "cli", arg(long, hide_short_help = true))]
+    pub flatten: bool,
+    /// Fail if a part of an input cannot be read; by default the rest is drawn
+    ///
+    /// A part is a file of a folder, a scan of an E57 file, a chunk of a LAZ file or a node of a
+    /// COPC file. A note names the parts that are left out
+    #[cfg_attr(feature = "cli", arg(long, hide_short_help = true))]
+    pub strict: bool,
+}
+
+/// Parses the names of the formats that this build reads.
+#[cfg(feature = "cli")]
+fn formats() -> impl clap::builder::TypedValueParser<Value = Format> {
+    use clap::builder::{PossibleValuesParser, TypedValueParser};
+    let names = Format::READ.iter().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
+}
+
+impl InputOptions {
+    /// Returns how a single file is read.
+    pub(crate) fn of_file(&self) -> io::ReadOptions {
+        io::ReadOptions {
+            format: self.file.input_format,
+            keep_withheld: self.keep_withheld,
+            flatten: self.flatten,
+            classes: self.class_opacity.unwrap_or_default(),
+            ignore_alpha: self.file.ignore_alpha,
+            describe: false,
+            strict: self.strict,
+        }
+    }
+
+    /// Returns these options as arguments of a command that reads the same file, each after a
+    /// space.
+    pub fn arguments(&self) -> String {
+        let format = self.file.input_format;
+        let format = format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
+        let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
+        let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
+        let classes = self.class_opacity.filter(|opacities| !opacities.are_plain());
+        let classes = classes.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
+        let alpha = if self.file.ignore_alpha { " --ignore-alpha" } else { "" };
+        let strict = if self.strict { " --strict" } else { "" };
+        format + withheld + if self.flatten { " --flatten" } else { "" } + alpha + &classes + strict
+    }
+}

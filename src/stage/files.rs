@@ -1,0 +1,243 @@
+//! The files of a scene: folders stand for their files, and parts that cannot be read are left out
+//! with a note.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::io::las::Copc;
+use crate::io::ply::{Levels, Rows};
+use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions};
+use crate::options::{FormatOptions, InputOptions};
+use crate::progress::Progress;
+
+/// Most unreadable files of folders that a note names.
+const MOST_NAMED: usize = 8;
+
+/// The input files of a scene, and how they are read.
+#[derive(Clone, Debug, Default)]
+pub struct Files {
+    paths: Vec<PathBuf>,
+    options: InputOptions,
+    /// Those of `paths` that were found in folders.
+    of_folders: BTreeSet<PathBuf>,
+}
+
+impl Files {
+    /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name.
+    /// Nothing is read yet.
+    ///
+    /// A file of a folder is readable if its extension is a format's name. Names with a leading dot
+    /// are skipped, as they are files that programs and systems store for themselves. Subfolders
+    /// are not searched. The path `-` is standard input.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file.
+    pub fn new(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &InputOptions) -> Result<Self> {
+        let mut files = Self { options: *options, ..Self::default() };
+        for path in paths {
+            let path = path.into();
+            if !path.is_dir() {
+                files.paths.push(path);
+                continue;
+            }
+            let mut found = files_of(&path)?;
+            if found.is_empty() {
+                let formats = Format::sentence();
+                return Err(Error::Usage(format!("the folder {} has no {formats} files", path.display())));
+            }
+            files.of_folders.extend(found.iter().cloned());
+            files.paths.append(&mut found);
+        }
+        Ok(files)
+    }
+
+    /// The files, with those of folders.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// How the files are read.
+    pub fn options(&self) -> &InputOptions {
+        &self.options
+    }
+
+    /// Returns an [`Error::EmptyScene`] with the name of the file if there is exactly one.
+    pub fn named(&self, error: Error) -> Error {
+        error.of_inputs(&self.paths)
+    }
+
+    /// Opens or reads each file. Returns the results and a sentence that names unreadable files.
+    ///
+    /// Unless the options are strict, a file of a folder that cannot be read is replaced by
+    /// `stands_in()`, or left out if that is None. If no file can be read, the first error is
+    /// returned.
+    fn each<T>(
+        &self,
+        open: impl Fn(&Path) -> Result<T>,
+        stands_in: impl Fn() -> Option<T>,
+    ) -> Result<(Vec<T>, Option<String>)> {
+        let (mut all, mut failed) = (Vec::new(), Vec::new());
+        for path in &self.paths {
+            match open(path) {
+                Ok(opened) => all.push(opened),
+                Err(error @ (Error::Read { .. } | Error::Malformed { .. }))
+                    if !self.options.strict && self.of_folders.contains(path) =>
+                {
+                    failed.push(error);
+                    all.extend(stands_in());
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if failed.len() == self.paths.len()
+            && let Some(first) = failed.pop()
+        {
+            return Err(failed.into_iter().next().unwrap_or(first));
+        }
+        let told = failed.iter().take(MOST_NAMED).map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        let more = failed.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+        let (count, files) = (failed.len(), self.of_folders.len());
+        let sentence = format!("{count} of {files} files of folders left out: {told}{more} (--strict refuses them)");
+        Ok((all, (count > 0).then_some(sentence)))
+    }
+
+    /// Opens a regular file; None for standard input and the like, where no part can be sought.
+    fn seekable(&self, path: &Path) -> Result<Option<Input>> {
+        let is_file = path.is_file() && path != Path::new("-");
+        is_file.then(|| Input::open(path, self.options.file.input_format)).transpose()
+    }
+
+    /// Opens the files as octrees if all of them are COPC. Otherwise returns None.
+    pub(super) fn octrees(&self, progress: &dyn Progress) -> Result<Option<Vec<Copc>>> {
+        let (files, left_out) = self.each(|path| self.seekable(path)?.map_or(Ok(None), Copc::open), || None)?;
+        let files: Option<Vec<Copc>> = files.into_iter().collect();
+        left_out.iter().filter(|_| files.is_some()).for_each(|line| progress.note(line));
+        Ok(files)
+    }
+
+    /// Opens the only file if it is a regular file with levels of detail. Otherwise returns None.
+    pub(super) fn levels(&self) -> Result<Option<Levels>> {
+        let [path] = &self.paths[..] else { return Ok(None) };
+        self.seekable(path)?.map_or(Ok(None), Levels::open)
+    }
+
+    /// Opens the files for reading their points piece by piece.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if a file cannot be read like this, for example because it is not binary
+    /// PLY.
+    pub fn rows(&self, progress: &dyn Progress) -> Result<Vec<Rows>> {
+        let open = |path: &Path| {
+            let input = self.seekable(path)?;
+            let rows = input.map_or(Ok(None), |input| Rows::open(input, self.options.file.ignore_alpha))?;
+            rows.ok_or_else(|| {
+                Error::Usage(format!(
+                    "--memory needs binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, which {} is not: make surfels of it first (epsplat surfels), or leave --memory out",
+                    path.display()
+                ))
+            })
+        };
+        let (mut files, left_out) = self.each(open, || None)?;
+        left_out.iter().for_each(|line| progress.note(line));
+        Rows::settle_colors(&mut files)?;
+        Ok(files)
+    }
+
+    /// Reads the points of the given nodes of each octree.
+    ///
+    /// The first points read with `rules` decide how colours are interpreted, so that later calls
+    /// with the same rules agree.
+    pub(super) fn nodes<'a>(
+        &self,
+        octrees: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
+        rules: &mut ColorRules,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Points>> {
+        let options = self.options.of_file();
+        let read = |(file, nodes): (&mut Copc, &Vec<usize>)| file.read_raw(nodes, &options, progress);
+        let mut points = octrees.map(read).collect::<Result<Vec<_>>>()?;
+        rules.settle(&mut points);
+        Ok(points)
+    }
+
+    /// Reads the points of each file, one entry for each path.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`io::read`], and [`Error::Usage`] if standard input is named twice or opacities
+    /// are given for classes that no file has.
+    pub fn read(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
+        if self.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Error::Usage("standard input can be read only once: give - once".into()));
+        }
+        let read = |path: &Path| io::read_raw(path, self.options.of_file(), progress);
+        let (mut inputs, left_out) = self.each(read, || Some(Points::default()))?;
+        // An unreadable file has an entry without points, so that indices of inputs stay those of
+        // `paths`.
+        inputs.iter_mut().take(1).for_each(|first| first.unread.extend(left_out.clone()));
+        // All tiles of one scan must use the same white point.
+        io::settle_colors(&mut inputs);
+        check_classes(&self.options, &inputs)?;
+        Ok(inputs)
+    }
+
+    /// Reads the points of a file and the description in its header ([`Points::about`]).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Files::read`].
+    pub fn described(path: &Path, options: &InputOptions, progress: &dyn Progress) -> Result<Points> {
+        let points = io::read_with(path, ReadOptions { describe: true, ..options.of_file() }, progress)?;
+        check_classes(options, std::slice::from_ref(&points))?;
+        Ok(points)
+    }
+}
+
+impl FormatOptions {
+    /// Reads the file at `path` as a mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if the format is neither obj nor ply, or an error of reading.
+    pub fn mesh(&self, path: &Path, progress: &dyn Progress) -> Result<Mesh> {
+        let format = self.input_format;
+        if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
+            return Err(Error::Usage(
+                "only obj and ply files can be read as meshes: choose one of them for --input-format".into(),
+            ));
+        }
+        let options = ReadOptions { format, ignore_alpha: self.ignore_alpha, ..ReadOptions::default() };
+        io::read_mesh_with(path, options, progress)
+    }
+}
+
+/// Lists the readable files of a folder, sorted by name.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let is_read = |path: &PathBuf| {
+        if path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b".")) {
+            return false;
+        }
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        path.is_file() && Format::READ.iter().any(|(name, _)| name.eq_ignore_ascii_case(extension))
+    };
+    let listed = std::fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+    let mut files: Vec<PathBuf> = listed.map_err(|error| Error::read(folder, error))?;
+    files.retain(is_read);
+    files.sort();
+    Ok(files)
+}
+
+/// Fails if opacities of classes are given and none of the inputs has classes.
+fn check_classes(options: &InputOptions, inputs: &[Points]) -> Result<()> {
+    let plain = options.class_opacity.is_none_or(|opacities| opacities.are_plain());
+    // An input without points may be a LAS file: only inputs with points show what is missing.
+    let none = inputs.iter().all(|input| input.classes.is_empty() && !input.positions.is_empty());
+    if plain || !none {
+        return Ok(());
+    }
+    Err(Error::Usage("no input has points with classes, which LAS files have: leave --class-opacity out".into()))
+}

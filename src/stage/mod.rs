@@ -1,0 +1,150 @@
+//! From files and options to pictures: what the command line, studies and callers of the library
+//! share.
+//!
+//! ```text
+//! Scene::open    lists the files; nothing is read yet
+//! Renderer::new  settles the options, opens the device, and reads what all views share
+//! frame(view)    reads what else the view needs, and renders
+//! ```
+
+mod files;
+mod in_part;
+mod levels;
+mod memory;
+mod octrees;
+mod renderer;
+mod settings;
+mod tree;
+mod view;
+mod whole;
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+pub use self::files::Files;
+pub use self::in_part::ReadReport;
+pub use self::renderer::{Picture, Renderer};
+pub use self::view::{View, ViewReport};
+
+use self::whole::{Making, Whole};
+use crate::error::{Error, Result};
+use crate::io::Points;
+use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
+use crate::plan::BackendName;
+use crate::progress::Progress;
+
+/// Files, or points in memory, that [`Renderer`]s draw.
+///
+/// A clone shares all data. Surfels that were made for one renderer are used again for the next,
+/// unless its options ask for others.
+#[derive(Clone)]
+pub struct Scene(Arc<Inputs>);
+
+/// The content of a [`Scene`].
+#[derive(Default)]
+struct Inputs {
+    files: Files,
+    /// Points that are in memory, in place of files.
+    given: Vec<Points>,
+    options: SceneOptions,
+    /// The surfels and triangles that were made last.
+    made: Mutex<Option<(Making, Arc<Whole>)>>,
+}
+
+impl Scene {
+    /// Opens files and folders, which together make one scene. The path `-` is standard input.
+    ///
+    /// The files are read when a [`Renderer`] needs them, and of files with levels of detail only
+    /// the parts that a view needs.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] for a missing file, [`Error::Usage`] for a folder without readable files.
+    pub fn open(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &SceneOptions) -> Result<Self> {
+        let files = Files::new(paths, &options.input)?;
+        for path in files.paths().iter().filter(|path| path.as_os_str() != "-") {
+            path.metadata().map_err(|error| Error::read(path, error))?;
+        }
+        Ok(Self(Arc::new(Inputs { files, options: options.clone(), ..Inputs::default() })))
+    }
+
+    /// Makes a scene of points in memory.
+    pub fn from_points(points: Vec<Points>, options: &SceneOptions) -> Self {
+        Self(Arc::new(Inputs { given: points, options: options.clone(), ..Inputs::default() }))
+    }
+
+    /// The files of the scene, with those of folders.
+    pub fn files(&self) -> &Files {
+        &self.0.files
+    }
+}
+
+/// A picture of a scene as it was asked for; the view apart.
+#[derive(Clone, Copy)]
+struct Request<'a> {
+    scene: &'a Inputs,
+    options: &'a RenderOptions,
+    device: &'a DeviceOptions,
+    /// The picture is one of many views, between which cuts of levels of detail fade.
+    views: bool,
+}
+
+impl Request<'_> {
+    fn files(&self) -> &Files {
+        &self.scene.files
+    }
+
+    fn surfels(&self) -> &SurfelOptions {
+        &self.scene.options.surfels
+    }
+
+    fn triangles(&self) -> &TriangleOptions {
+        &self.scene.options.triangles
+    }
+
+    /// The backend, or None for the best that there is.
+    fn backend(&self) -> Option<BackendName> {
+        self.device.backend.0
+    }
+
+    /// Whether the f64 twins render by choice.
+    fn is_reference(&self) -> bool {
+        self.backend() == Some(BackendName::Reference)
+    }
+
+    /// Reads the points of all inputs.
+    fn points(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
+        if self.files().paths().is_empty() { Ok(self.scene.given.clone()) } else { self.files().read(progress) }
+    }
+
+    /// Returns the surfels and triangles of all inputs, as they were made before if the same are
+    /// needed.
+    fn whole(&self, progress: &dyn Progress) -> Result<Arc<Whole>> {
+        let making = Making::of(self);
+        let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((known, whole)) = &*made
+            && *known == making
+        {
+            return Ok(whole.clone());
+        }
+        // The memory of what was made before is needed for what is made now.
+        *made = None;
+        let (scene, preparation) = whole::scene(self, progress)?;
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation });
+        *made = Some((making, whole.clone()));
+        Ok(whole)
+    }
+
+    /// Returns the same surfels and triangles with levels of detail, which later renderers use too.
+    fn with_levels(&self, whole: Arc<Whole>, progress: &dyn Progress) -> Result<Arc<Whole>> {
+        let making = Making::of(self);
+        let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
+        // Surfels that nobody else draws are not copied.
+        *made = None;
+        let Whole { scene, preparation } = Arc::unwrap_or_clone(whole);
+        let scene = levels::made(Arc::unwrap_or_clone(scene), progress)?;
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation });
+        *made = Some((making, whole.clone()));
+        Ok(whole)
+    }
+}

@@ -1,0 +1,252 @@
+//! Renders views of a scene.
+
+use std::sync::Arc;
+
+use super::in_part::{Part, Parts};
+use super::{Inputs, ReadReport, Request, Scene, View, ViewReport, levels, memory};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::Gpu;
+use crate::options::{DeviceOptions, RenderOptions};
+use crate::passes::unseen::{Unseen, is_empty};
+use crate::plan::{BackendName, RenderOptions as Settings};
+use crate::progress::Progress;
+use crate::render::{self, Backend, Report, render};
+use crate::scene::{self, Bounds, Camera};
+
+/// Renders views of a scene with the same options. All that views share is kept from one to the
+/// next: surfels, buffers and compiled kernels.
+pub struct Renderer {
+    inputs: Arc<Inputs>,
+    options: RenderOptions,
+    device: DeviceOptions,
+    views: bool,
+    settings: Settings,
+    backend: Arc<Backend>,
+    drawn: Drawn,
+    /// Frames in memory at once, for a limit of memory.
+    frames: u64,
+}
+
+/// The scene of all views.
+enum Drawn {
+    /// Surfels and triangles that all views share.
+    Whole {
+        scene: Arc<scene::Scene>,
+        guessed_up: bool,
+        renderer: Box<render::Renderer<Arc<scene::Scene>, Arc<Backend>>>,
+    },
+    /// Files of which each view reads a part.
+    Parts {
+        parts: Box<Parts>,
+        /// The notes of a first view were given: those of the next would be the same.
+        noted: bool,
+    },
+}
+
+/// A rendered view.
+#[derive(Debug)]
+pub struct Picture {
+    /// The colour and the maps.
+    pub frame: Frame,
+    /// Times and counts.
+    pub report: Report,
+    /// The camera, complete with the scene's values.
+    pub camera: Camera,
+    /// The camera as options that give it again.
+    pub view: ViewReport,
+    /// Counts of what was read for this view; None if the inputs were read whole.
+    pub read: Option<ReadReport>,
+    /// Why nothing is seen, if nothing is.
+    pub unseen: Option<Unseen>,
+}
+
+impl Renderer {
+    /// Makes a renderer of `scene`: checks the options, opens the device, and reads and prepares
+    /// all that its views share. What a user should know is given to [`Progress::note`].
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if the options do not go together or do not suit the scene,
+    /// [`Error::NoAdapter`] if there is none that the device options name, and errors of reading.
+    pub fn new(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::with(scene, options, device, false, progress)
+    }
+
+    /// Makes a renderer for a camera that moves: cuts of levels of detail fade from view to view
+    /// where they can, unless the options say otherwise.
+    ///
+    /// # Errors
+    ///
+    /// The same as those of [`Renderer::new`].
+    pub fn of_views(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::with(scene, options, device, true, progress)
+    }
+
+    fn with(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        views: bool,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let (inputs, options, device) = (scene.0.clone(), options.clone(), device.clone());
+        let request = Request { scene: &inputs, options: &options, device: &device, views };
+        let settings = request.settings()?;
+        let backend = Arc::new(backend(&device, progress)?);
+        let (settings, drawn) = match Parts::of(&request, &settings, progress)? {
+            Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
+            None => whole(&request, settings, &backend, progress)?,
+        };
+        Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
+    }
+
+    /// Sets how many frames the caller has in memory at once, which counts against a limit of
+    /// memory: 1 by default.
+    #[must_use]
+    pub fn with_frames(self, frames: u64) -> Self {
+        Self { frames, ..self }
+    }
+
+    /// The maps, filters and all else that the options and the scene decided.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The backend that renders.
+    pub fn backend(&self) -> &Backend {
+        &self.backend
+    }
+
+    /// The box of what is drawn, world coordinates; of files that are read in part it is the box of
+    /// the coarsest nodes' centres.
+    pub fn bounds(&self) -> Bounds {
+        let scene = self.scene();
+        let Bounds { min, max } = scene.bounds();
+        Bounds { min: min + scene.origin, max: max + scene.origin }
+    }
+
+    /// The scene, or an overview of files that are read in part.
+    fn scene(&self) -> &scene::Scene {
+        match &self.drawn {
+            Drawn::Whole { scene, .. } => scene,
+            Drawn::Parts { parts, .. } => parts.overview(),
+        }
+    }
+
+    /// Returns the camera of a view, complete with the scene's values.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if the view and the scene give no camera.
+    pub fn camera(&self, view: &View) -> Result<Camera> {
+        view.camera(self.scene()).map(|(camera, _)| camera)
+    }
+
+    /// Renders a view.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Limit`] if a limit of the adapter is too small, [`Error::Usage`] if a limit of
+    /// memory is, and errors of reading and of the device.
+    pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
+        let (camera, seen) = view.camera(self.scene())?;
+        let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
+        let request = Request { scene: inputs, options, device, views: *views };
+        // Of many views none is described: that would be a line for each.
+        let tell = |view: &ViewReport| {
+            if !*views {
+                progress.note(&view.sentence());
+                view.warning().iter().for_each(|warning| progress.note(warning));
+            }
+        };
+        match drawn {
+            Drawn::Whole { scene, guessed_up, renderer } => {
+                let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
+                tell(&view);
+                let rendered = renderer.frame(&camera, progress)?;
+                Ok(picture(scene, settings, rendered, (camera, view), None))
+            }
+            Drawn::Parts { parts, noted } => {
+                let Part { made: (scene, preparation), settings, read } =
+                    parts.scene(&request, (&camera, *frames), settings, progress)?;
+                if !std::mem::replace(noted, true) {
+                    preparation.notes().iter().for_each(|line| progress.note(line));
+                }
+                let view = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
+                tell(&view);
+                if !*views {
+                    progress.note(&read.sentence());
+                }
+                let rendered = render(&scene, &camera, &settings, backend, progress)?;
+                Ok(picture(&scene, &settings, rendered, (camera, view), Some(read)))
+            }
+        }
+    }
+}
+
+/// Opens the backend of the device options.
+///
+/// # Errors
+///
+/// [`Error::NoAdapter`] if there is none that the options name.
+fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result<Backend> {
+    if device.backend.0 == Some(BackendName::Reference) {
+        if device.adapter.is_some() {
+            return Err(Error::Usage("--backend reference uses no adapter: leave --adapter out".into()));
+        }
+        return Ok(Backend::Reference);
+    }
+    match Gpu::open(device.adapter.as_deref()) {
+        Ok(gpu) => {
+            progress.note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
+            let gpu = if device.memory.is_some() { gpu.with_buffer_limit(memory::BUFFER) } else { gpu };
+            Ok(Backend::gpu(gpu))
+        }
+        Err(Error::NoAdapter(why)) if device.backend.0.is_none() && device.adapter.is_none() => {
+            progress.note(&format!("rendering with the f64 reference on the processor: {why}"));
+            Ok(Backend::Reference)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Reads and prepares a scene that all views share, and returns it with the settings that suit it.
+fn whole(
+    request: &Request<'_>,
+    settings: Settings,
+    backend: &Arc<Backend>,
+    progress: &dyn Progress,
+) -> Result<(Settings, Drawn)> {
+    let mut whole = request.whole(progress)?;
+    whole.preparation.notes().iter().for_each(|line| progress.note(line));
+    let settings = request.for_scene(settings, &whole.scene, progress)?;
+    if levels::lack(&whole.scene, &settings) {
+        whole = request.with_levels(whole, progress)?;
+    }
+    let renderer = render::Renderer::new(whole.scene.clone(), &settings, backend.clone())?;
+    let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
+    Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
+}
+
+/// Puts a rendered frame together with what is known of it.
+fn picture(
+    scene: &scene::Scene,
+    settings: &Settings,
+    (frame, report): (Frame, Report),
+    (camera, view): (Camera, ViewReport),
+    read: Option<ReadReport>,
+) -> Picture {
+    let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
+    Picture { frame, report, camera, view, read, unseen }
+}

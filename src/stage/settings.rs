@@ -1,0 +1,62 @@
+//! The settings of a picture, from the options and the scene.
+
+use super::Request;
+use crate::error::{Error, Result};
+use crate::options::Suggested;
+use crate::plan::{RenderOptions as Settings, check};
+use crate::progress::Progress;
+use crate::scene::{Blend, Colors, Composite, Scene};
+
+impl Request<'_> {
+    /// Returns the settings of a scene that has no Gaussians, before anything is read.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for options that do not go together.
+    pub fn settings(&self) -> Result<Settings> {
+        let settings = self.settled(false)?;
+        if self.surfels().textures.is_empty() {
+            return Ok(settings);
+        }
+        if self.options.points.facing.is_some() {
+            return Err(Error::Usage("--facing leaves points no plane to paint: leave it or --texture out".into()));
+        }
+        // In transparent pictures surfels have their texture's mean colour (whole.rs), so that the
+        // check is that of an opaque picture.
+        let opaque = Settings { composite: Composite::Opaque, ..settings.clone() };
+        check::textured(&opaque, self.is_reference())?;
+        Ok(settings)
+    }
+
+    /// Returns the settings for a scene. Gaussians are drawn by the rules of their training, unless
+    /// the options say otherwise.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for options that cannot be used with Gaussians.
+    pub fn for_scene(&self, settings: Settings, scene: &Scene, progress: &dyn Progress) -> Result<Settings> {
+        if settings.blend == Blend::Nearest && matches!(scene.colors, Colors::Linear(_)) {
+            progress.note(
+                "--blend nearest stores 8-bit colours: finer ones are rounded, and values above white are clamped",
+            );
+        }
+        if !scene.encoded {
+            return Ok(settings);
+        }
+        let settings = self.settled(true)?;
+        // --facing, the rasteriser and --blend nearest never draw the Gaussians' own kernel.
+        let has_kernel = settings.facing.is_none() && settings.raster.is_none() && settings.blend != Blend::Nearest;
+        if has_kernel && self.options.replaces_gaussians() {
+            progress.note(
+                "warning: --kernel takes the place of the Gaussians' own: leave it out for pictures as they were trained",
+            );
+        }
+        Ok(settings)
+    }
+
+    fn settled(&self, gaussians: bool) -> Result<Settings> {
+        let one_input = self.files().paths().len() < 2 && self.scene.given.len() < 2;
+        let suggested = Suggested { gaussians, shading: None, views: self.views, one_input };
+        let settings = self.options.settle(self.backend(), suggested);
+        self.options.check(self.backend(), &settings)?;
+        Ok(settings)
+    }
+}

@@ -1,0 +1,190 @@
+//! Builds the scene of a picture from all inputs and triangle meshes.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Request;
+use crate::error::{Error, Result};
+use crate::io::{self, Mesh, Points, ReadOptions, Texture};
+use crate::options::{RenderOptions, Suggested};
+use crate::plan::check::textured;
+use crate::plan::{Facts, composited};
+use crate::progress::Progress;
+use crate::scene::{Blend, Colors, Composite, Map, PointSize, Scene};
+use crate::surfels::{self, FromPoints, Preparation, Surfels, from_points, with_triangles};
+
+/// A scene, and counts of how its points became surfels.
+pub(super) type Made = (Scene, Preparation);
+
+/// The surfels and triangles of all inputs, shared by all renderers that draw them.
+#[derive(Clone)]
+pub(super) struct Whole {
+    pub scene: Arc<Scene>,
+    /// Counts of how its points became surfels.
+    pub preparation: Preparation,
+}
+
+/// The choices of a picture on which its surfels depend.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) struct Making {
+    /// The size of points that face the camera.
+    facing: Option<PointSize>,
+    /// Surfels are painted by the images of their meshes' materials.
+    paints: bool,
+    /// How surfaces show through each other: [`seen_through`].
+    composite: Composite,
+    transparent: bool,
+}
+
+impl Making {
+    pub fn of(request: &Request<'_>) -> Self {
+        let RenderOptions { points, transparency, maps, .. } = request.options;
+        let settings = request.options.settle(request.backend(), Suggested::default());
+        Self {
+            facing: points.facing.map(|_| points.point_size.unwrap_or_default()),
+            paints: paints(request),
+            composite: settings.composite,
+            transparent: transparency.opacity.is_some_and(|opacity| opacity < 1.0) || maps.aov.contains(&Map::Surfaces),
+        }
+    }
+}
+
+/// Reads all inputs and meshes into one scene.
+pub(super) fn scene(request: &Request<'_>, progress: &dyn Progress) -> Result<Made> {
+    scene_of(request, request.points(progress)?, progress)
+}
+
+/// Builds one scene from the points of the inputs, reading the triangle meshes to draw with them.
+pub(super) fn scene_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+    if inputs.is_empty() && !request.surfels().textures.is_empty() {
+        let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
+        return Err(Error::Usage(what.into()));
+    }
+    if request.options.surface.separate && inputs.len() < 2 {
+        progress.note(
+            "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
+        );
+    }
+    // A file of `epsplat hybrid` names the mesh of its remaining triangles.
+    let beside = inputs.iter().filter_map(|points| points.beside.clone());
+    let mut paths: Vec<PathBuf> = request.triangles().meshes.iter().cloned().chain(beside).collect();
+    // A mesh that is named twice is drawn once.
+    let mut known = BTreeSet::new();
+    paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
+    // Inputs with neither points nor triangles fail in `surfels_of`, whose error says so.
+    let none = !inputs.is_empty() && inputs.iter().all(|points| points.beside.is_none());
+    let of_surfels = if none || inputs.iter().any(|points| !points.positions.is_empty()) {
+        Some(surfels_of(request, inputs, progress)?)
+    } else {
+        inputs.iter().flat_map(|points| &points.unread).for_each(|line| progress.note(line));
+        None
+    };
+    if paths.is_empty() {
+        if request.options.surface.join.is_some() || request.triangles().texture.is_some() {
+            let what = "--join and --triangle-texture need triangles, and there are none: name a mesh by --triangles";
+            return Err(Error::Usage(what.into()));
+        }
+        return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
+    }
+    let options = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
+    let meshes = paths.iter().map(|path| io::read_mesh_with(path, options, progress)).collect::<Result<Vec<_>>>()?;
+    let meshes = painted(meshes, &paths, request.triangles().texture.as_deref(), progress)?;
+    meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| progress.note(line));
+    let (scene, preparation) = of_surfels.unzip();
+    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| error.of_inputs(&paths))?;
+    of_triangles.notes().iter().for_each(|line| progress.note(line));
+    let guessed_up = of_triangles.guessed_up;
+    Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+}
+
+/// Paints meshes whose materials have no texture with `image`, if that is given.
+///
+/// # Errors
+///
+/// [`Error::Malformed`] if such a mesh has no texture coordinates.
+fn painted(
+    mut meshes: Vec<Mesh>,
+    paths: &[PathBuf],
+    image: Option<&Path>,
+    progress: &dyn Progress,
+) -> Result<Vec<Mesh>> {
+    let Some(image) = image else { return Ok(meshes) };
+    let texture = Texture::read(image)?;
+    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    if !meshes.iter().any(bare) {
+        progress.note("warning: --triangle-texture is not used, as every mesh has a texture of its own");
+    }
+    for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
+        if mesh.texture.is_none() {
+            return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
+        }
+        mesh.paint(texture.clone());
+    }
+    Ok(meshes)
+}
+
+/// Returns true if these options can paint surfels with the images of their meshes' materials.
+///
+/// Otherwise each surfel has the mean colour of its part of the image.
+fn paints(request: &Request<'_>) -> bool {
+    let levels = &request.options.levels;
+    let finest = levels.lod.is_none() && levels.splats.is_none();
+    let reference = request.is_reference();
+    let settings = request.settings();
+    finest && settings.is_ok_and(|settings| textured(&settings, reference).is_ok() && settings.blend != Blend::Nearest)
+}
+
+/// Builds the surfels of all inputs.
+fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+    let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+    let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
+    if !textures.is_empty() && inputs.iter().any(bare) {
+        let paths =
+            request.files().paths().iter().zip(&inputs).filter(|(_, points)| bare(points)).map(|(path, _)| path);
+        if !inputs.iter().any(Points::has_places) {
+            let what = "its points have no texture coordinates, so they cannot be textured: use `epsplat sample` to make surfels of a mesh with texture coordinates";
+            let unnamed = Path::new("the scene");
+            return Err(Error::malformed(paths.clone().next().map_or(unnamed, PathBuf::as_path), what));
+        }
+        let names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        progress.note(&format!(
+            "{names}: no texture coordinates, so the points have their own colours in spite of --texture"
+        ));
+    }
+    let limits = request.surfels().limits.limits();
+    let in_file = |error| request.files().named(error);
+    if let Some(size) = request.surfels().size {
+        let options = FromPoints { size, limits, ..FromPoints::default() };
+        let Surfels { points, preparation, .. } = from_points(inputs, &options, progress).map_err(in_file)?;
+        // No limits here: `from_points` has already dropped outliers and limited half-axes.
+        let (scene, of_scene) = surfels::build(vec![points], progress).map_err(in_file)?;
+        let Preparation { guessed_up, strays, rounding, .. } = of_scene;
+        return Ok((
+            seen_through(scene, request, progress),
+            Preparation { guessed_up, strays, rounding, ..preparation },
+        ));
+    }
+    let built = match request.options.points.facing {
+        Some(_) => {
+            surfels::build_facing(inputs, request.options.points.point_size.unwrap_or_default(), &limits, progress)
+        }
+        None if textures.is_empty() && paints(request) => surfels::build_painted(inputs, &limits, progress),
+        None => surfels::build_within(inputs, textures, &limits, progress),
+    };
+    let (scene, preparation) = built.map_err(in_file)?;
+    Ok((seen_through(scene, request, progress), preparation))
+}
+
+/// Replaces texture coordinates by each surfel's mean colour if the scene is transparent.
+///
+/// The fragment lists of transparent pictures store no texture coordinates.
+fn seen_through(scene: Scene, request: &Request<'_>, progress: &dyn Progress) -> Scene {
+    let Colors::Textured(textured) = &scene.colors else { return scene };
+    let settings = request.options.settle(request.backend(), Suggested::default());
+    if settings.composite == Composite::Opaque || composited(&Facts::of(&scene), &settings) == Composite::Opaque {
+        return scene;
+    }
+    progress.note("the picture is transparent, so each surfel has the mean colour of its texture");
+    Scene { colors: Colors::Linear(textured.colors().to_vec()), ..scene }
+}

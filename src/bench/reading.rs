@@ -31,6 +31,11 @@ impl Definition {
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let mut definition: Self = toml::from_str(text).map_err(|e| Error::malformed(path, located(text, &e)))?;
         definition.folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        for config in &mut definition.configs {
+            let sources = std::mem::take(&mut config.options.research.sources);
+            config.options.research.sources =
+                sources.into_iter().map(|source| source.within(&definition.folder)).collect();
+        }
         definition.check().map_err(|what| Error::malformed(path, what))?;
         Ok(definition)
     }

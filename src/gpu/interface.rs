@@ -10,6 +10,26 @@ use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Module, ScalarKind,
 /// pipelines.
 pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
 
+/// Why a text is no valid module.
+#[derive(Debug)]
+pub(super) struct Invalid {
+    sentence: String,
+    /// The place of the fault in the text.
+    at: Option<naga::SourceLocation>,
+}
+
+impl Invalid {
+    /// The sentence, after the place that `place_of` gives for a line of the text.
+    pub fn told<'a>(&self, place_of: impl Fn(u32) -> Option<(&'a str, u32)>) -> String {
+        let at = self.at.as_ref();
+        let place = at.and_then(|at| Some((place_of(at.line_number)?, at.line_position)));
+        match place {
+            Some(((file, line), column)) => format!("{file}:{line}:{column}: {}", self.sentence),
+            None => self.sentence.clone(),
+        }
+    }
+}
+
 /// A parsed and validated module.
 pub(super) struct Interface {
     pub module: Module,
@@ -20,12 +40,20 @@ impl Interface {
     /// Parses and validates `text`, which may use `capabilities`.
     ///
     /// # Errors
-    /// The parser's or validator's message.
-    pub fn of(text: &str, capabilities: Capabilities) -> Result<Self, String> {
-        let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-        let info = Validator::new(ValidationFlags::all(), capabilities)
-            .validate(&module)
-            .map_err(|e| e.emit_to_string(text))?;
+    /// The parser's or validator's message, and its place.
+    pub fn of(text: &str, capabilities: Capabilities) -> Result<Self, Invalid> {
+        let module = naga::front::wgsl::parse_str(text).map_err(|error| {
+            let labels = error.labels().filter(|(_, label)| !label.is_empty()).map(|(_, label)| label.to_owned());
+            let sentence = [error.message().to_owned()].into_iter().chain(labels).collect::<Vec<_>>().join(": ");
+            Invalid { sentence, at: error.location(text) }
+        })?;
+        let validated = Validator::new(ValidationFlags::all(), capabilities).validate(&module);
+        let info = validated.map_err(|error| {
+            let causes =
+                std::iter::successors(Some(error.as_inner() as &dyn std::error::Error), |error| error.source());
+            let sentence = causes.map(ToString::to_string).collect::<Vec<_>>().join(": ");
+            Invalid { sentence, at: error.location(text) }
+        })?;
         Ok(Self { module, info })
     }
 
@@ -177,7 +205,8 @@ impl Interface {
 /// Parses and validates a module. Returns it, the bindings of its entry points and the names of its
 /// overrides.
 pub fn reflect(text: &str) -> Result<(Module, Bindings, Vec<String>), String> {
-    let interface = Interface::of(text, Capabilities::all())?;
+    let interface =
+        Interface::of(text, Capabilities::all()).map_err(|invalid| invalid.told(|line| Some(("line", line))))?;
     let (bindings, overrides) = (interface.bindings(), interface.overrides());
     Ok((interface.module, bindings, overrides))
 }

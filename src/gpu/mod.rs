@@ -4,6 +4,7 @@
 pub mod adapter;
 pub mod buffers;
 pub mod device;
+pub(crate) mod evaluate;
 pub mod interface;
 pub mod kernel;
 pub mod layout;
@@ -11,10 +12,12 @@ mod loops;
 mod module;
 pub mod program;
 mod recent;
+mod replacement;
 pub mod sources;
 mod spirv;
 pub mod timing;
 
 pub use adapter::AdapterDescription;
 pub use device::{Gpu, adapters};
+pub use replacement::Replacement;
 pub use sources::Sources;

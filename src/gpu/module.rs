@@ -66,12 +66,14 @@ impl Entry<'_> {
 impl Module {
     /// Parses and validates a module.
     pub fn of(gpu: &Gpu, text: Text) -> Result<Self> {
-        let Text { joined, counts_loops } = text;
+        let counts_loops = text.counts_loops;
         let spirv = gpu.takes_spirv();
         let capabilities = if spirv { spirv::capabilities(gpu.device.features()) } else { Capabilities::all() };
-        let interface = Interface::of(&joined, capabilities);
-        let interface = interface.map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
-        let text = (!spirv).then(|| translated_by_wgpu(gpu, joined, counts_loops));
+        let interface = Interface::of(&text.joined, capabilities).map_err(|invalid| {
+            let told = invalid.told(|line| text.place_of(line));
+            gpu.error(format!("a kernel is not valid WGSL: {told}"))
+        })?;
+        let text = (!spirv).then(|| translated_by_wgpu(gpu, text.joined, counts_loops));
         Ok(Self { interface, counts_loops, text })
     }
 

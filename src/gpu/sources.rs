@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use super::loops;
+use super::{Replacement, loops};
 use crate::error::{Error, Result};
 
 // Defines `FILES`, the name and text of each file of `wgsl/`, as the build script found them.
@@ -14,6 +14,25 @@ pub(crate) struct Text {
     pub joined: String,
     /// Whether every loop gets a counter that ends it.
     pub counts_loops: bool,
+    /// The name of each joined file for people, and the number of its lines.
+    files: Vec<(String, u32)>,
+}
+
+impl Text {
+    /// A module of one text, whose loops are counted.
+    pub fn alone(text: &str) -> Self {
+        Self { joined: text.to_owned(), counts_loops: true, files: Vec::new() }
+    }
+
+    /// The file and the line in it of a line of the joined text; both start at 1.
+    pub fn place_of(&self, line: u32) -> Option<(&str, u32)> {
+        let mut first = 1;
+        self.files.iter().find_map(|(name, lines)| {
+            let within = line.checked_sub(first)?;
+            first += lines;
+            (within < *lines).then_some((name.as_str(), within + 1))
+        })
+    }
 }
 
 /// The WGSL files of the kernels. They are the built-in ones, parts of which a researcher (or a
@@ -21,12 +40,18 @@ pub(crate) struct Text {
 #[derive(Clone, Debug)]
 pub struct Sources {
     texts: BTreeMap<&'static str, Cow<'static, str>>,
+    /// Names for people of files that a user wrote.
+    shown: BTreeMap<&'static str, String>,
     counts_loops: bool,
 }
 
 impl Default for Sources {
     fn default() -> Self {
-        Self { texts: FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect(), counts_loops: false }
+        Self {
+            texts: FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect(),
+            shown: BTreeMap::new(),
+            counts_loops: false,
+        }
     }
 }
 
@@ -44,6 +69,32 @@ impl Sources {
         Ok(self)
     }
 
+    /// Puts the texts of a user in the place of built-in files.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there is no such file, and errors of reading.
+    pub fn with(mut self, replacements: &[Replacement]) -> Result<Self> {
+        for replacement in replacements {
+            let file = replacement.file();
+            let Some((&file, _)) = self.texts.get_key_value(file) else {
+                return Err(Error::Usage(format!(
+                    "there is no kernel file {file} to replace: the files in wgsl/ have names such as kernel_ellipse.wgsl"
+                )));
+            };
+            self.texts.insert(file, Cow::Owned(replacement.text()?.to_string()));
+            self.shown.insert(file, replacement.shown());
+        }
+        Ok(self)
+    }
+
+    /// The text of a file that is not the built-in one, and its name for people.
+    pub(crate) fn replaced(&self, file: &str) -> Option<(&str, &str)> {
+        match self.texts.get_key_value(file) {
+            Some((file, Cow::Owned(text))) => Some((text, self.shown.get(file).map_or(file, String::as_str))),
+            _ => None,
+        }
+    }
+
     /// Returns these sources with counters in all loops, even in those that are proven to end.
     pub(crate) fn with_counted_loops(self) -> Self {
         Self { counts_loops: true, ..self }
@@ -51,7 +102,13 @@ impl Sources {
 
     /// Returns the source of the module of `files`.
     pub(super) fn text(&self, files: &[&str]) -> Text {
-        Text { joined: self.join(files), counts_loops: !self.all_end(files) }
+        let shown = |file: &&str| {
+            let text = self.texts.get(file).map_or("", |text| text);
+            // Joining ends each text with a line break.
+            let lines = text.matches('\n').count() as u32 + 1;
+            (self.shown.get(file).map_or_else(|| (*file).to_owned(), String::clone), lines)
+        };
+        Text { joined: self.join(files), counts_loops: !self.all_end(files), files: files.iter().map(shown).collect() }
     }
 
     /// Whether all loops of `files` are proven to end and so need no counters.

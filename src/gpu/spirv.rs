@@ -244,7 +244,7 @@ mod tests {
     }
 
     fn translated(text: &str, features: wgpu::Features, limits: &wgpu::Limits) -> Result<Vec<u32>, String> {
-        let interface = Interface::of(text, capabilities(features))?;
+        let interface = Interface::of(text, capabilities(features)).map_err(|invalid| invalid.told(|_| None))?;
         let options = options(features, [(0, 0)].into_iter(), true);
         translate(&interface, (naga::ShaderStage::Compute, "go"), &[], (&options, limits))
     }

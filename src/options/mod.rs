@@ -38,7 +38,7 @@ pub use triangles::TriangleOptions;
 
 use std::fmt;
 
-use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 
 use crate::error::{Error, Result};
 use group::Group;
@@ -176,6 +176,15 @@ impl<'de> Visitor<'de> for Texts {
         let mut texts = Vec::new();
         while let Some(item) = items.next_element_seed(Item)? {
             texts.push(item);
+        }
+        Ok(texts)
+    }
+
+    /// A table, such as `{ "kernel_ellipse.wgsl" = "mine.wgsl" }`, has an item `KEY=VALUE` a row.
+    fn visit_map<A: MapAccess<'de>>(self, mut rows: A) -> Result<Vec<String>, A::Error> {
+        let mut texts = Vec::new();
+        while let Some((key, value)) = rows.next_entry::<String, String>()? {
+            texts.push(format!("{key}={value}"));
         }
         Ok(texts)
     }

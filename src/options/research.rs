@@ -1,6 +1,7 @@
 //! Choices that change speed or error and that a picture rarely needs: for studies and comparisons.
 
 use super::group::group;
+use crate::gpu::Replacement;
 use crate::plan::{Accumulator, BlendFormat, Optimisation, Organisation, RasterDepth};
 use crate::scene::{DetailMeasure, NodeShape, Outline, ShadingAt};
 
@@ -19,6 +20,13 @@ group! {
         /// Optimisations that are left out; none changes a bit of the picture
         #[cfg_attr(feature = "cli", arg(long, value_name = "NAMES", value_delimiter = ',', hide_short_help = true))]
         pub without: Vec<Optimisation>,
+        /// A WGSL file of one's own in place of a built-in one: FILE=PATH, such as
+        /// kernel_ellipse.wgsl=mine.wgsl
+        ///
+        /// A blending kernel is evaluated in f64 too, for the reference, and weights that are NaN,
+        /// infinite, negative or above 1 are counted
+        #[cfg_attr(feature = "cli", arg(long = "source", value_name = "FILE=PATH", hide_short_help = true))]
+        pub sources: Vec<Replacement>,
         /// Target of --backend raster: rgba8unorm, rgba16float or rgba32float
         /// [default: rgba16float]
         #[cfg_attr(feature = "cli", arg(long, value_name = "FORMAT", hide_short_help = true))]

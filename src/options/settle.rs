@@ -69,6 +69,8 @@ impl RenderOptions {
             background: look.background.map_or(default.background, |Rgba(color)| color),
             maps: Maps::of(&maps.aov),
             without: research.without.clone(),
+            sources: research.sources.clone(),
+            own_kernel: None,
         };
         let fades = suggested.views && levels.lod_fade.is_none() && check::fades(&settings).is_ok();
         Settings { detail_fades: settings.detail_fades || fades, ..settings }

@@ -226,7 +226,7 @@ pub fn reference<'a>(
                     continue;
                 }
                 sum.back = front.back;
-                let once = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                let once = (gain * options.weight(at.rho2)).max(LEAST_WEIGHT);
                 let weight = times * once;
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {

@@ -32,12 +32,7 @@ pub const PASS: Pass = Pass {
         ];
         if needs.weighs() {
             files.push("blend.wgsl");
-            files.push(match needs.kernel {
-                KernelShape::Gaussian => "kernel_gaussian.wgsl",
-                KernelShape::Ellipse => "kernel_ellipse.wgsl",
-                KernelShape::Cone => "kernel_cone.wgsl",
-                KernelShape::Constant => "kernel_constant.wgsl",
-            });
+            files.push(file_of(needs.kernel));
         }
         files
     },
@@ -46,18 +41,34 @@ pub const PASS: Pass = Pass {
         let kernel = making.options.kernel;
         let mut constants =
             vec![("SIDES", u32::from(making.needs.sides == Sides::Nearest).into()), ("KERNEL_FLOOR", kernel.floor())];
-        constants.extend(match kernel {
-            Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
-            Kernel::Ellipse { a, n, smooth } => {
-                let step = if smooth { (-a).exp() } else { 0.0 };
-                vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
-            }
-            Kernel::Cone { power } => vec![("KERNEL_POWER", power)],
-            Kernel::Constant => Vec::new(),
-        });
+        constants.extend(kernel_file(kernel).1);
         constants
     },
 };
+
+/// The WGSL file of a kernel's family.
+fn file_of(shape: KernelShape) -> &'static str {
+    match shape {
+        KernelShape::Gaussian => "kernel_gaussian.wgsl",
+        KernelShape::Ellipse => "kernel_ellipse.wgsl",
+        KernelShape::Cone => "kernel_cone.wgsl",
+        KernelShape::Constant => "kernel_constant.wgsl",
+    }
+}
+
+/// The WGSL file of a kernel, and the override constants that hold its parameters.
+pub(crate) fn kernel_file(kernel: Kernel) -> (&'static str, Vec<(&'static str, f64)>) {
+    let constants = match kernel {
+        Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
+        Kernel::Ellipse { a, n, smooth } => {
+            let step = if smooth { (-a).exp() } else { 0.0 };
+            vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
+        }
+        Kernel::Cone { power } => vec![("KERNEL_POWER", power)],
+        Kernel::Constant => Vec::new(),
+    };
+    (file_of(kernel.shape()), constants)
+}
 
 /// Intersects the ray through the centre of pixel (x, y) with the splat's plane, or its low-pass.
 ///

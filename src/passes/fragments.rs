@@ -72,7 +72,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<List> {
                 let list = &mut lists[((y - first_row) * camera.width + x) as usize];
                 list.decision = list.decision.min(decision(at, f64::INFINITY, camera.near));
                 if at.hit(camera) {
-                    let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                    let weight = (gain * options.weight(at.rho2)).max(LEAST_WEIGHT);
                     let (depth, back, normal) = (at.depth, splat.shows_back(&at), splat.normal_at(&at));
                     list.fragments.push(Fragment {
                         surfel: splat.surfel,

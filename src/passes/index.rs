@@ -81,7 +81,7 @@ fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
                 if !at.hit(camera) || !front.shows(at.depth, splat.shows_back(&at), behind) {
                     continue;
                 }
-                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                let weight = (gain * options.weight(at.rho2)).max(LEAST_WEIGHT);
                 let (most, rank, _) = strongest[pixel];
                 if weight > most || (weight == most && ranks[surfel] < rank) {
                     strongest[pixel] = (weight, ranks[surfel], splat.surfel);

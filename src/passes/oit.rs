@@ -77,7 +77,7 @@ pub(super) fn visit(strip: &Strip<'_>, mut near: impl FnMut(usize, Intersection)
                 let pixel = ((y - first_row) * camera.width + x) as usize;
                 near(pixel, at);
                 if at.hit(camera) {
-                    let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                    let weight = (gain * options.weight(at.rho2)).max(LEAST_WEIGHT);
                     fragment(Fragment { pixel, depth: at.depth, weight, color });
                 }
             }

@@ -174,7 +174,7 @@ fn may_be_small(options: &RenderOptions) -> bool {
     // the weight of splats smaller than a pixel.
     let square = options.facing.is_some_and(|facing| facing.shape == PointShape::Square);
     let farthest = if square { 2.0 } else { 1.0 };
-    options.kernel.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
+    options.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
 }
 
 /// Whether surfels that face away are culled.

@@ -4,9 +4,10 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
+use crate::gpu::Replacement;
 use crate::scene::{
     Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, Light, LowPass, Maps, Outline,
-    Samples, Shading, ShadingAt, Tail,
+    OwnKernel, Samples, Shading, ShadingAt, Tail,
 };
 
 /// Who renders.
@@ -123,6 +124,11 @@ pub struct RenderOptions {
     pub maps: Maps,
     /// What is left out that makes frames faster; none changes a bit of the image.
     pub without: Vec<Optimisation>,
+    /// Texts of a user in place of built-in WGSL files.
+    pub sources: Vec<Replacement>,
+    /// The twin of a blending kernel among `sources`. If it is None, the text itself is evaluated
+    /// in f64.
+    pub own_kernel: Option<OwnKernel>,
 }
 
 impl RenderOptions {
@@ -151,6 +157,15 @@ impl RenderOptions {
     pub fn shows_where_nothing_is(&self) -> bool {
         self.maps.iter().any(|map| !map.row().nothing.is_empty())
             || self.background.iter().any(|value| value.to_bits() != 0)
+    }
+
+    /// The weight of a fragment at the squared distance `rho2` from its disk's centre, in radii
+    /// squared.
+    pub fn weight(&self, rho2: f64) -> f64 {
+        match &self.own_kernel {
+            Some(own) => own.weight(rho2).max(self.kernel.floor()),
+            None => self.kernel.weight(rho2),
+        }
     }
 
     /// Whether an optimisation is not left out.
@@ -189,6 +204,8 @@ impl Default for RenderOptions {
             background: [0.0; 4],
             maps: Maps::NONE,
             without: Vec::new(),
+            sources: Vec::new(),
+            own_kernel: None,
         }
     }
 }

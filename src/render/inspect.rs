@@ -135,7 +135,7 @@ pub fn evaluate<I: Pod + Send + Sync, O: Pod>(
     if let Some((name, _)) = variables.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
         return Err(Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")));
     }
-    let text = Text { joined: text.to_owned(), counts_loops: true };
+    let text = Text::alone(text);
     let program = Program::compile(gpu, text, &[ENTRY], &[], &[])?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;

@@ -187,6 +187,7 @@ impl Kept {
             total_ms,
             needs: plan.needs.names(),
             tail: None,
+            kernel: None,
         }
     }
 }

@@ -6,6 +6,7 @@ pub mod inspect;
 mod kept;
 mod kernels;
 mod look;
+mod own;
 mod page;
 mod parts;
 mod reference;
@@ -27,7 +28,7 @@ use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
 use crate::plan::{Optimisation, RenderOptions, check, culls_back};
 use crate::progress::Progress;
-use crate::scene::{Camera, Detail};
+use crate::scene::{Camera, Detail, KernelFaults, OwnKernel};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 pub use taken::taken;
@@ -76,6 +77,10 @@ pub fn render(
 pub struct Renderer<S, B> {
     source: S,
     backend: B,
+    /// The WGSL files of the kernels; unused by the reference.
+    sources: Sources,
+    /// What is wrong with a kernel that the user wrote.
+    faults: Option<KernelFaults>,
     /// The part that renders the colour.
     kept: Kept,
     /// The parts that render maps with other options than the colour's ([`parts::parts`]).
@@ -95,12 +100,14 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::options(options, reference)?;
         let facts = source.facts();
         check::scene(&facts, options, reference)?;
-        let options = &encoded::of(&facts, options);
+        let (sources, options) = own::settled(backend.borrow(), options)?;
+        let faults = options.own_kernel.as_ref().map(OwnKernel::faults);
+        let options = &encoded::of(&facts, &options);
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
-        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_maps, detail })
+        Ok(Self { source, backend, sources, faults, kept: Kept::new(facts, colors), of_maps, detail })
     }
 
     /// Renders one frame.
@@ -111,9 +118,9 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let start = Instant::now();
         let detail = self.sized(camera);
         let spent = start.elapsed().as_secs_f64() * 1e3;
-        let Self { source, backend, kept, of_maps, .. } = self;
+        let Self { source, backend, sources, faults, kept, of_maps, .. } = self;
         of_maps.iter_mut().chain([&mut *kept]).for_each(|part| part.options.detail = detail);
-        let one = |kept: &mut Kept| one(&*source, (*backend).borrow(), kept, camera, progress);
+        let one = |kept: &mut Kept| one(&*source, ((*backend).borrow(), &*sources), kept, camera, progress);
         let mut maps = Vec::new();
         for part in of_maps {
             // All parts share the uploaded surfels as far as their needs agree.
@@ -123,6 +130,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         }
         let (mut frame, mut report) = parts::joined(one(kept)?, maps);
         report.tail = Tail::of(&frame);
+        report.kernel = faults.clone();
         if matches!(self.detail, Detail::Splats(_)) {
             *report.passes.entry("select_ms".to_owned()).or_default() += spent;
             report.total_ms += spent;
@@ -142,6 +150,11 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         tree.map_or(self.detail, |tree| select::sized(tree, facts.origin, camera, &wanted))
     }
 
+    /// Counts of wrong weights of a kernel that the user wrote; None for built-in kernels.
+    pub fn kernel_faults(&self) -> Option<&KernelFaults> {
+        self.faults.as_ref()
+    }
+
     /// Device memory of the last frame; zero for the reference.
     pub fn device_bytes(&self) -> DeviceBytes {
         self.kept.device_bytes()
@@ -151,18 +164,16 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
 /// Renders one part of a frame on `backend`.
 fn one(
     source: &dyn Source,
-    backend: &Backend,
+    (backend, sources): (&Backend, &Sources),
     kept: &mut Kept,
     camera: &Camera,
     progress: &dyn Progress,
 ) -> Result<(Frame, Report)> {
     match backend {
-        Backend::Gpu { gpu, sources } if kept.options.has(Optimisation::UncountedLoops) => {
+        Backend::Gpu { gpu, .. } if kept.options.has(Optimisation::UncountedLoops) => {
             kept.frame((gpu, sources), source, camera, progress)
         }
-        Backend::Gpu { gpu, sources } => {
-            kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress)
-        }
+        Backend::Gpu { gpu, .. } => kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress),
         Backend::Reference => {
             let scene = source.whole().ok_or_else(|| {
                 Error::Usage("the reference needs all surfels in memory: render on an adapter".into())

@@ -210,6 +210,7 @@ fn report(
         total_ms,
         needs: needs.names(),
         tail: None,
+        kernel: None,
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::frame::Frame;
-use crate::scene::Map;
+use crate::scene::{KernelFaults, Map};
 
 /// Describes one render: what was drawn, how, and how long it took.
 #[derive(Clone, Debug, Serialize)]
@@ -47,6 +47,9 @@ pub struct Report {
     /// Statistics of the map [`Map::Tail`](crate::scene::Map::Tail), if it is written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tail: Option<Tail>,
+    /// Counts of wrong weights of a kernel that the user wrote.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kernel: Option<KernelFaults>,
 }
 
 fn is_none(count: &u64) -> bool {

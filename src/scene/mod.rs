@@ -26,6 +26,7 @@ pub mod mipmap;
 pub mod octree;
 pub mod options;
 pub mod outline;
+pub mod own_kernel;
 mod provenance;
 mod reordered;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
@@ -57,6 +58,7 @@ pub use maps::{MAPS, Map, Maps};
 pub use mipmap::Mipmap;
 pub use options::{Blend, Cull, Epsilon, LowPass, Samples, Shading, ShadingAt};
 pub use outline::Outline;
+pub use own_kernel::{KernelFaults, OwnKernel};
 pub use provenance::Provenance;
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

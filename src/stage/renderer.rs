@@ -12,7 +12,7 @@ use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, RenderOptions as Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
-use crate::scene::{self, Bounds, Camera};
+use crate::scene::{self, Bounds, Camera, KernelFaults};
 
 /// Renders views of a scene with the same options. All that views share is kept from one to the
 /// next: surfels, buffers and compiled kernels.
@@ -235,6 +235,7 @@ fn whole(
         whole = request.with_levels(whole, progress)?;
     }
     let renderer = render::Renderer::new(whole.scene.clone(), &settings, backend.clone())?;
+    renderer.kernel_faults().and_then(KernelFaults::sentence).iter().for_each(|line| progress.note(line));
     let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
     Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
 }

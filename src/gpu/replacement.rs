@@ -1,0 +1,81 @@
+//! A kernel file of a user in place of a built-in one.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+
+/// A WGSL text in place of the built-in file of the name `file`, such as `kernel_ellipse.wgsl`.
+///
+/// As text it is `FILE=PATH`: the built-in file's name and the path of the text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replacement {
+    file: String,
+    by: By,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum By {
+    Path(PathBuf),
+    Text(Arc<str>),
+}
+
+impl Replacement {
+    /// Puts `text` in the place of `file`.
+    pub fn new(file: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
+        Self { file: file.into(), by: By::Text(text.into()) }
+    }
+
+    /// The name of the built-in file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The name of the text in errors: its path, or the name of the built-in file.
+    pub fn shown(&self) -> String {
+        match &self.by {
+            By::Path(path) => path.display().to_string(),
+            By::Text(_) => self.file.clone(),
+        }
+    }
+
+    /// The same with a relative path counted from `folder`.
+    #[must_use]
+    pub fn within(self, folder: &Path) -> Self {
+        let by = match self.by {
+            By::Path(path) => By::Path(folder.join(path)),
+            text => text,
+        };
+        Self { by, ..self }
+    }
+
+    /// Returns the text, which is read if it is a file's.
+    ///
+    /// # Errors
+    /// [`Error::Read`] for a file that cannot be read.
+    pub fn text(&self) -> Result<Arc<str>> {
+        match &self.by {
+            By::Text(text) => Ok(text.clone()),
+            By::Path(path) => {
+                let text = std::fs::read_to_string(path).map_err(|error| Error::read(path, error))?;
+                Ok(text.into())
+            }
+        }
+    }
+}
+
+impl FromStr for Replacement {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.split_once('=') {
+            Some((file, path)) if !file.is_empty() && !path.is_empty() => {
+                Ok(Self { file: file.to_owned(), by: By::Path(path.into()) })
+            }
+            _ => Err(Error::Usage(format!(
+                "'{text}' names no two files: give FILE=PATH, such as kernel_ellipse.wgsl=mine.wgsl"
+            ))),
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Blending kernels that a user wrote: their weights in f64, and what is wrong with them.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+/// The distances from a disk's centre at which a kernel is tried: k / DISTANCES radii.
+const DISTANCES: u32 = 4096;
+
+/// A loop of a kernel did not end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Endless;
+
+/// A blending kernel that a user wrote, evaluated in f64. It is what the reference draws in place
+/// of a built-in kernel, so that the device's error is its rounding.
+#[derive(Clone)]
+pub struct OwnKernel {
+    name: String,
+    weight: Arc<dyn Fn(f64) -> Result<f64, Endless> + Send + Sync>,
+}
+
+impl fmt::Debug for OwnKernel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "OwnKernel({})", self.name)
+    }
+}
+
+/// Kernels are equal if they are clones of one.
+impl PartialEq for OwnKernel {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name && Arc::ptr_eq(&self.weight, &other.weight)
+    }
+}
+
+impl OwnKernel {
+    /// A kernel by its weight, a function of the squared distance from the disk's centre in radii,
+    /// from 1 at 0 to the rim at 1. `name` stands in reports.
+    pub fn new(name: impl Into<String>, weight: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Self {
+        Self::fallible(name, move |rho2| Ok(weight(rho2)))
+    }
+
+    /// The same of a weight that may have none.
+    pub(crate) fn fallible(
+        name: impl Into<String>,
+        weight: impl Fn(f64) -> Result<f64, Endless> + Send + Sync + 'static,
+    ) -> Self {
+        Self { name: name.into(), weight: Arc::new(weight) }
+    }
+
+    /// The weight at the squared distance `rho2`, in [0, 1]; 0 where it is no number.
+    pub fn weight(&self, rho2: f64) -> f64 {
+        (self.weight)(rho2).ok().filter(|weight| !weight.is_nan()).unwrap_or(0.0).clamp(0.0, 1.0)
+    }
+
+    /// Tries the kernel at 4,097 distances from the disk's centre, and counts the weights that are
+    /// none: those between 0 and 1 are.
+    pub fn faults(&self) -> KernelFaults {
+        let mut faults = KernelFaults { kernel: self.name.clone(), tried: DISTANCES + 1, ..KernelFaults::default() };
+        for k in 0..=DISTANCES {
+            let rho = f64::from(k) / f64::from(DISTANCES);
+            let count = match (self.weight)(rho * rho) {
+                Err(Endless) => &mut faults.endless,
+                Ok(weight) if weight.is_nan() => &mut faults.not_a_number,
+                Ok(weight) if weight.is_infinite() => &mut faults.infinite,
+                Ok(weight) if weight < 0.0 => &mut faults.negative,
+                // A rounding above 1 is no fault.
+                Ok(weight) if weight > 1.0 + 1e-6 => &mut faults.above_one,
+                Ok(_) => continue,
+            };
+            *count += 1;
+            faults.first.get_or_insert(rho);
+        }
+        faults
+    }
+}
+
+/// Counts of weights that are none, of a kernel that a user wrote. The device clamps weights to
+/// [0, 1], so that a picture does not show such faults.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct KernelFaults {
+    /// The kernel's file or name.
+    pub kernel: String,
+    /// Number of distances from a disk's centre that were tried.
+    pub tried: u32,
+    /// Weights that are NaN.
+    pub not_a_number: u32,
+    /// Weights that are infinite.
+    pub infinite: u32,
+    /// Weights below 0.
+    pub negative: u32,
+    /// Weights above 1.
+    pub above_one: u32,
+    /// Calls whose loops do not end.
+    pub endless: u32,
+    /// The least distance with a fault, in radii.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first: Option<f64>,
+}
+
+impl KernelFaults {
+    /// One line that says what is wrong; None if nothing is.
+    pub fn sentence(&self) -> Option<String> {
+        let first = self.first?;
+        let counts = [
+            (self.not_a_number, "NaN"),
+            (self.infinite, "infinite"),
+            (self.negative, "negative"),
+            (self.above_one, "above 1"),
+            (self.endless, "missing, as a loop does not end"),
+        ];
+        let wrong: u32 = counts.iter().map(|(count, _)| count).sum();
+        let counts: Vec<_> =
+            counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
+        Some(format!(
+            "warning: of {} weights of the kernel {}, {} are wrong, first at {first:.4} radii: {}; the picture has them clamped to 0 to 1",
+            self.tried,
+            self.kernel,
+            wrong,
+            counts.join(", ")
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn weights_that_are_none_are_counted_and_named() {
+        let fine = OwnKernel::new("fine", |rho2| 1.0 - rho2);
+        assert_eq!(fine.faults().sentence(), None);
+        assert_eq!(fine.weight(0.25), 0.75);
+        let root = OwnKernel::new("root", |rho2| (-1.0 - rho2).sqrt());
+        assert_eq!((root.faults().not_a_number, root.faults().first), (4097, Some(0.0)));
+        assert_eq!(root.weight(0.5), 0.0);
+        let below = OwnKernel::new("below", |rho2| 0.5 - rho2).faults();
+        assert_eq!((below.negative, below.not_a_number), (1200, 0));
+        let sentence = below.sentence().unwrap();
+        assert!(sentence.contains("kernel below, 1200 are wrong, first at 0.7073 radii: 1200 negative"), "{sentence}");
+        assert_eq!(OwnKernel::new("high", |rho2| 2.0 * (1.0 - rho2)).faults().above_one, 2897);
+        let endless = OwnKernel::fallible("endless", |rho2| if rho2 > 0.25 { Err(Endless) } else { Ok(1.0) });
+        assert_eq!((endless.faults().endless, endless.weight(0.5)), (2048, 0.0));
+    }
+}

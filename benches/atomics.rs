@@ -1,44 +1,53 @@
-//! Atomic operations per second of an adapter: `cargo bench --bench atomics [-- --quick] [-- --adapter SUBSTRING]`.
+//! Atomic operations per second of an adapter.
 //!
-//! Scatter kernels add every fragment to the sums of its pixel, so they are as fast as the adapter's atomics. Which
-//! accumulator (`src/passes/accumulate.rs`) is the fastest follows from the rows:
+//! ```text
+//! cargo bench --bench atomics [-- --quick] [-- --adapter SUBSTRING]
+//! ```
 //!
-//! - **u32 add**: what `fixed32` costs for each sum, and the measure of the rest.
-//! - **u32 add, carry**: two words and an add to the second where the first wraps, here at every fourth add: `fixed`.
-//!   It needs nothing beyond core WebGPU. Where it comes near *u32 add*, there is no reason for another accumulator.
-//! - **u64 add**: `fixed64`, or two sums at once with `packed64`, which therefore wins wherever this row is faster than
-//!   half of *u32 add*.
-//! - **f32 add**, **f32 compare-exchange**: `float` and `cas`. They are not exact, so only speed speaks for them.
-//! - **u32 min**: the visibility pass. Most attempts change nothing, which hardware may find out before it locks.
-//! - **workgroup, then global**: adds to workgroup memory, eight for each one to the buffer after them. Where it beats
-//!   *u32 add*, splats of many pixels belong in tiles whose sums stay in workgroup memory.
+//! Scatter kernels add every fragment to the sums of its pixel, so they are as fast as the
+//! adapter's atomics. The rows tell which accumulator (`src/passes/accumulate.rs`) is the fastest:
 //!
-//! The columns are how fragments fall. *Spread* is one add to each of 4 Mi addresses in an order without locality: many
-//! small splats in any order, bound by memory. *Line* is 16 addresses of one 64-byte line (two such lines for pairs and
-//! 64-bit words): threads that draw one splat. *Same* is a single address: the depth complexity of a cloud seen end on,
-//! where hardware takes turns or adds up within a subgroup first.
+//! - **u32 add**: the cost of each sum with `fixed32`, and the measure for the other rows.
+//! - **u32 add, carry**: `fixed`, with two words per sum and an add to the second where the first
+//!   wraps, here at every fourth add. It needs nothing beyond core WebGPU. Where it is nearly as
+//!   fast as *u32 add*, no other accumulator is needed.
+//! - **u64 add**: `fixed64`, or two sums at once with `packed64`, which therefore wins wherever
+//!   this row is faster than half of *u32 add*.
+//! - **f32 add**, **f32 compare-exchange**: `float` and `cas`. They are not exact, so only their
+//!   speed could justify them.
+//! - **u32 min**: the visibility pass. Most attempts change nothing, which hardware may detect
+//!   before it locks.
+//! - **workgroup, then global**: adds to workgroup memory, and then one add to the buffer for every
+//!   eight of them. Where it beats *u32 add*, splats of many pixels belong in tiles whose sums stay
+//!   in workgroup memory.
 //!
-//! Every kernel's result is compared, address by address, with one computed here; a wrong one fails the benchmark. The
-//! repetitions of all kernels alternate, so that a busy machine slows all of them alike; the median is printed with the
-//! median distance from it.
+//! The columns are distributions of fragments. *Spread* is one add to each of 4 Mi addresses in an
+//! order without locality, as with many small splats in any order: bound by memory. *Line* is 16
+//! addresses of one 64-byte line (two lines for pairs and 64-bit words), as with threads that draw
+//! one splat. *Same* is a single address, as with a cloud of great depth complexity: hardware takes
+//! turns, or adds up within a subgroup first.
+//!
+//! Every kernel's result is compared, address by address, with one computed here; a wrong one fails
+//! the benchmark. The kernels' repetitions alternate, so that a busy machine slows all of them
+//! alike. The median is printed with the median distance from it.
 
 use epsplat::low_level::gpu::device::{INSTALL_HINT, adapters};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Invocations of a workgroup, and addresses of a tile in workgroup memory.
+/// Invocations per workgroup, and addresses per tile in workgroup memory.
 const GROUP: u32 = 256;
-/// Operations of an invocation: few, because software adapters end a loop that runs long.
+/// Operations per invocation: few, because software adapters end long loops.
 const ROUNDS: u32 = 8;
-/// Addresses that *spread* covers.
+/// Addresses in the column *spread*.
 const SPREAD: u32 = 1 << 22;
 /// Scatters consecutive operations over the addresses; it is odd, so each address has its turn.
 const SCATTER: u32 = 0x9e37_79b1;
 
-/// Where operations go: the column's name, and the addresses less one.
+/// The columns: name, and number of addresses less one (a mask).
 const PATTERNS: [(&str, u32); 3] = [("spread", SPREAD - 1), ("line", 15), ("same", 0)];
 
-/// What is measured.
+/// An atomic operation to measure; a row of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Operation {
     Add,
@@ -52,7 +61,8 @@ enum Operation {
 
 use Operation::{Add, Add64, AddCarry, AddFloat, CompareExchange, Min, Workgroup};
 
-/// What each *u32 add, carry* adds: a quarter of a word and a little, as a full weight of `fixed` does.
+/// The value of each *u32 add, carry*: slightly more than a quarter of a word, like a full weight
+/// of `fixed`.
 const QUARTER: u32 = (1 << 30) + 1;
 
 impl Operation {
@@ -70,7 +80,7 @@ impl Operation {
         }
     }
 
-    /// What it needs beyond core WebGPU.
+    /// Features that the operation needs beyond core WebGPU.
     fn features(self) -> wgpu::Features {
         match self {
             Add64 => wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS,
@@ -79,12 +89,12 @@ impl Operation {
         }
     }
 
-    /// u32 words at each address.
+    /// The number of u32 words per address.
     fn words(self) -> usize {
         if matches!(self, Add64 | AddCarry) { 2 } else { 1 }
     }
 
-    /// The kernel, for one address less than `mask + 1` and `invocations` in all.
+    /// The WGSL kernel for `mask + 1` addresses and `invocations` invocations in all.
     fn kernel(self, mask: u32, invocations: u32) -> String {
         let (cell, operation) = match self {
             Add => ("u32", "atomicAdd(&cells[at], 1u + (i & 1u));".to_owned()),
@@ -141,12 +151,12 @@ impl Operation {
         )
     }
 
-    /// Every word before the operations.
+    /// The value of every word before the operations.
     fn initial(self) -> u32 {
         if self == Min { u32::MAX } else { 0 }
     }
 
-    /// Every word after them.
+    /// All words after the operations.
     fn expected(self, mask: u32, invocations: u32) -> Vec<u32> {
         let mut words = vec![self.initial(); SPREAD as usize * self.words()];
         for i in 0..invocations * ROUNDS {
@@ -165,7 +175,7 @@ impl Operation {
                     let sum = (u64::from(*high) << 32 | u64::from(*low)).wrapping_add(value);
                     (*low, *high) = (sum as u32, (sum >> 32) as u32);
                 }
-                // Whole numbers up to 2^24 are exact in f32, in any order.
+                // Whole numbers up to 2^24 are exact in f32, in any order of additions.
                 (AddFloat | CompareExchange, Some([word])) => *word = (f32::from_bits(*word) + 1.0).to_bits(),
                 _ => {}
             }
@@ -174,7 +184,8 @@ impl Operation {
     }
 }
 
-/// Addresses from one workgroup's tile to the next: tiles lie apart where operations are spread, else on one another.
+/// The distance of consecutive workgroups' tiles in addresses: apart in the column *spread*, else
+/// all at 0.
 fn tile_stride(mask: u32, invocations: u32) -> u32 {
     if mask == SPREAD - 1 { SPREAD / (invocations / GROUP) } else { 0 }
 }
@@ -188,18 +199,18 @@ struct Bench {
     cells: wgpu::Buffer,
     ones: wgpu::Buffer,
     staging: wgpu::Buffer,
-    /// Two timestamps, where the adapter has them.
+    /// Two timestamps, if the adapter supports them.
     clock: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     invocations: u32,
 }
 
-/// A kernel with what was measured of it.
+/// A kernel and its measured rates.
 struct Case {
     operation: Operation,
     mask: u32,
     pipeline: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
-    /// Operations per second, one for each repetition.
+    /// Operations per second, one value per repetition.
     rates: Vec<f64>,
 }
 
@@ -237,7 +248,8 @@ impl Bench {
         });
         let ones = buffer(Usage::COPY_SRC | Usage::COPY_DST, bytes);
         queue.write_buffer(&ones, 0, &vec![0xff; bytes as usize]);
-        // Hardware is over so soon that starting it would count; floats stay exact up to 2^24 additions.
+        // A graphics card is so fast that the cost of a launch would count, so it does more. f32
+        // stays exact up to 2^24 additions.
         let operations = 1 << if quick { 20 } else { 22 + 2 * u32::from(chosen.kind != "software") };
         Ok(Self {
             name: format!("{} ({}, {})", chosen.name, chosen.api, chosen.kind),
@@ -281,7 +293,7 @@ impl Bench {
         self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ()).map_err(|error| error.to_string())
     }
 
-    /// The first bytes of a buffer.
+    /// Reads the first `bytes` bytes of a buffer.
     fn read(&self, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, String> {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(from, 0, &self.staging, 0, bytes);
@@ -294,7 +306,7 @@ impl Bench {
         Ok(values)
     }
 
-    /// Runs a kernel once on fresh cells; operations per second.
+    /// Runs a kernel once on fresh cells and returns operations per second.
     fn run(&self, case: &Case) -> Result<f64, String> {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         match case.operation.initial() {
@@ -333,7 +345,7 @@ impl Bench {
         Ok(f64::from(self.invocations * ROUNDS) / seconds)
     }
 
-    /// Compares the cells with what the last kernel must have left there.
+    /// Compares the cells with the words that the last kernel must have left.
     fn verify(&self, case: &Case) -> Result<(), String> {
         let expected = case.operation.expected(case.mask, self.invocations);
         let bytes = self.read(&self.cells, 4 * expected.len() as u64)?;
@@ -350,7 +362,7 @@ impl Bench {
     }
 }
 
-/// The middle of some numbers; NaN of none.
+/// The median, or NaN if there are no values.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
@@ -371,7 +383,7 @@ fn run() -> Result<(), String> {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--bench" => {} // cargo says so
+            "--bench" => {} // cargo passes it
             "--quick" => quick = true,
             "--adapter" => wanted = arguments.next().ok_or("--adapter needs a part of a name")?,
             other => return Err(format!("{other:?} is not --quick or --adapter SUBSTRING")),

@@ -1,4 +1,6 @@
-//! Surfels from points, part by part: `cargo bench --bench points [-- COUNT...]`, for 1,000,000 points unless told.
+//! Times surfels from points, stage by stage: `cargo bench --bench points [-- COUNT...]`.
+//!
+//! Without counts it measures 1,000,000 points.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -10,7 +12,7 @@ use epsplat::io::Points;
 use epsplat::low_level::surfels::analytic::{Shape, generate};
 use epsplat::low_level::surfels::{FromPoints, Size, from_points};
 
-/// What each part took, in seconds.
+/// The time of each stage, in seconds.
 #[derive(Default)]
 struct Parts {
     running: Mutex<Vec<(String, Instant)>>,
@@ -31,7 +33,7 @@ impl Progress for Parts {
     }
 }
 
-/// A torus in no order that memory could like.
+/// Points of a torus in random order, the worst case for caches.
 fn shuffled(count: u64) -> Vec<[f64; 3]> {
     let mut positions: Vec<_> = generate(Shape::Torus, count).map(|sample| sample.position).collect();
     let mut state = 1u64;
@@ -42,7 +44,7 @@ fn shuffled(count: u64) -> Vec<[f64; 3]> {
     positions
 }
 
-/// The most memory that this process has held, where the system tells it.
+/// The peak memory of this process, if the system reports it.
 fn peak_memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

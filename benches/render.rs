@@ -1,4 +1,5 @@
-//! Whole frames, their single stages, and the preparation before them: `cargo bench --bench render`.
+//! Times whole frames, their single stages, and the preparation before them: `cargo bench --bench
+//! render`.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -23,7 +24,7 @@ fn sphere(count: u64, with_normals: bool) -> Points {
     }
 }
 
-/// A frame of 1024x1024, upload included.
+/// A frame of 1024x1024 pixels, upload included.
 fn frames(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("frame");
     group.sample_size(10);
@@ -42,7 +43,7 @@ fn frames(criterion: &mut Criterion) {
     }
 }
 
-/// Normals and radii of points that have none.
+/// Estimation of normals and radii for points that have none.
 fn estimates(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("estimate");
     group.sample_size(10);
@@ -55,8 +56,10 @@ fn estimates(criterion: &mut Criterion) {
     }
 }
 
-/// Time per stage at 1024x1024, of few large splats and of many small ones: a frame is rendered for every measurement, of
-/// which one stage's time is taken; upload and compilation are done before.
+/// Time per stage at 1024x1024 pixels, with few large splats and with many small ones.
+///
+/// Each measurement renders a frame and uses the time of one stage. Upload and compilation happen
+/// before.
 fn stages(criterion: &mut Criterion) {
     let Ok(gpu) = Gpu::open(None) else {
         eprintln!("no adapter: nothing to measure");

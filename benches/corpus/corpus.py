@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
-"""The test files of other programs, each read by epsplat and by a second reader, and compared.
+"""Compares how epsplat and a second reader read the test files of other programs.
 
-Two steps. `fetch` gets the source packages of other readers by their names, from PyPI (through pip) and from Debian
-(through apt-get source), and unpacks them into a folder. `check` runs epsplat on every PLY, LAS, LAZ, OBJ, E57 and
-PCD file below that folder, one of each content, and holds what it says against a reader that shares no code with it:
+There are two steps. `fetch` gets the source packages of other readers by name, from PyPI (with pip)
+and from Debian (with apt-get source), and unpacks them into a folder. `check` runs epsplat on every
+distinct PLY, LAS, LAZ, OBJ, E57 and PCD file below that folder, and compares its output with that
+of a reader that shares no code with it:
 
     LAS, LAZ  laspy with lazrs          E57  pye57 (libE57Format)
     PLY       plyfile, or else trimesh  PCD  Open3D (no code of PCL's)
     OBJ       the `v` lines, read here
 
-Compared are the number of points, the box, whether there are colours and normals, and of files of up to --points
-points every coordinate, colour and given normal, by way of the PLY that `epsplat surfels` writes.
+It compares the number of points, the bounding box, and whether there are colours and normals. For
+files of up to --points points it also compares every coordinate, colour and given normal, by means
+of the PLY that `epsplat surfels` writes.
 
 It needs Python 3.11 or later on Linux, and: pip install laspy lazrs plyfile trimesh pye57 open3d
-Open3D wants the system's libusb-1.0 too. Where the reader of a format that was found cannot be had, nothing is judged.
+Open3D also needs the system's libusb-1.0. If the reader of any format found is missing, no file is
+judged.
 
-Nothing of what it fetches belongs in this repository.
+The fetched files do not belong in this repository.
 """
 
 import argparse
@@ -37,11 +40,14 @@ from readers import MODULES, READERS, Cloud, srgb_to_light
 
 
 def read(arguments):
-    """Run as a process of its own, as a reader may crash or never end: writes a Cloud, or a complaint to stderr."""
+    """Writes the Cloud of a second reader to a file, or an error to stderr.
+
+    It runs as a separate process, because a reader may crash or never end.
+    """
     reader = READERS[arguments.file.suffix.lower()][arguments.reader]
     try:
         cloud = dataclasses.asdict(reader(arguments.file, arguments.keep_withheld))
-    except Exception as error:  # Whatever a reader of another's making throws, one that is not installed too.
+    except Exception as error:  # a second reader may throw anything, also if it is not installed
         print(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}", file=sys.stderr)
         return 3
     np.savez(arguments.output, **{key: value for key, value in cloud.items() if value is not None})
@@ -49,7 +55,7 @@ def read(arguments):
 
 
 def second_reading(file, options, folder):
-    """The Cloud of the first reader that has one, or None, and what the others complained of."""
+    """Returns the Cloud of the first reader that succeeds, or None, and the others' errors."""
     complaints = []
     output = folder / "second.npz"
     for number, reader in enumerate(READERS[file.suffix.lower()]):
@@ -57,7 +63,7 @@ def second_reading(file, options, folder):
         command += ["--keep-withheld"] if options.keep_withheld else []
         name = reader.__name__.removeprefix("read_").replace("obj", "v lines")
         try:
-            # Some are programs in Python, and slow.
+            # Some readers are Python programs, and slow.
             limit = 5 * options.timeout
             done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=limit)
         except subprocess.TimeoutExpired:
@@ -74,22 +80,22 @@ def second_reading(file, options, folder):
 
 
 class Crash(Exception):
-    """What no input may bring about."""
+    """A crash, hang or panic, which no input may cause."""
 
 
 class Refusal(Exception):
-    """The one sentence of a failed run."""
+    """The error sentence of a run that failed in an orderly way."""
 
 
 class Difference(Exception):
-    """Where the two readers do not agree."""
+    """A disagreement of the two readers."""
 
 
 def epsplat(options, *words):
-    """Runs epsplat under limits; what it prints, or Refusal, or Crash."""
+    """Runs epsplat within limits and returns its output; raises Refusal or Crash."""
 
     def limit():
-        # The threads that decode LAZ reserve a quarter of a GiB of stack each, which is no memory until it is used.
+        # Each thread that decodes LAZ reserves 0.25 GiB of stack: address space, mostly unused.
         size = int((options.memory + 0.25 * os.cpu_count()) * 2**30)
         resource.setrlimit(resource.RLIMIT_AS, (size, size))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -112,18 +118,18 @@ def epsplat(options, *words):
     return done.stdout
 
 
-# `epsplat info` says this of a mesh whose colours are not those of its vertices.
+# `epsplat info` reports these colours for a mesh whose colours are not on its vertices.
 PAINTED = "of faces or materials"
 
 
 def usable(positions):
-    """What is dropped, with a note, is not finite or beyond 1e18."""
+    """Marks the positions that epsplat keeps: it drops those that are not finite or beyond 1e18."""
     with np.errstate(invalid="ignore"):
         return (np.abs(positions) <= 1e18).all(axis=1)
 
 
 def compare_info(info, theirs):
-    """What `epsplat info` says of the whole against the other reader's points."""
+    """Compares the output of `epsplat info` with the other reader's points."""
     kept = theirs.positions[usable(theirs.positions)]
     if info["points"] != len(theirs.positions):
         raise Difference(f"{info['points']} points, {theirs.reader} has {len(theirs.positions)}")
@@ -132,7 +138,7 @@ def compare_info(info, theirs):
         raise Difference(f"{info['preparation']['surfels']} usable points, {theirs.reader} has {len(kept)}")
     low, high = kept.min(axis=0), kept.max(axis=0)
     extent = (high - low).max()
-    # The box is that of f32 coordinates relative to the origin.
+    # epsplat computes the box from f32 coordinates relative to the origin.
     relative = np.maximum(np.abs(low - info["origin"]), np.abs(high - info["origin"]))
     tolerance = 1e-9 * extent + 2.0**-23 * relative
     if theirs.single:
@@ -142,7 +148,7 @@ def compare_info(info, theirs):
             raise Difference(f"the box's {name} is {list(ours)}, of {theirs.reader} {other.tolist()}")
     if info["colors"] == PAINTED:
         return compare_normals(info, theirs)
-    # Greys of intensities are no colours.
+    # Greys made from intensities do not count as colours.
     colored = (theirs.codes is not None or theirs.light is not None) and not theirs.made
     if (info["colors"] != "none") != colored:
         raise Difference(f"colours: {info['colors']}, {theirs.reader} has {'some' if colored else 'none'}")
@@ -150,16 +156,16 @@ def compare_info(info, theirs):
 
 
 def compare_normals(info, theirs):
-    """Whether both say that there are normals."""
+    """Compares whether there are normals."""
     normals = theirs.normals is not None or theirs.faces
     if info["normals"] != normals:
         raise Difference(f"normals: {info['normals']}, {theirs.reader}: {normals}")
 
 
 def compare_points(output, theirs, colors):
-    """Every point of the PLY that `epsplat surfels` wrote, which is in the file's order, against the other reader's.
+    """Compares every point of the PLY from `epsplat surfels` with the other reader's points.
 
-    `colors` says whether colours are compared too.
+    Both are in the file's order. `colors` says whether colours are compared too.
     """
     import plyfile
 
@@ -186,7 +192,7 @@ def compare_points(output, theirs, colors):
         else:
             light = theirs.light[kept][:, :3]
             rgb = srgb_to_light(rgb / 255.0) if eight_bit else rgb
-            # Where a point has no colour of its own it gets the default, which is not compared.
+            # A point without a colour gets the default, which is not compared.
             off = np.abs(rgb - light) > 1e-6 * np.maximum(1.0, np.abs(light))
         if off.any():
             row = int(off.any(axis=1).argmax())
@@ -205,11 +211,11 @@ def compare_points(output, theirs, colors):
 
 
 def compare(file, options, theirs, folder):
-    """Holds everything that both say of a file together; a remark, if there is something to say of equal ones."""
+    """Compares all that both readers report of a file, and returns a remark, which may be empty."""
     flags = ["--keep-withheld"] if options.keep_withheld and file.suffix.lower() in (".las", ".laz") else []
     info = json.loads(epsplat(options, "info", file, "--json", "-", *flags))
     compare_info(info, theirs)
-    # The second readers know the colours of vertices alone.
+    # The second readers read only vertex colours.
     colors = info["colors"] != PAINTED
     faults = ("count", "box", "colours", "normals") if colors else ("count", "box", "normals")
     check_control(theirs, lambda altered: compare_info(info, altered), faults)
@@ -231,7 +237,7 @@ def compare(file, options, theirs, folder):
 
 
 def check_control(theirs, comparison, faults):
-    """The control of every comparison: with a fault in what the other reader says it has to fail."""
+    """The control of a comparison: it must fail if the other reader's points get a fault."""
     kept = usable(theirs.positions)
     row = int(kept.nonzero()[0][kept.sum() // 2])
     for fault in faults:
@@ -265,7 +271,7 @@ def check_control(theirs, comparison, faults):
 
 
 def judge(file, options):
-    """The verdict on one file, what was found, and how many points the other reader has."""
+    """Returns the verdict on a file, its details, and the other reader's number of points."""
     short = lambda refusal: str(refusal).removeprefix(f"{file}: ")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -295,7 +301,7 @@ VERDICTS = ("equal", "both refuse", "we refuse, they read", "they refuse, we rea
 
 
 def check(arguments):
-    """Judges every distinct file; 1 if any differs or crashes."""
+    """Judges every distinct file, and returns 1 if any differs or crashes."""
     arguments.epsplat = arguments.epsplat.resolve()
     help_text = subprocess.run([str(arguments.epsplat), "info", "--help"], capture_output=True, text=True).stdout
     arguments.keep_withheld = "--keep-withheld" in help_text
@@ -333,7 +339,7 @@ def check(arguments):
 
 
 def print_table(rows):
-    """Files per package and format, and how many of them are equal."""
+    """Prints the number of files per package and format, and how many of them are equal."""
     groups = {}
     for row in rows:
         parts = pathlib.Path(row["path"]).parts

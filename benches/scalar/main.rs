@@ -1,12 +1,17 @@
-//! The kernels against a plain program on the same processor: `cargo bench --bench scalar [-- --quick] [-- --adapter SUBSTRING]`.
+//! Times the kernels against a plain program on the same processor.
 //!
-//! [`program`] renders what `epsplat` renders of an opaque, unlit sphere of 8-bit colours: what the kernels must be worth on a
-//! machine that has only a processor. Its surfels lie in the order in which the renderer stores them, and buffers stay from
-//! frame to frame as the renderer's do, so that both times are those of a frame alone, from the scene to the image in host
-//! memory. Both take turns, so that a busy machine slows both alike; the medians are printed.
+//! ```text
+//! cargo bench --bench scalar [-- --quick] [-- --adapter SUBSTRING]
+//! ```
 //!
-//! Before anything is timed, the program's image is compared with the renderer's, and so is one with a wrong kernel: the first
-//! must pass and the second must fail, or the benchmark does.
+//! [`program`] renders the same picture of an opaque, unlit sphere of 8-bit colours as `epsplat`:
+//! the kernels must be worth their cost on a machine that has only a processor. The program's
+//! surfels lie in the renderer's order, and its buffers stay from frame to frame as the renderer's
+//! do, so both times are those of a frame alone, from the scene to the image in host memory. Both
+//! alternate, so that a busy machine slows both alike; the medians are printed.
+//!
+//! Before timing, two images are compared with the renderer's: the program's, which must match, and
+//! one with a wrong kernel, which must not. Otherwise the benchmark fails.
 
 #![allow(missing_docs)]
 
@@ -28,14 +33,16 @@ use glam::DVec3;
 
 use program::{Program, THREADS, View};
 
-/// What is rendered, beside the first: surfels of the sphere, and their radius in units of the generated one.
+/// The scenes: number of surfels on the sphere, and their radius in units of the generated one.
 const SCENES: [(u64, f32); 4] = [(10_000, 1.0), (100_000, 1.0), (1_000_000, 1.0), (1_000_000, 0.77)];
 /// The passes, as the renderer's report names them.
 const PASSES: [&str; 4] = ["project", "visibility", "accumulate", "resolve"];
-/// The largest RMSE over pixels that both images cover, linear RGBA: few fragments in each frame lie so near to epsilon that f32
-/// decides otherwise, and make most of it.
+/// The largest RMSE over pixels that both images cover, linear RGBA.
+///
+/// A few fragments per frame lie so near to epsilon that f32 decides them differently; they make
+/// most of the error.
 const MOST_RMSE: f64 = 2e-4;
-/// The largest share of pixels that one image covers and the other does not.
+/// The largest share of pixels that only one of the images covers.
 const MOST_MISMATCH: f64 = 1e-3;
 
 /// A sphere of `count` surfels, whose radii are `scale` times the generated ones.
@@ -50,11 +57,12 @@ fn sphere(count: u64, scale: f32) -> Result<Scene> {
         ..Points::default()
     };
     let (scene, _) = build(vec![points], &())?;
-    // The plain program blends what is within epsilon, whichever side it shows.
+    // The plain program blends all fragments within epsilon, whichever side they show.
     Ok(Scene { oriented: false, ..scene })
 }
 
-/// The RMSE of `found` over the pixels that `expected` covers too, and the share of pixels that only one of them covers.
+/// The RMSE of `found` over pixels that `expected` covers too, and the share of pixels that only
+/// one of them covers.
 fn error(found: &Frame, expected: &Frame) -> Result<[f64; 2]> {
     let both: Vec<_> = found.color.iter().zip(&expected.color).filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0).collect();
     let row = |color: Vec<[f32; 4]>| Frame::of_colors(color.len() as u32, 1, color);
@@ -62,15 +70,15 @@ fn error(found: &Frame, expected: &Frame) -> Result<[f64; 2]> {
     Ok([compare(&a, &b)?.rmse, compare(found, expected)?.coverage_mismatch])
 }
 
-/// Whether that is the same image.
+/// Whether the errors are those of the same image.
 fn passes([rmse, mismatch]: [f64; 2]) -> bool {
     rmse < MOST_RMSE && mismatch < MOST_MISMATCH
 }
 
-/// Milliseconds of a frame: in all, and of each of [`PASSES`].
+/// Milliseconds of a frame: the total, then each of [`PASSES`].
 type Times = [f64; 5];
 
-/// The middle of each.
+/// The median of each time.
 fn median(times: &[Times]) -> Times {
     std::array::from_fn(|k| {
         let mut values: Vec<f64> = times.iter().map(|frame| frame[k]).collect();
@@ -79,19 +87,19 @@ fn median(times: &[Times]) -> Times {
     })
 }
 
-/// What was measured of a scene.
+/// The measurements of one scene.
 struct Measured {
-    /// Of a surfel in the middle of the sphere, pixels.
+    /// The radius of a surfel at the centre of the sphere's image, in pixels.
     radius: f64,
-    /// RMSE and coverage mismatch of the program, and of the one with a wrong kernel.
+    /// RMSE and coverage mismatch of the program, and of the program with a wrong kernel.
     errors: [[f64; 2]; 2],
     scalar: Times,
     epsplat: Times,
 }
 
-/// Compares the images, then takes the time of `rounds` frames each, in turns.
+/// Compares the images, then times `rounds` frames of each program in turns.
 fn measure(scene: &Scene, backend: &Backend, rounds: usize) -> Result<Measured> {
-    // The plain program knows this tolerance alone.
+    // The plain program supports only this epsilon.
     let epsilon = Epsilon::Relative(0.01);
     let options = RenderOptions { shading: Shading::Unlit, epsilon, ..RenderOptions::default() };
     let camera = Camera::framing((1024, 1024), Lens::Fov(45.0), scene, Camera::default_near(scene))?;
@@ -113,7 +121,8 @@ fn measure(scene: &Scene, backend: &Backend, rounds: usize) -> Result<Measured> 
         let start = Instant::now();
         let (_frame, report) = renderer.frame(&camera, &())?;
         let total = start.elapsed().as_secs_f64() * 1e3;
-        // Tiles that gather resolve their pixels as they accumulate.
+        // Gathering tiles resolve their pixels while they accumulate, so they report no separate
+        // time.
         let of_pass = |pass| report.passes.get(&format!("{pass}_ms")).copied().unwrap_or(0.0);
         let [project, visibility, accumulate, resolve] = PASSES.map(of_pass);
         epsplat.push([total, project, visibility, accumulate, resolve]);
@@ -127,7 +136,7 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--bench" => {} // cargo says so
+            "--bench" => {} // cargo passes it
             "--quick" => quick = true,
             "--adapter" => wanted = Some(arguments.next().context("--adapter needs a part of a name")?),
             other => bail!("{other:?} is not --quick or --adapter SUBSTRING"),

@@ -1,16 +1,22 @@
-//! The plain program: scalar Rust on two threads, no GPU and no intrinsics. The four passes are those of `src/render.rs`:
+//! The plain program: scalar Rust on two threads, without a GPU or intrinsics.
 //!
-//! 1. **project**, in f32: each thread turns half of the surfels into splats and puts each splat into the buckets of the strips
-//!    of [`ROWS`] rows that it may touch. The disk is exact in perspective, as in `src/passes/homography.rs`.
-//! 2. **visibility**: a thread takes the next strip and finds the largest 1/z at each pixel, which is linear along a row, so
-//!    that nothing is divided. Which pixels of a row a disk covers are the roots of a quadratic, not tests. Splats that face
-//!    away come last, and are left out where every tile under them is nearer already.
-//! 3. **accumulate**, of the same strip while it is in the cache: f32 sums of weight and of weight times colour where z is
-//!    within epsilon of the nearest; splats that are hidden are left out again. The kernel is a table over rho², not `exp`.
-//! 4. **resolve**: divide by the weight.
+//! Its four passes are those of epsplat (`src/passes`):
 //!
-//! The other way to share the work, half of the splats for each thread with depths and sums of the whole image, and a merge after
-//! either pass, took 1.3 times as long for 100,000 and 1,000,000 surfels; strips of 8 to 128 rows took the same within a tenth.
+//! 1. **project**, in f32: each thread turns half of the surfels into splats, and puts each splat
+//!    into the buckets of all strips of [`ROWS`] rows that it may touch. The disk is exact in
+//!    perspective, as in `src/passes/homography.rs`.
+//! 2. **visibility**: a thread takes the next strip and finds the largest 1/z at each pixel. It is
+//!    linear along a row, so nothing is divided. The pixels of a row that a disk covers lie between
+//!    the roots of a quadratic, so no pixel is tested. Splats that face away come last, and are
+//!    skipped where every tile under them is nearer already.
+//! 3. **accumulate**, in the same strip while it is in the cache: f32 sums of weight, and of weight
+//!    times colour, where z is within epsilon of the nearest. Hidden splats are skipped again. The
+//!    kernel is a table over rho², not `exp`.
+//! 4. **resolve**: divides by the weight.
+//!
+//! Another way to share the work took 1.3 times as long for 100,000 and 1,000,000 surfels: each
+//! thread draws half of the splats into depths and sums of the whole image, which are merged after
+//! each pass. Strips of 8 to 128 rows took the same time within a tenth.
 
 use std::sync::Mutex;
 use std::time::Instant;
@@ -22,20 +28,21 @@ use epsplat::low_level::scene::color::SRGB8_TO_LINEAR;
 use epsplat::low_level::scene::{Camera, Colors, Scene, Surfel};
 use glam::{Mat3, Vec2, Vec3};
 
-/// Threads of the program.
+/// The number of threads.
 pub const THREADS: usize = 2;
-/// Image rows of a strip: depths and sums of 32 rows of 1024 pixels are 640 KiB.
+/// Image rows per strip: depths and sums of 32 rows of 1024 pixels take 640 KiB.
 const ROWS: usize = 32;
-/// Side of the tiles whose farthest visible depth hides splats, pixels.
+/// The side of a tile in pixels; the farthest visible depth of tiles hides splats.
 const TILE: usize = 16;
-/// Values in the table of the kernel; the nearest is off by at most 4e-4, upwards as often as downwards.
+/// Entries of the kernel's table; the nearest is off by at most 4e-4, upwards as often as
+/// downwards.
 const WEIGHTS: usize = 4096;
 
-/// The camera in f32 and the options.
+/// The camera and the options in f32.
 pub struct View {
     width: usize,
     height: usize,
-    /// Relative to the scene's origin.
+    /// The camera's position relative to the scene's origin.
     eye: Vec3,
     rotation: Mat3,
     focal: Vec2,
@@ -43,9 +50,10 @@ pub struct View {
     pixel: Vec2,
     principal: Vec2,
     near: f32,
-    /// What is left of the largest 1/z at a pixel at the farthest depth that is accepted there.
+    /// 1 / (1 + epsilon): times the largest 1/z of a pixel, it gives the smallest 1/z that is
+    /// accepted there.
     accepted: f32,
-    /// Of the kernel, over rho² from 0 to 1.
+    /// The kernel's weights for rho² from 0 to 1.
     weights: Vec<f32>,
 }
 
@@ -71,9 +79,9 @@ impl View {
 /// A projected surfel: at (x, y) pixels from `first`, `row . (x, y, 1)` is u/z, v/z and 1/z.
 #[derive(Clone, Copy)]
 struct Splat {
-    /// First pixel (x, y) that it may touch.
+    /// The first pixel (x, y) that the splat may touch.
     first: [u16; 2],
-    /// Last pixel.
+    /// The last pixel (x, y) that the splat may touch.
     last: [u16; 2],
     a: [f32; 3],
     b: [f32; 3],
@@ -82,16 +90,18 @@ struct Splat {
     color: [u8; 4],
 }
 
-/// The splats of a strip, from one thread.
+/// The splats of a strip that one thread projected.
 #[derive(Default)]
 struct Bucket {
-    /// Those whose normals point toward the viewer: they are likely to hide the others.
+    /// Splats whose normals point toward the viewer: they are likely to hide the others.
     toward: Vec<Splat>,
     away: Vec<Splat>,
 }
 
-/// Pass 1: the splat of a surfel, and whether it faces away. `None` if it touches no pixel, is seen edge-on, or reaches the near
-/// depth, which no surfel of these scenes does.
+/// Pass 1: returns the splat of a surfel and whether it faces away.
+///
+/// Returns `None` if it touches no pixel, is seen edge-on, or reaches the near depth, which no
+/// surfel of these scenes does.
 fn project(surfel: &Surfel, color: [u8; 4], view: &View) -> Option<(bool, Splat)> {
     let p = view.rotation * (Vec3::from_array(surfel.center) - view.eye);
     let s = view.rotation * Vec3::from_array(surfel.s);
@@ -105,12 +115,13 @@ fn project(surfel: &Surfel, color: [u8; 4], view: &View) -> Option<(bool, Splat)
     let inverse = 1.0 / p.z;
     let ray = p.truncate() * inverse;
     let image = view.focal * ray + view.principal;
-    // The half-axes' images, were the whole disk at its nearest depth: not tight, but never too small.
+    // The images of the half-axes as if the whole disk were at its nearest depth: never too small,
+    // though not tight.
     let across = Vec2::new(s.x - ray.x * s.z, t.x - ray.x * t.z).length();
     let down = Vec2::new(s.y - ray.y * s.z, t.y - ray.y * t.z).length();
     let extent = view.focal * Vec2::new(across, down) * (1.0 / nearest) + 0.01;
     let size = Vec2::new(view.width as f32, view.height as f32);
-    // Rounded down, these are the first pixel and the one past the last.
+    // Rounded down, these give the first pixel and the one past the last.
     let (low, high) = ((image - extent + 0.5).max(Vec2::ZERO), (image + extent + 0.5).min(size));
     let (first, end) = ([low.x as u16, low.y as u16], [high.x as u16, high.y as u16]);
     if !(first[0] < end[0] && first[1] < end[1]) {
@@ -127,12 +138,12 @@ fn project(surfel: &Surfel, color: [u8; 4], view: &View) -> Option<(bool, Splat)
 }
 
 impl Splat {
-    /// Calls `draw` for each row of `strip` with the pixels in it that the disk covers and u/z, v/z and 1/z at the first of
-    /// them.
+    /// Calls `draw` for each row of `strip` with the pixels that the disk covers there, and with
+    /// u/z, v/z and 1/z at the first of them.
     #[inline(always)]
     fn spans(&self, strip: &Place, mut draw: impl FnMut(std::ops::Range<usize>, [f32; 3])) {
         let (a_x, b_x, c_x) = (self.a[0], self.b[0], self.c[0]);
-        // a² + b² <= c² between the roots of a quadratic in x.
+        // Pixels with a² + b² <= c² lie between the roots of a quadratic in x.
         let scale = 1.0 / (a_x * a_x + b_x * b_x - c_x * c_x);
         let widest = f32::from(self.last[0] - self.first[0]);
         let [left, top] = self.first.map(usize::from);
@@ -144,7 +155,8 @@ impl Splat {
             if half_squared >= 0.0 {
                 let half = half_squared.sqrt();
                 let (low, high) = ((middle - half).max(0.0), (middle + half).min(widest));
-                // Rounding up by `ceil` is a call where the processor's baseline lacks it.
+                // Rounds up without `ceil`, which is a function call if the processor's baseline
+                // lacks it.
                 let first = low as i32 + i32::from((low as i32 as f32) < low);
                 let end = (high + 1.0) as i32;
                 if first < end {
@@ -156,27 +168,27 @@ impl Splat {
         }
     }
 
-    /// The largest 1/z over its bounds.
+    /// The largest 1/z over the splat's bounds.
     fn nearest(&self) -> f32 {
         let [right, down] = [0, 1].map(|k| f32::from(self.last[k] - self.first[k]));
         self.c[2] + (self.c[0] * right).max(0.0) + (self.c[1] * down).max(0.0)
     }
 }
 
-/// Which rows of the image a strip is.
+/// The position of a strip in the image.
 struct Place {
     first: usize,
     width: usize,
 }
 
-/// The pixels of the strip that a thread has in work.
+/// The pixels of the strip that a thread is drawing.
 struct Strip {
     place: Place,
-    /// The largest 1/z so far; after [`Strip::settle`] the smallest that is accepted.
+    /// The largest 1/z so far; after [`Strip::settle`], the smallest that is accepted.
     nearest: Vec<f32>,
     /// The smallest `nearest` of each tile.
     tiles: Vec<f32>,
-    /// Weight times red, green, blue, and weight.
+    /// Weight times red, green and blue, and weight.
     sums: Vec<[f32; 4]>,
 }
 
@@ -191,14 +203,14 @@ impl Strip {
         }
     }
 
-    /// Begins with the strip whose first row is `first`.
+    /// Clears the buffers for the strip whose first row is `first`.
     fn clear(&mut self, first: usize) {
         self.place.first = first;
         self.nearest.fill(0.0);
         self.sums.fill([0.0; 4]);
     }
 
-    /// Pass 2, of one splat.
+    /// Pass 2 for one splat.
     fn visibility(&mut self, splat: &Splat) {
         splat.spans(&self.place, |pixels, [_, _, mut c]| {
             for nearest in &mut self.nearest[pixels] {
@@ -208,12 +220,12 @@ impl Strip {
         });
     }
 
-    /// Turns the largest 1/z into the smallest that is `accepted`.
+    /// Turns the largest 1/z into the smallest that is accepted, with the factor `accepted`.
     fn settle(&mut self, accepted: f32) {
         self.nearest.iter_mut().for_each(|nearest| *nearest *= accepted);
     }
 
-    /// What is visible so far hides what is farther.
+    /// Updates the tiles, so that visible splats hide farther ones.
     fn occlude(&mut self) {
         let across = self.place.width.div_ceil(TILE);
         self.tiles.fill(f32::INFINITY);
@@ -225,7 +237,7 @@ impl Strip {
         }
     }
 
-    /// Whether each tile that the splat may touch is nearer than all of it.
+    /// Whether every tile that the splat may touch is nearer than the whole splat.
     fn hides(&self, splat: &Splat) -> bool {
         let across = self.place.width.div_ceil(TILE);
         let nearest = splat.nearest();
@@ -235,7 +247,7 @@ impl Strip {
         (top..=bottom).all(|y| self.tiles[y * across..][columns.clone()].iter().all(|&tile| nearest < tile))
     }
 
-    /// Pass 3, of one splat.
+    /// Pass 3 for one splat.
     fn accumulate(&mut self, splat: &Splat, weights: &[f32]) {
         let linear = |k: usize| SRGB8_TO_LINEAR[usize::from(splat.color[k])];
         let values = [linear(0), linear(1), linear(2), 1.0];
@@ -256,7 +268,7 @@ impl Strip {
         });
     }
 
-    /// Pass 4, into the rows of the image.
+    /// Pass 4, into the strip's rows of the image.
     fn resolve(&self, image: &mut [[f32; 4]]) {
         for (pixel, sum) in image.iter_mut().zip(&self.sums) {
             if sum[3] > 0.0 {
@@ -265,7 +277,8 @@ impl Strip {
         }
     }
 
-    /// Passes 2 to 4 of the strip `index`, whose splats are `buckets`; milliseconds of each.
+    /// Runs passes 2 to 4 of strip `index` with the splats in `buckets`, and returns the
+    /// milliseconds of each.
     fn draw(&mut self, index: usize, buckets: &[&Bucket], view: &View, image: &mut [[f32; 4]]) -> [f64; 3] {
         let start = Instant::now();
         let now = || start.elapsed().as_secs_f64() * 1e3;
@@ -296,9 +309,9 @@ impl Strip {
 /// The program: surfels, and the buffers that stay from frame to frame.
 pub struct Program {
     surfels: Vec<(Surfel, [u8; 4])>,
-    /// Of each thread of the first pass, a bucket a strip.
+    /// A bucket per strip, for each thread of the first pass.
     buckets: [Vec<Bucket>; THREADS],
-    /// Of each thread of the other passes.
+    /// A strip for each thread of the other passes.
     strips: [Strip; THREADS],
 }
 
@@ -317,7 +330,7 @@ impl Program {
         }
     }
 
-    /// The image, and the milliseconds of each pass.
+    /// Draws the image, and returns it with the milliseconds of each pass.
     pub fn frame(&mut self, camera: &Camera, view: &View) -> (Frame, [f64; 4]) {
         let start = Instant::now();
         let mut frame = Frame::new(camera, Default::default());
@@ -349,7 +362,7 @@ impl Program {
     }
 }
 
-/// Pass 1, of one thread's surfels.
+/// Pass 1 for one thread's surfels.
 fn fill(buckets: &mut [Bucket], surfels: &[(Surfel, [u8; 4])], view: &View) {
     for bucket in &mut *buckets {
         bucket.toward.clear();

@@ -1,4 +1,5 @@
-//! Benchmark studies: shipped ones are read, a small one runs, its files appear, and what misses its limit is told.
+//! Benchmark studies: the shipped ones parse, a small one runs and writes its files, and missed
+//! limits are reported.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -67,7 +68,7 @@ fn a_study_without_an_adapter_measures_the_reference_against_itself() {
         assert_eq!(m.reconstruction.contains_key("psnr_db"), m.scene == "ball");
     }
     assert!((study.measurements[2].footprint_px - 3.0).abs() < 1e-6);
-    // Twice as many disks follow the surface more closely.
+    // Twice as many disks approximate the surface more closely.
     let psnr = |index: usize| study.measurements[index].reconstruction["psnr_db"];
     assert!(psnr(1) > psnr(0) && psnr(0) > 10.0, "{} {}", psnr(0), psnr(1));
     assert_eq!(study.images.len(), 3);
@@ -75,7 +76,7 @@ fn a_study_without_an_adapter_measures_the_reference_against_itself() {
     assert!(bench::run(&definition(&needs_one), None, &()).unwrap_err().to_string().contains("adapter"));
 }
 
-/// A file with levels of detail that is read in part is drawn as the scene that it was made of.
+/// A file with levels of detail that is read in parts looks like the scene that it was made from.
 #[test]
 fn scenes_that_are_read_in_parts_have_the_pictures_of_whole_ones() {
     let folder = Folder::new();
@@ -104,7 +105,7 @@ fn scenes_that_are_read_in_parts_have_the_pictures_of_whole_ones() {
     assert!(cuts[0].0 == 3000 && cuts[0].1 > 1.2 * cuts[1].1 && cuts[1].1 > 50.0, "{cuts:?}");
     let pictures: Vec<_> = shown.images.iter().map(|set| &set.image.color).collect();
     assert!(pictures[0] == pictures[2] && pictures[1] == pictures[3] && pictures[0] != pictures[1]);
-    // What has no levels of detail is told.
+    // An input without levels of detail is an error that names `epsplat lod`.
     let error = study(&text.replace("levels.ply", "sphere.ply")).unwrap_err().to_string();
     assert!(error.contains("sphere.ply") && error.contains("epsplat lod"), "{error}");
 }
@@ -117,7 +118,7 @@ fn each_backend_has_its_error_its_memory_and_its_ratio() {
         bench::run(&definition(&[&SCENES.replace("fill = 0.5", few), GPU].concat()), Some(&backend), &()).unwrap();
     assert!(outcome.failures.is_empty(), "{:?}", outcome.failures);
     let all = &outcome.study.measurements;
-    assert_eq!(all.len(), 4 + 4 + 3, "a scene has the configurations that it says");
+    assert_eq!(all.len(), 4 + 4 + 3, "each scene runs its own configurations only");
     for m in all {
         let rmse = m.numeric.unwrap().rmse;
         match m.backend.as_str() {
@@ -126,13 +127,13 @@ fn each_backend_has_its_error_its_memory_and_its_ratio() {
             _ => assert!(rmse > 0.0 && rmse < 1e-5 && m.device_bytes > 48 * 48 * 4, "{m:?}"),
         }
         assert_eq!(m.bytes_per_splat > 36.0, m.backend != "reference", "{m:?}");
-        // A card draws small splats one by one and large ones by tiles.
+        // A graphics card draws small splats one by one and large ones by tiles.
         assert!((4..=5).contains(&m.passes.len()), "{m:?}");
     }
     assert!(!outcome.study.machine.adapter.is_empty());
 }
 
-/// A page of a web site that stands where the report's would is no report.
+/// An unrelated web page at the report's path is not taken for a report and stays.
 #[test]
 fn a_page_that_no_report_has_is_not_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -196,7 +197,7 @@ fn the_command_refuses_what_is_no_study() {
     assert!(output.status.success() && stdout.contains("| `exact` | 1.00 | 0.0e0 | 0.0e0 | yes |"), "{stdout}");
 }
 
-/// The smallest of the shipped studies, in its quick form and with one run.
+/// Runs the smallest of the shipped studies in its quick form, once.
 #[test]
 fn a_shipped_study_keeps_its_limits() {
     if common::gpu().is_none() {

@@ -1,4 +1,5 @@
-//! One run of everything on an adapter: its records are there and say what it found, and what is wrong is told.
+//! `epsplat card`, which runs all studies on one adapter: its records hold the findings, and
+//! failures are reported.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -13,7 +14,7 @@ const STUDY: &str = "name = \"small\"\nabout = \"A test.\"\nsize = [32, 32]\nrun
     [[scene]]\nname = \"ball\"\nshape = \"sphere\"\ncount = [100, 200]\n\
     [[config]]\nname = \"fixed\"\nbackend = \"gpu\"\nerror_limit = 1e-5\n";
 
-/// Runs it in its quick form: the exit code and what is on stderr.
+/// Runs `epsplat card --quick` and returns the exit code and stderr.
 fn card(studies: [&Path; 2], out: &Path) -> (Option<i32>, String) {
     let mut arguments = vec!["card", text(studies[0]), text(studies[1]), "--quick", "--out", text(out)];
     let adapter = std::env::var("EPSPLAT_TEST_ADAPTER").ok();
@@ -39,7 +40,7 @@ fn a_quick_run_tries_everything_and_keeps_it() {
     let Some(gpu) = common::gpu() else { return };
     let folder = Folder::new();
     let (study, out) = (folder.file("small.toml", STUDY), folder.path("records/of a card"));
-    // A study that misses its limit fails the run, and nothing else does.
+    // A study that misses its limit fails the run but does not stop the others.
     let strict = folder.file("strict.toml", STUDY.replace("1e-5", "1e-15").replace("\"small\"", "\"strict\""));
     let (code, stderr) = card([&study, &strict], &out);
     assert_eq!(code, Some(1), "{stderr}");
@@ -72,7 +73,7 @@ fn a_quick_run_tries_everything_and_keeps_it() {
         assert!(summary.contains(words), "{words:?}: {summary}");
     }
     assert!(!summary.contains("DIFFER"), "{summary}");
-    // No place of this machine is in what is passed on.
+    // The records are meant to be shared, so they contain no path of this machine.
     for name in ["card.md", "card.json"] {
         assert!(!std::fs::read_to_string(out.join(name)).unwrap().contains(text(&folder.path(""))), "{name}");
     }
@@ -84,7 +85,7 @@ fn studies(found: &Value, out: &Path) {
     assert_eq!([small, strict].map(|study| rows(&study["failures"]).len()), [0, 2]);
     assert!(number(&small["configs"][0]["worst_rmse"]) < 1e-5, "{small}");
     let page = std::fs::read_to_string(out.join("small/index.html")).unwrap();
-    assert!(page.contains("epsplat card small.toml strict.toml --quick --out"), "the page says what repeats it");
+    assert!(page.contains("epsplat card small.toml strict.toml --quick --out"), "the page names its command");
     assert_eq!(std::fs::read_to_string(out.join("small/results.csv")).unwrap().lines().count(), 3);
 }
 
@@ -100,7 +101,7 @@ fn accuracy(found: &Value, out: &Path) {
 fn determinism(found: &Value) {
     let found = rows(found);
     let of = |what: &str| found.iter().filter(|row| row["what"].as_str().unwrap().starts_with(what)).count();
-    // At two sizes of splats each.
+    // Each at two sizes of splats.
     assert!(of("organisation") == 4 && of("without") >= 20 && of("surfels in reverse") == 2, "{found:?}");
     assert!(of("the second frame") >= 4 && of("the second frame") == of("another renderer"));
     for row in found {
@@ -120,7 +121,7 @@ fn throughput(found: &Value, copy: f64) {
         for name in ["project", "visibility", "accumulate"] {
             let pass = &passes[name];
             let share = number(&pass["share_of_copy"]);
-            // Caches may serve what memory could not.
+            // Caches may give more than the memory's bandwidth.
             assert!(share > 0.0 && share < 20.0, "{name}: {pass}");
             assert!((share * copy / number(&pass["gb_per_second"]) - 1.0).abs() < 1e-9);
         }
@@ -145,7 +146,7 @@ fn what_cannot_be_used_is_told_in_a_sentence_before_anything_is_done() {
     said(with(&[text(&study), "--out", text(&folder.path("out"))]), 2, &["two studies are called \"small\""]);
     let away = folder.file("away.toml", STUDY.replace("\"small\"", "\"../small\""));
     said(with(&[text(&away), "--out", text(&folder.path("out"))]), 2, &["../small", "folder"]);
-    // A study would be overwritten.
+    // An output would overwrite a study.
     let inside = folder.file("card.json", STUDY);
     said(with(&[text(&inside), "--out", text(&folder.path(""))]), 2, &["two studies"]);
     fails(&["card", text(&inside), "--out", text(&folder.path(""))], 2, &["would overwrite the input"]);

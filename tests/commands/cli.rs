@@ -1,4 +1,5 @@
-//! The command line as its users meet it: good runs, and one sentence with the right exit code for bad ones.
+//! The command line as users meet it: successful runs, and for bad ones a one-sentence error with
+//! the right exit code.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -59,14 +60,15 @@ fn coverage_tells_a_whole_surface_from_one_with_holes() {
         let output = succeeds(&[&["coverage", surfels, "--mesh", &bunny, "--json", "-"], &few[..]].concat());
         serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
     };
-    // The reader's radii make disks that cover the triangles around each vertex.
+    // The reader derives radii whose disks cover the triangles around each vertex.
     let whole = run(&bunny);
     assert_eq!((&whole["triangles"], &whole["views"]), (&3674.into(), &6.into()));
-    // One at each vertex, and more where the surface has edges.
+    // One surfel at each vertex, and more where the surface has sharp edges.
     assert!((1839..=3 * 3674).contains(&whole["surfels"].as_u64().unwrap()), "{whole}");
     assert!(whole["hole_free"] == true && whole["holes"] == 0 && whole["worst_view"].is_null(), "{whole}");
     assert!(whole["centers_to_mesh"]["max"].as_f64().unwrap() < 1e-6 && whole["rays"].as_u64().unwrap() > 4000);
-    // Half of a rim that a line cuts ends at the vertex; the other half leaves a surface that bends.
+    // A clipped disk ends at the vertex on one side; on the other, its rim leaves the curved
+    // surface.
     let rims = |of: &str| whole["rims_to_mesh"][of].as_f64().unwrap();
     assert!(rims("max") > 1e-3 && rims("mean") > 1e-4, "{whole}");
     // Disks too small to touch each other.
@@ -125,7 +127,7 @@ fn without_an_adapter_auto_falls_back_and_gpu_says_what_to_install() {
     let folder = Folder::new();
     let cloud = folder.file("c.ply", ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n"));
     let image = folder.path("c.png");
-    // No adapter of another system's API exists here.
+    // An adapter of another system's API, which does not exist here.
     let foreign = if cfg!(windows) { "metal" } else { "dx12" };
     let run = |backend: &str| {
         Command::new(env!("CARGO_BIN_EXE_epsplat"))
@@ -221,7 +223,7 @@ fn bad_files_exit_with_1_and_leave_nothing_behind() {
     bad("head.laz", &laz[..300], &["head.laz"]);
     bad("noise.laz", &[&laz[..400], &[0x5a; 4000][..]].concat(), &["noise.laz"]);
     let mut promises = laz.clone();
-    // LAS 1.2: the legacy number of points is at byte 107.
+    // In LAS 1.2 the number of points is at byte 107.
     promises[107..111].copy_from_slice(&200_000u32.to_le_bytes());
     bad("promises.laz", &promises, &["promises.laz", "200000"]);
     bad("index.obj", b"v 0 0 0\nf 1 2 3\n", &["index.obj"]);
@@ -257,8 +259,10 @@ fn odd_points_are_dropped_or_repaired_and_counted() {
     assert_eq!(info["preparation"]["estimated_radii"], 2);
 }
 
-/// Every command on every bad input: a sentence that names the file and nothing written, or success, and what was left out is
-/// told. A panic has another exit code than either.
+/// Runs every command on every bad input: either it fails with a sentence that names the file and
+/// writes nothing, or it succeeds and reports what it left out.
+///
+/// A panic has a different exit code.
 #[test]
 fn bad_meshes_and_clouds_end_in_a_sentence_or_a_count_whatever_the_command() {
     let folder = Folder::new();
@@ -271,7 +275,7 @@ fn bad_meshes_and_clouds_end_in_a_sentence_or_a_count_whatever_the_command() {
     folder.file("junk.png", "no image");
     folder.file("junk.mtl", "newmtl x\nmap_Kd junk.png\n");
     let same = |count: usize| ply("x y z", count, &"1 2 3\n".repeat(count));
-    // What `sample` and `coverage --mesh` say of it; of a cloud that it has no triangles.
+    // The words in the errors of `sample` and `coverage --mesh`; a cloud has no triangle.
     let no_mesh = ["no triangle"];
     let inputs: [(&str, String, &[&str]); 16] = [
         ("fin.obj", format!("{quad}v 0 0 1\nv 0 1 -1\nf 1 2 3\nf 1 3 5\nf 1 3 6\nf 3 1 2\nf 1 2 3\n"), &[]),
@@ -397,7 +401,7 @@ fn info_tells_what_is_missing_and_which_command_supplies_it() {
     let after = info(&folder.path("cloud.surfels.ply"));
     assert_eq!((strings(&after["lacks"]), after["supplied_by"].is_null()), (vec!["colours".to_owned()], true));
     assert_eq!(after["coverage"]["covered"].as_f64(), Some(1.0));
-    // Disks too small to touch close nothing.
+    // Disks too small to touch do not close the surface.
     let rows: String = (0..400).map(|i| format!("{} {} 0 0 0 1 0.3\n", i % 20, i / 20)).collect();
     let dots = folder.file("dots.ply", ply("x y z nx ny nz radius", 400, &rows));
     assert_eq!(strings(&info(&dots)["lacks"]), ["surfels that close the surface", "colours"]);
@@ -417,7 +421,7 @@ fn info_tells_the_format_and_what_is_not_used() {
     ] {
         assert!(shaded.contains(line), "{shaded}");
     }
-    // Normals that some points lack are given, and some of them are lacking.
+    // Normals that only some points have: the others are estimated and counted.
     let rows: String = (0..400).map(|i| format!("{} {} 0 0 0 {}\n", i % 20, i / 20, i % 2)).collect();
     let half = told(&folder.file("half.ply", ply("x y z nx ny nz", 400, &rows)));
     assert!(half.contains("  normals   given for 200 of 400, the others estimated from neighbours\n"), "{half}");
@@ -478,7 +482,8 @@ fn simplify_keeps_the_picture_with_fewer_surfels() {
     };
     let pairs = alpha(&dense, "dense.exr").into_iter().zip(alpha(&sparse, "sparse.exr")).collect::<Vec<_>>();
     let (covered, different) = (pairs.iter().filter(|p| p.0).count(), pairs.iter().filter(|p| p.0 != p.1).count());
-    // The outlines are less than half a pixel apart: counted where a row or a column of the image crosses the first one.
+    // The outlines are less than half a pixel apart on average: differing pixels are compared with
+    // the crossings of the first outline by rows and columns.
     let crossed = |step: usize| (0..pairs.len() - step).filter(|&k| pairs[k].0 != pairs[k + step].0).count();
     let crossings = crossed(1) + crossed(128);
     assert!(covered > 3_000 && 2 * different < crossings, "{different} of {covered}, {crossings}");
@@ -489,7 +494,8 @@ fn simplify_keeps_the_picture_with_fewer_surfels() {
     fails(&["simplify", "no.ply", "-o", "y.ply"], 1, &["no.ply"]);
 }
 
-/// A mesh's triangles are drawn alone and beside surfels, and what does not go with them is told in a sentence.
+/// A mesh's triangles are drawn alone and beside surfels; options that do not apply to them are
+/// refused in a sentence.
 #[test]
 fn triangles_are_drawn_alone_and_beside_surfels() {
     let folder = Folder::new();

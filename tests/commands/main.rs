@@ -1,5 +1,5 @@
 //! The commands, the studies and the README.
-//! One program: shared code and kernels are compiled once.
+//! All in one test program, so that shared code and kernels are compiled once.
 
 mod bench;
 mod card;

@@ -1,11 +1,11 @@
-//! The README and the guide stay true: every command in them runs.
+//! Every command in the README and the guide runs.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::Path;
 use std::process::Command;
 
-/// The lines of the ```sh blocks of a page, continuation lines joined.
+/// The commands in the ```sh blocks of a page, with continuation lines joined.
 fn commands(page: &str) -> Vec<String> {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
     let mut commands = Vec::new();
@@ -17,10 +17,10 @@ fn commands(page: &str) -> Vec<String> {
     commands
 }
 
-/// The shell's line for a command of a page; none for those that other scripts run.
+/// The shell command to run for a page's command; `None` for those that tests/run covers.
 fn line(command: &str) -> Option<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    // Commands that install drivers, or run the tests, are those of the script that runs the tests.
+    // tests/run installs drivers itself, and tests cannot run it.
     if command.contains("apt-get") {
         let script = std::fs::read_to_string(root.join("tests/run")).unwrap();
         for package in command.split(' ').filter(|word| word.contains("vulkan")) {
@@ -38,8 +38,8 @@ fn line(command: &str) -> Option<String> {
     Some(format!("{binary} {arguments}"))
 }
 
-/// Runs the commands of a page in order, in a folder that links to the data and the studies, and
-/// returns the folder.
+/// Runs a page's commands in order, in a new folder with links to the data and the studies; returns
+/// that folder.
 fn run(page: &str, least: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -81,7 +81,7 @@ fn the_guides_commands_run() {
     }
 }
 
-/// A file of tests that no module names would never run.
+/// Every test file is declared as a module of a program; otherwise it would never run.
 #[test]
 fn every_file_of_tests_is_in_a_program() {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");

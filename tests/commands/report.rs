@@ -1,4 +1,4 @@
-//! The report of a study: its files are well-formed, and its page is what a reader in a browser can use.
+//! The report of a study: its files are well-formed, and its page works in a browser.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -10,7 +10,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::metrics::compare;
 use epsplat::low_level::report::{ImageSet, Machine, Measurement, Numeric, Study, Summary, write};
 
-/// A configuration: name, backend, accumulator, milliseconds for a million splats, milliseconds for a frame, error.
+/// A configuration: name, backend, accumulator, ms per million splats, ms per frame, error.
 type Config = (&'static str, &'static str, &'static str, f64, f64, Option<f64>);
 
 const CONFIGS: [Config; 8] = [
@@ -24,7 +24,7 @@ const CONFIGS: [Config; 8] = [
     ("reference", "reference", "", 2400.0, 80.0, Some(0.0)),
 ];
 
-/// A sphere over a transparent background, with a little noise of the size of `error`.
+/// A sphere over a transparent background, with noise of magnitude about `error`.
 fn frame(size: u32, error: f64) -> Frame {
     let pixel = |index: u32| {
         let (x, y) = (index % size, index / size);
@@ -34,7 +34,7 @@ fn frame(size: u32, error: f64) -> Frame {
             return [0.0; 4];
         }
         let light = (0.5 * inside.sqrt() - 0.35 * u - 0.5 * v).max(0.05);
-        // Errors are frequent at the rim, and of all sizes.
+        // Errors of all sizes, more frequent at the rim.
         let dice = f64::from(index.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24);
         let noise = if dice > inside { error * (8.0 * (dice - 0.7)).exp() } else { 0.0 };
         [0.9 * light, 0.55 * light + noise, 0.3 * light, 1.0].map(|c| c as f32)
@@ -42,7 +42,7 @@ fn frame(size: u32, error: f64) -> Frame {
     Frame::of_colors(size, size, (0..size * size).map(pixel).collect())
 }
 
-/// A study as the runner would fill it: two scenes, one of them at four sizes, and pictures of the other.
+/// A study as the runner would fill it: two scenes, one at four sizes, and images of the other.
 fn study() -> Study {
     let mut measurements = Vec::new();
     let scenes =
@@ -120,7 +120,7 @@ fn study() -> Study {
     }
 }
 
-/// The page of a study, and the folder that it is in.
+/// Writes a study's report into a temporary folder; returns the folder and the page.
 fn written(study: &Study) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("new/report");
@@ -134,7 +134,7 @@ fn parsed(page: &str) -> roxmltree::Document<'_> {
     roxmltree::Document::parse_with_options(page, options).expect("the page is well-formed XML")
 }
 
-/// The markers of the plots of one class.
+/// The number of plot markers of one class.
 fn points(page: &roxmltree::Document<'_>, class: &str) -> usize {
     let is = |node: &roxmltree::Node<'_, '_>, class: &str| {
         node.attribute("class").is_some_and(|of| of.split(' ').any(|word| word == class))
@@ -174,7 +174,7 @@ fn the_page_is_well_formed_and_needs_nothing_else() {
     assert_eq!(images, 2 * study.images.len());
     assert_eq!(points(&page, "numeric"), study.measurements.len());
     assert_eq!(points(&page, "truth"), CONFIGS.len());
-    // Of the sphere at three sizes, each configuration has a curve; nothing else was varied alone.
+    // Each configuration has a curve of the sphere at three sizes; no other parameter varies alone.
     assert_eq!(points(&page, "scaling"), 3 * CONFIGS.len());
     let ids: Vec<&str> = page.descendants().filter_map(|node| node.attribute("id")).collect();
     assert!(ids.iter().enumerate().all(|(index, id)| !ids[..index].contains(id)));
@@ -199,7 +199,7 @@ fn a_study_of_nothing_is_still_a_page() {
     assert_eq!(points(&parsed(&page), "plot"), 0);
     let json = std::fs::read_to_string(folder.path().join("new/report/results.json")).unwrap();
     assert_eq!(json.trim(), "[]");
-    // Numbers that are none are shown as missing, and are no points.
+    // NaN and infinities are shown as missing and have no marker.
     let mut odd = study();
     odd.images.clear();
     for (index, m) in odd.measurements.iter_mut().enumerate() {
@@ -260,7 +260,7 @@ fn the_heat_map_and_the_comparison_agree_on_what_a_difference_is() {
     assert_eq!(largest, compare(&image, &reference).unwrap().max_abs);
 }
 
-/// A Chromium: what `EPSPLAT_CHROMIUM` names, or what is on the path.
+/// Path of a Chromium: `EPSPLAT_CHROMIUM`, or the first one on the path.
 fn chromium() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("EPSPLAT_CHROMIUM") {
         return Some(named.into());
@@ -271,8 +271,8 @@ fn chromium() -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-/// What a browser found is written into the page's own text, from where `--dump-dom` brings it here.
-/// The policy forbids every request, so that each one that is tried is reported.
+/// Page script that writes the browser's findings into the page, where `--dump-dom` returns them.
+/// The policy forbids all requests, so each attempted one is reported.
 const PROBE: &str = r#"<meta http-equiv="Content-Security-Policy" content="default-src data: 'unsafe-inline'"/><script>
 const requests = [];
 document.addEventListener('securitypolicyviolation', event => requests.push(event.blockedURI));
@@ -294,7 +294,8 @@ addEventListener('load', () => {
   });
 });</script>"#;
 
-/// Opens the page in a frame of this width: a headless window itself is never narrower than about 500 pixels.
+/// Opens the page in an iframe of this width, as a headless window is at least about 500 pixels
+/// wide.
 fn probe(browser: &Path, folder: &Path, page: &str, width: u32) -> serde_json::Value {
     std::fs::write(folder.join("probed.html"), page.replacen("<head>", &format!("<head>{PROBE}"), 1)).unwrap();
     let outer = format!(
@@ -347,7 +348,7 @@ fn a_browser_shows_the_page_on_a_phone_and_on_a_desk() {
     let study = study();
     let (folder, page) = written(&study);
     let out = folder.path().join("new/report");
-    // For a person who wants to look at it.
+    // Keeps a copy of the report for a person to look at.
     if let Some(keep) = std::env::var_os("EPSPLAT_KEEP_REPORT") {
         write(Path::new(&keep), &study).unwrap();
     }
@@ -366,7 +367,7 @@ fn a_browser_shows_the_page_on_a_phone_and_on_a_desk() {
         );
         assert_eq!((&found["points"], &found["inside"]), (&points.into(), &points.into()), "{found}");
     }
-    // The control: what the page must not do is noticed if it does.
+    // The control: a page with these faults is noticed.
     let broken = page.replacen(
         "<h1>",
         "<div style=\"width:3000px\">wide</div><img src=\"missing.png\"/><img src=\"data:image/png;base64,AAAA\"/><h1>",

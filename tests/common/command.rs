@@ -1,12 +1,12 @@
-//! The command line, run as its users run it.
+//! Helpers for tests that run the `epsplat` program as its users do.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The repository's own inputs.
+/// The repository's own input files.
 pub const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
 
-/// A folder that goes with the test.
+/// A temporary folder that is deleted when the test ends.
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -29,7 +29,7 @@ impl Folder {
     }
 }
 
-/// Runs the program.
+/// Runs the program with these arguments.
 pub fn epsplat(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_epsplat")).args(arguments).output().unwrap()
 }
@@ -38,7 +38,8 @@ pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Runs, and checks the exit code and that stderr ends in one sentence that holds every one of `words`.
+/// Runs the program and checks that it exits with `code` and that stderr ends in one sentence that
+/// contains all of `words`.
 pub fn fails(arguments: &[&str], code: i32, words: &[&str]) {
     let output = epsplat(arguments);
     let stderr = String::from_utf8(output.stderr).unwrap();
@@ -59,7 +60,7 @@ pub fn succeeds(arguments: &[&str]) -> Output {
     output
 }
 
-/// A PLY of `rows` under the given vertex properties.
+/// An ASCII PLY file of `count` vertices with the given float properties; `rows` is its data.
 pub fn ply(properties: &str, count: usize, rows: &str) -> String {
     let properties: String = properties.split(' ').map(|p| format!("property float {p}\n")).collect();
     format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}")

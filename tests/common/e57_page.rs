@@ -1,9 +1,9 @@
-//! The pages of E57 files: 1020 bytes and their checksum.
+//! The pages of E57 files: each holds 1020 bytes of content and a checksum of 4 bytes.
 
-/// Bytes of a page before its checksum.
+/// Content bytes of a page, without its checksum.
 pub const CONTENT: usize = 1020;
 
-/// Bytes of a page.
+/// Bytes of a page, with its checksum.
 pub const PAGE: usize = 1024;
 
 /// The checksum of a page's content: CRC-32C, big-endian.

@@ -1,6 +1,9 @@
-//! What each pixel's depth and sums can be on the device, as intervals around the twins' values: a fragment that the
-//! bounds leave undecided (at a rim, at epsilon, at the near depth) may be in or out, all others must be as the twin
-//! says. No pixel is excused; how many are left undecided is counted.
+//! Intervals that must contain each pixel's depth and sums on the device, around the values of the
+//! twins.
+//!
+//! A fragment that the bounds leave undecided (at a rim, at epsilon, at the near depth) may be in
+//! or out; all others must be as in the twin. No pixel is excused, and the undecided ones are
+//! counted.
 
 use epsplat::low_level::passes::footprint::footprint;
 use epsplat::low_level::passes::splat::Splat;
@@ -23,7 +26,7 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
-    /// Infinite where it reaches down to zero or up to infinity.
+    /// `high / low - 1`, or infinity if the interval reaches zero or infinity.
     pub fn relative_width(&self) -> f64 {
         if self.low > 0.0 && self.high.is_finite() { self.high / self.low - 1.0 } else { f64::INFINITY }
     }
@@ -34,53 +37,58 @@ impl Interval {
     }
 }
 
-/// Everything about one pixel.
+/// The enclosure of one pixel.
 #[derive(Clone, Debug)]
 pub struct Pixel {
-    /// Nearest depth, world units.
+    /// Nearest depth, world units. The upper end is infinite if the pixel may be background.
     pub nearest: Interval,
     pub count: (u32, u32),
     pub weight: Interval,
-    /// Weighted sums of colour and normal, mapped to [0, 1].
+    /// Weighted colour sums, mapped to [0, 1].
     pub color: [Interval; 4],
     pub normal: [Interval; 3],
-    /// Mean depth, world units.
+    /// Depths of the accepted fragments, so of their mean too; world units.
     pub depth: Interval,
-    /// Largest relative error of the depth of one of its fragments.
+    /// Largest relative width of the depth interval of one of its fragments.
     pub depth_error: f64,
-    /// Of fronts and of backs, the least depth that one may have and the greatest that the nearest surely has.
+    /// For front faces (0) and back faces (1): the least possible depth, and an upper bound of the
+    /// nearest depth.
     pub sides: [Interval; 2],
 }
 
 impl Pixel {
-    /// Whether its nearest fragment is a back, if that is known.
+    /// Whether the nearest fragment is a back face; `None` if undecided.
     fn back(&self) -> Option<bool> {
         let [front, back] = self.sides;
         let nearer = |a: Interval, b: Interval| a.high < b.low;
         if nearer(front, back) { Some(false) } else { nearer(back, front).then_some(true) }
     }
 
-    /// All its fragments are surely in or surely out.
+    /// Whether every fragment is surely in or surely out.
     pub fn decided(&self) -> bool {
         self.count.0 == self.count.1
     }
 }
 
-/// Absolute error of a kernel weight at rho: WGSL grants exp 3 + 2 |x| units and sqrt the error of `1 / inverseSqrt`, 5
-/// units; the argument of exp takes three roundings.
+/// Absolute error of a kernel weight at rho.
+///
+/// WGSL allows exp an error of 3 + 2 |x| ulp, and sqrt that of `1 / inverseSqrt`, 5 ulp; the
+/// argument of exp is rounded three times.
 fn weight_error(kernel: Kernel, rho: f64) -> f64 {
     let exponential =
         |exponent: f64, power: f64| (-exponent).exp() * ((3.0 + 2.0 * exponent) * 2.0 * E + power * exponent * E);
     match kernel {
         Kernel::Gaussian { sigma } => exponential(0.5 * (rho / sigma).powi(2), 3.0),
         Kernel::Ellipse { a, n, smooth } => {
-            // pow is exp2(y log2 x): its error grows with the logarithm, which is small where the weight is not.
+            // pow is exp2(y log2 x): its error grows with the logarithm, which is small where the
+            // weight is large.
             let power = if [2.0, 3.0, 4.0].contains(&n) { 3.0 } else { 64.0 };
             let error = exponential(a * rho.powf(n), power);
-            // The step and 1 - step are rounded, the difference and the quotient too.
+            // The step, 1 - step, the difference and the quotient are all rounded.
             if smooth { (error + 5.0 * E) / (1.0 - (-a).exp()) } else { error }
         }
-        // 1 - rho errs by 11 E and is raised to the power; powers that the kernel has no products for are no test's.
+        // 1 - rho has an error of 11 E and is raised to the power. Tests only use powers that the
+        // kernel computes by products.
         Kernel::Cone { power } => {
             let height = (1.0 - rho).max(0.0);
             (height + 11.0 * E).powf(power) - height.powf(power) + 12.0 * E * height.powf(power)
@@ -97,7 +105,7 @@ struct Candidate {
     splat: usize,
 }
 
-/// The enclosures of an image.
+/// Computes the enclosure of each pixel of an image.
 pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: &[Splat]) -> Vec<Pixel> {
     let (width, height) = (camera.width, camera.height);
     let blank = Pixel {
@@ -110,7 +118,7 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
         depth_error: 0.0,
         sides: [Interval { low: f64::INFINITY, high: f64::INFINITY }; 2],
     };
-    // A bit of a depth says which side it is of.
+    // One bit of a stored depth tells front from back faces, which costs precision.
     let sided = Sides::of(&Facts::of(scene), camera, options) == Sides::Nearest;
     let of_side = if sided { 2.0 * E } else { 0.0 };
     let mut pixels = vec![blank; camera.pixels()];
@@ -119,7 +127,8 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
     for (index, splat) in splats.iter().enumerate() {
         let precision = Precision::of(splat, scene, camera);
         open[index] = precision.side_is_open();
-        // A pixel more on each side: what the twin's bounds leave out must be out for other reasons too.
+        // One pixel more on each side: pixels outside the twin's bounds must fail the other tests
+        // too.
         for y in splat.first[1].saturating_sub(1)..=(splat.last[1] + 1).min(height - 1) {
             for x in splat.first[0].saturating_sub(1)..=(splat.last[0] + 1).min(width - 1) {
                 let Some((at, _)) = footprint(splat, camera, LowPass::None, x, y) else { continue };
@@ -165,7 +174,7 @@ fn accumulate(
 ) {
     let (low, high) = scene.color_range();
     let (_, _, of_radius) = options.epsilon.parts();
-    // Of the comparison with the farthest accepted depth: a radius takes eight more roundings.
+    // Rounding of the comparison with the farthest accepted depth; a radius adds eight roundings.
     let of_ray = matches!(options.epsilon, Epsilon::Ray(_));
     let rounding = if of_radius > 0.0 || of_ray { 12.0 * E } else { 4.0 * E };
     for candidate in candidates {
@@ -181,7 +190,7 @@ fn accumulate(
         if side.is_some_and(|back| back != (splat.away && splat.sides == Sides::Nearest)) && !open[candidate.splat] {
             continue;
         }
-        // What is nearest itself is accepted whatever its depth is.
+        // Only a fragment in front of the limit for the nearest possible depth is surely accepted.
         let sure =
             candidate.sure && side.is_some() && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - rounding);
         let weight_at = |rho: f64| options.kernel.weight(rho.min(1.0).powi(2));
@@ -189,7 +198,8 @@ fn accumulate(
         let (near_rim, near_center) = (candidate.rho.high, candidate.rho.low);
         let least = if sure { (weight_at(near_rim) - error_at(near_rim)).max(0.0) } else { 0.0 };
         let most = weight_at(near_center) + error_at(near_center);
-        // Rounding to whole units is one unit for the weight and one more for each term; a term is rounded to f32 before.
+        // Rounding to whole units costs one unit for the weight and one more for each term; a term
+        // is rounded to f32 first.
         let add = |sum: &mut Interval, value: Interval, units: f64| {
             let low = (least * (value.low - 5.0 * E).max(0.0) - units * UNIT).max(0.0);
             let high = most * (value.high + 5.0 * E).min(1.0) + units * UNIT;
@@ -200,7 +210,7 @@ fn accumulate(
         for (k, value) in [r * alpha, g * alpha, b * alpha, alpha].into_iter().enumerate() {
             let span = f64::from(high[k]) - f64::from(low[k]);
             let mapped = if span > 0.0 { (f64::from(value) - f64::from(low[k])) / span } else { 0.0 };
-            // The difference from the low end may be exact to 1e of the larger magnitude only.
+            // The difference from the low end is accurate only to 1 E of the larger magnitude.
             let blur = if span > 0.0 { 2.0 * E * f64::from(low[k].abs().max(high[k].abs())) / span } else { 0.0 };
             add(&mut pixel.color[k], Interval { low: mapped - blur, high: mapped + blur }, 2.0);
         }

@@ -1,5 +1,7 @@
-//! Files of Gaussians, and an oracle for their pictures that shares nothing with the program: rays and planes in f64, harmonics from
-//! associated Legendre polynomials, all fragments sorted.
+//! Files of Gaussians, and an oracle for their pictures that shares no code with the program.
+//!
+//! The oracle intersects rays and planes in f64, evaluates harmonics by associated Legendre
+//! polynomials, and sorts all fragments.
 
 use std::f64::consts::PI;
 
@@ -8,23 +10,23 @@ use glam::{DQuat, DVec3};
 
 use super::Random;
 
-/// A Gaussian as files have it.
+/// A Gaussian as stored in a file.
 #[derive(Clone, Debug)]
 pub struct Gaussian {
     pub position: [f32; 3],
-    /// Logarithms of two standard deviations, or of three.
+    /// Logarithms of two or three standard deviations.
     pub scales: Vec<f32>,
-    /// w, x, y, z.
+    /// Quaternion w, x, y, z.
     pub rotation: [f32; 4],
-    /// Before the logistic function.
+    /// Opacity before the logistic function.
     pub opacity: f32,
     pub base: [f32; 3],
-    /// Red, then green, then blue.
+    /// Higher harmonics: all of red, then of green, then of blue.
     pub rest: Vec<f32>,
 }
 
 impl Gaussian {
-    /// A round one of standard deviation `sigma`, opaque but for `opacity`, of one colour, that faces along z.
+    /// A round Gaussian of standard deviation `sigma` and one colour that faces along z.
     pub fn round(position: [f32; 3], sigma: f32, opacity: f64, color: [f64; 3]) -> Self {
         Self {
             position,
@@ -36,13 +38,13 @@ impl Gaussian {
         }
     }
 
-    /// Its opacity, as f32 has it.
+    /// The opacity, from the stored f32.
     pub fn alpha(&self) -> f64 {
         1.0 / (1.0 + (-f64::from(self.opacity)).exp())
     }
 }
 
-/// A binary file of them.
+/// Encodes the Gaussians as a binary PLY file.
 pub fn file(gaussians: &[Gaussian]) -> Vec<u8> {
     let first = &gaussians[0];
     let mut names: Vec<String> =
@@ -63,7 +65,8 @@ pub fn file(gaussians: &[Gaussian]) -> Vec<u8> {
     bytes
 }
 
-/// Gaussians about a torus of radii 1 and 0.4, most of them in its surface, with harmonics of `degree`.
+/// Gaussians near a torus of radii 1 and 0.4, most of them on its surface, with harmonics of degree
+/// `degree`.
 pub fn torus(count: usize, degree: u32, seed: u64) -> Vec<Gaussian> {
     let mut random = Random(seed);
     let spacing = (4.0 * PI * PI * 0.4 / count as f64).sqrt();
@@ -88,11 +91,11 @@ pub fn torus(count: usize, degree: u32, seed: u64) -> Vec<Gaussian> {
     (0..count).map(one).collect()
 }
 
-/// The real spherical harmonic of degree `l` and order `m`, with the factor (-1)^m of Condon and Shortley.
+/// The real spherical harmonic of degree `l` and order `m`, with the Condon-Shortley factor (-1)^m.
 pub fn harmonic(l: i32, m: i32, direction: DVec3) -> f64 {
     let order = m.abs();
     let (cosine, sine) = (direction.z, direction.truncate().length());
-    // P_m^m, then upward in degree.
+    // The recurrence starts at P_m^m and goes up in degree.
     let (mut below, mut own) = (0.0, (1..=order).map(|k| -f64::from(2 * k - 1) * sine).product::<f64>());
     for degree in order + 1..=l {
         let next = (f64::from(2 * degree - 1) * cosine * own - f64::from(degree + order - 1) * below)
@@ -109,20 +112,20 @@ pub fn harmonic(l: i32, m: i32, direction: DVec3) -> f64 {
     }
 }
 
-/// A Gaussian as the oracle sees it.
+/// A Gaussian prepared for the oracle's camera.
 struct Seen {
     center: DVec3,
-    /// Unit vectors along its axes, and its standard deviations.
+    /// Unit vectors along its two axes.
     axes: [DVec3; 2],
     sigmas: [f64; 2],
     alpha: f64,
     color: [f64; 3],
     image: [f64; 2],
-    /// The depths of its disk.
+    /// The least and greatest depth of its disk.
     depths: [f64; 2],
 }
 
-/// So many standard deviations reach as far as anything shows.
+/// Radius in standard deviations beyond which alpha is below 1/255: sqrt(2 ln 255).
 fn extent() -> f64 {
     (2.0 * 255f64.ln()).sqrt()
 }
@@ -151,7 +154,7 @@ impl Seen {
         Self { center, axes, sigmas, alpha: gaussian.alpha(), color, image, depths: [seen.z - half, seen.z + half] }
     }
 
-    /// Depth and alpha at a pixel's centre, and whether that is certain.
+    /// Returns depth, alpha and whether they are certain at an image position (a pixel's centre).
     fn at(&self, camera: &Camera, [x, y]: [f64; 2]) -> Option<(f64, f64, bool)> {
         let ray = camera.ray(x, y);
         let normal = self.axes[0].cross(self.axes[1]);
@@ -162,7 +165,7 @@ impl Seen {
         let rho2 = if depth > 0.0 { disk.min(round) } else { round };
         let alpha = self.alpha * (-0.5 * rho2).exp();
         let certain = (alpha * 255.0 - 1.0).abs() > 1e-4;
-        // A plane that goes away past infinity is as far as it can be.
+        // A plane that recedes past infinity counts as infinitely far.
         let plane = if depth > 0.0 { depth } else { f64::INFINITY };
         let depth = if disk <= round { plane } else { plane.clamp(self.depths[0], self.depths[1]) };
         (rho2 <= extent().powi(2) && alpha >= 1.0 / 255.0)
@@ -171,11 +174,13 @@ impl Seen {
     }
 }
 
-/// The picture that the published formulas make, codes of sRGB premultiplied by alpha, and whether nothing in it depends on rounding.
+/// Renders by the published formulas: sRGB codes premultiplied by alpha, and whether the pixel is
+/// independent of rounding.
 pub fn picture(gaussians: &[Gaussian], camera: &Camera) -> Vec<([f64; 4], bool)> {
     let mut lists = vec![Vec::new(); camera.pixels()];
     for seen in gaussians.iter().map(|gaussian| Seen::of(gaussian, camera)) {
-        // Of its sphere, and at least of the low-pass.
+        // Half the width of the searched square: a bounding sphere, and at least the low-pass;
+        // pixels.
         let nearest = seen.depths[0].max(1e-3);
         let reach = (extent() * seen.sigmas[0].max(seen.sigmas[1]) * camera.fx / nearest * 1.5).max(4.0);
         let range = |k: usize, size: u32| {

@@ -1,11 +1,12 @@
-//! Scenes of a test's own, judged pixel by pixel by the bounds of the hard cases.
+//! Judges a test's own scene pixel by pixel by the derived bounds of the hard cases.
 
 use epsplat::low_level::hardcases::{HardCase, Verdict};
 use epsplat::low_level::plan::{Accumulator, RenderOptions};
 use epsplat::low_level::render::Backend;
 use epsplat::low_level::scene::{Camera, Scene, Shading};
 
-/// Fails if the device's image of `scene`, of which the reference covers such a share of pixels, exceeds its derived bound anywhere.
+/// Fails if any pixel of the device's image exceeds its derived bound, or if the share of pixels
+/// that the reference covers is outside `covered`.
 pub fn judge(
     name: &str,
     (scene, camera): (&Scene, &Camera),

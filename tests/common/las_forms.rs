@@ -1,13 +1,14 @@
-//! LAS and LAZ files in forms that the `las` crate does not write.
+//! LAS and LAZ files in variants that the `las` crate does not write.
 
 #![allow(dead_code)]
 
-/// Where a file's LASzip record begins.
+/// Returns the offset of the LASzip record's data.
 pub fn laszip_record(bytes: &[u8]) -> usize {
     bytes.windows(14).position(|window| window == b"laszip encoded").unwrap() + 52
 }
 
-/// A file of at most 50,000 points as LASzip wrote it before there were chunks: their one chunk, without its place in a table.
+/// A LAZ file as LASzip wrote it before it had chunks: one chunk without a chunk table. The input
+/// has at most 50,000 points.
 pub fn pointwise(bytes: &[u8], chunk_size: u32) -> Vec<u8> {
     let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
     let table = u64::from_le_bytes(*bytes[start..].first_chunk().unwrap()) as usize;
@@ -18,7 +19,8 @@ pub fn pointwise(bytes: &[u8], chunk_size: u32) -> Vec<u8> {
     pointwise
 }
 
-/// The same file as of LAS 1.5: eighteen bytes more at the end of the header. `bytes` is of 1.4, with the counts of both.
+/// The same file as LAS 1.5, whose header is 18 bytes longer. `bytes` is LAS 1.4 with legacy and
+/// 64-bit point counts.
 pub fn of_las_1_5(bytes: &[u8]) -> Vec<u8> {
     let longer = |bytes: &mut Vec<u8>, at: usize| {
         let place = u32::from_le_bytes(*bytes[at..].first_chunk().unwrap()) + 18;
@@ -33,12 +35,13 @@ pub fn of_las_1_5(bytes: &[u8]) -> Vec<u8> {
         let start = u32::from_le_bytes(*newer[96..].first_chunk().unwrap()) as usize;
         longer(&mut newer, start);
     }
-    // 1.5 has no counts where earlier versions do; what is there means nothing.
+    // LAS 1.5 ignores the legacy point counts, so they are filled with garbage.
     newer[107..131].fill(7);
     newer
 }
 
-/// A compressed file with a LASzip record under a name that is nearly its own, and after it the one that counts, which has no items.
+/// A compressed file with a decoy LASzip record, whose name differs by one letter, before the valid
+/// one, which has no items.
 pub fn with_another_record(bytes: &[u8]) -> Vec<u8> {
     let data = laszip_record(bytes);
     let length = 54 + usize::from(u16::from_le_bytes([bytes[data - 34], bytes[data - 33]]));

@@ -10,7 +10,8 @@ use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Cull, Detail, Hierarchy, Mipmap, Provenance, Scene};
 use epsplat::low_level::surfels::hierarchy;
 
-/// The twin's cut as a scene of its own, with what is known of all that it is a cut of: then kernels work in the same units.
+/// The twin's cut as a scene, with the facts of the whole scene, so that kernels use the same
+/// units.
 pub struct Cut {
     pub scene: Scene,
     facts: Facts,
@@ -46,7 +47,7 @@ pub fn tree(scene: &Scene) -> &Hierarchy {
     scene.hierarchy.as_ref().unwrap()
 }
 
-/// What the twin draws, and how.
+/// Returns the cut that the twin selects, and the options to draw it with.
 pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
     let back = options.cull == Cull::Back;
     let cut = select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(
@@ -57,7 +58,7 @@ pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, Ren
     let whole = Facts::of(scene);
     let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
     let surfels = cut.surfels.len() as u64;
-    // As kernels of the whole scene have it.
+    // Caps are declared as for the whole scene.
     let caps = whole.caps || (options.draws_node_caps() && whole.levels.is_some_and(|levels| levels.caps));
     let facts = Facts {
         surfels,

@@ -6,12 +6,13 @@ use std::f64::consts::TAU;
 use epsplat::io::Mesh;
 use glam::DVec3;
 
-/// The unit sphere as an octahedron whose faces were cut in four `cuts` times, with normals at its corners or without.
+/// A unit sphere: an octahedron whose faces are split into four `cuts` times, with or without
+/// corner normals.
 pub fn sphere(cuts: u32, smooth: bool) -> Mesh {
     let mut positions = DVec3::AXES.iter().flat_map(|&axis| [axis, -axis]).collect::<Vec<_>>();
     let mut triangles = Vec::new();
     for (x, y, z) in [0, 1].into_iter().flat_map(|x| [2, 3].into_iter().flat_map(move |y| [(x, y, 4), (x, y, 5)])) {
-        // An even number of negative half-axes keeps the turn of (x, y, z).
+        // An even number of negative axes keeps the orientation of (x, y, z).
         triangles.push(if (x + y + z) % 2 == 0 { [x, y, z] } else { [x, z, y] });
     }
     for _ in 0..cuts {
@@ -35,7 +36,8 @@ pub fn sphere(cuts: u32, smooth: bool) -> Mesh {
     Mesh { positions: positions.iter().map(DVec3::to_array).collect(), triangles, normals, ..Mesh::default() }
 }
 
-/// A bar along z from -1 to 1 whose profile is a regular polygon of `sides` sides and radius 0.6.
+/// A bar along z from -1 to 1, whose profile is a regular polygon with `sides` sides and radius
+/// 0.6.
 pub fn bar(sides: u32) -> Mesh {
     let at = |k: u32, z: f64| {
         let (sin, cos) = (TAU * f64::from(k) / f64::from(sides)).sin_cos();

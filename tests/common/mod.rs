@@ -1,4 +1,5 @@
-//! What the kernels' tests share: the adapter, all needs, seeded numbers, scenes, and the derived error bounds.
+//! Shared by the kernel tests: the adapter, all sets of needs, seeded numbers, scenes, and the
+//! derived error bounds.
 
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -26,30 +27,32 @@ use epsplat::low_level::plan::{
 use epsplat::low_level::scene::facing::POINT_SHAPES;
 use epsplat::low_level::scene::{Join, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
-/// What one unit in a sum of the accumulator `fixed` is of a full weight.
+/// One unit of a sum of the accumulator `fixed`, as a fraction of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
 
-/// The adapter, or `None` with a line on stderr where there is none and none is required.
+/// Opens the adapter under test; `None`, with a line on stderr, if there is none and none is
+/// required.
 pub fn gpu() -> Option<Gpu> {
     open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref(), "EPSPLAT_REQUIRE_ADAPTER")
 }
 
-/// The same adapter with what every WebGPU implementation has, and no more.
+/// The same adapter, limited to the features that every WebGPU implementation has.
 pub fn core_gpu() -> Option<Gpu> {
     static CORE: OnceLock<Gpu> = OnceLock::new();
     let open = || Gpu::open_core(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()).unwrap();
     gpu().map(|_| CORE.get_or_init(open).clone())
 }
 
-/// An adapter that is reached through OpenGL, whatever others there are; `None` as of [`gpu`].
+/// Opens an OpenGL adapter even if there are others; `None` as for [`gpu`].
 pub fn opengl() -> Option<Gpu> {
     open(Some("gl"), "EPSPLAT_REQUIRE_OPENGL")
 }
 
-/// The device of this name, which all tests of a program share: most of their time would else go to compile the same kernels again.
+/// Opens the device of this name once for all tests of a program; otherwise most time would go to
+/// compiling the same kernels.
 fn open(name: Option<&str>, required: &str) -> Option<Gpu> {
     static OPENED: Mutex<Vec<(Option<String>, Gpu)>> = Mutex::new(Vec::new());
-    // A poisoned lock means that another test panicked while it opened one; the list is whole.
+    // A poisoned lock means that another test panicked while opening a device; the list is intact.
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, gpu)) = opened.iter().find(|(known, _)| known.as_deref() == name) {
         return Some(gpu.clone());
@@ -67,8 +70,8 @@ fn open(name: Option<&str>, required: &str) -> Option<Gpu> {
     }
 }
 
-/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics, or subgroups for tiles to gather
-/// with, if they would replace it.
+/// The adapter, limited so that `fixed` runs the kernel in `file`: without 64-bit atomics, or
+/// without subgroups for gathering tiles, where those would select another kernel.
 pub fn gpu_for(file: &str) -> Option<Gpu> {
     let mut gpu = gpu()?;
     gpu.adapter.subgroups &= !file.starts_with("accum");
@@ -77,7 +80,7 @@ pub fn gpu_for(file: &str) -> Option<Gpu> {
     Some(gpu)
 }
 
-/// The accumulators that the adapter can run; of each other one a line on stderr.
+/// The accumulators that the adapter can run; each other one is reported on stderr.
 pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
     let able = |row: &&AccumulatorRow| {
         check::sums(&gpu.adapter, row.of).inspect_err(|why| eprintln!("skipped: {why}")).is_ok()
@@ -85,9 +88,12 @@ pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
     ACCUMULATORS.iter().filter(able).collect()
 }
 
-/// A sample of the sets of needs that renders have: every one of the eight that say what is blended and written, with the first
-/// accumulator and one kernel, and of each other accumulator, kernel and form of epsilon a dozen, others for each. All that go
-/// together meet two by two (`tests/kernels/shaders.rs`).
+/// A sample of the sets of needs that renders have.
+///
+/// It has every combination of the eight bits that say what is blended and written, with the first
+/// accumulator and one kernel, and a dozen for each combination of accumulator, kernel and form of
+/// epsilon, each time others. All values that can be combined occur in pairs
+/// (`tests/kernels/shaders.rs`).
 pub fn all_needs() -> Vec<SceneNeeds> {
     let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Cone, KernelShape::Constant];
     let mut base = base_needs();
@@ -102,7 +108,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         for kernel in shapes {
             for epsilon in [EpsilonForm::Depth, EpsilonForm::Radius, EpsilonForm::Ray] {
                 for _ in 0..12 {
-                    // A step that shares no factor with the number of needs, so that it comes to all of them.
+                    // The step is coprime to the number of needs, so all are reached.
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.of;
@@ -125,7 +131,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         }
     }
     let rastered: Vec<_> = base.iter().filter(|needs| needs.color != ColorNeed::Textured).collect();
-    // The rasteriser's, with as many targets as the sums take.
+    // Needs of the rasteriser, with as many targets as the sums require.
     for (step, (depth, _)) in (0..240).zip(RasterDepth::ALL.iter().cycle()) {
         let (kernel, base) = (shapes[step / 2 % 4], rastered[(step * 101) % rastered.len()]);
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
@@ -203,12 +209,12 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all
 }
 
-/// Those of a render that keeps all its splats and draws each by itself.
+/// These needs with all splats kept and each drawn by itself.
 fn scattered(needs: &SceneNeeds) -> SceneNeeds {
     SceneNeeds { tiles: false, gather: false, subgroups: false, cull: false, ..*needs }
 }
 
-/// Those of renders in which surfaces show through each other, a third of what they could be.
+/// Needs of renders with transparent surfaces in fragment lists, for a third of the candidates.
 fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let fits = |needs: &&SceneNeeds| {
         let fixed = needs.accumulator == Accumulator::Fixed && needs.raster.is_none() && needs.winner.is_none();
@@ -224,7 +230,7 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         ];
         let lit = needs.shading != Shading::Unlit;
         let lists = [Lists::Layers, Lists::Sorted][step % 2];
-        // Of sorted fragments there is no tail.
+        // Sorted fragments have no tail.
         let others: &[Map] = if lists == Lists::Sorted { &[Map::Tail] } else { &[] };
         SceneNeeds {
             lists: Some(lists),
@@ -240,13 +246,14 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
 }
 
-/// Those of renders that sum all fragments of a pixel, a third of what they could be.
+/// Needs of order-independent transparency, which sums all fragments of a pixel, for a third of the
+/// candidates.
 fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let fits = |needs: &&SceneNeeds| {
         let stored = needs.raster.is_none() && needs.winner.is_none() && needs.lists.is_none();
         let of_words = matches!(needs.accumulator, Accumulator::Fixed32 | Accumulator::Packed64);
         let textured = needs.color == ColorNeed::Textured;
-        // Splats are lit.
+        // Only splats can be lit, not pixels.
         stored && !of_words && !needs.copies && !textured && (needs.lit_splats || needs.shading == Shading::Unlit)
     };
     let of = |(step, needs): (usize, &SceneNeeds)| {
@@ -265,7 +272,7 @@ fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
 }
 
-/// Those of renders of triangles beside splats, a third of what they could be.
+/// Needs of renders that draw triangles beside splats, for a third of the candidates.
 fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let drawn = |needs: &SceneNeeds| {
         let exact = needs.raster.is_some_and(|raster| raster.depth == RasterDepth::Exact);
@@ -287,7 +294,7 @@ fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     all.iter().filter(opaque).step_by(3).enumerate().map(of).collect()
 }
 
-/// Those of renders whose inputs are kept apart, a fifth of what they could be.
+/// Needs of renders that do not blend different inputs, for a fifth of the candidates.
 fn kept_apart(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let opaque = |needs: &&SceneNeeds| needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none();
     let blended = |needs: &&SceneNeeds| needs.winner.is_none() && !needs.copies;
@@ -298,14 +305,14 @@ fn kept_apart(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     all.iter().filter(opaque).filter(blended).step_by(5).map(of).collect()
 }
 
-/// Those of renders of cuts of levels of detail, a third of what they could be.
+/// Needs of renders of cuts of levels of detail, for a third of the candidates.
 fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let of_disks = |needs: &&SceneNeeds| needs.facing.is_none() && !needs.separate && !needs.maps.has(Map::Index);
     let with_colors =
         |needs: &&SceneNeeds| matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
     let of = |(step, needs): (usize, &SceneNeeds)| {
         let fades = step % 2 == 0 && needs.sums_by_compute() && needs.oit.is_none();
-        // Fades may be given, too.
+        // A few fades have no levels: they come with the scene.
         let levels = !fades || step % 16 > 0;
         let node_caps = levels && needs.curved && step % 4 < 3;
         SceneNeeds { levels, fades, node_caps, cull: needs.cull && !levels, ..*needs }
@@ -314,7 +321,7 @@ fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     disks.step_by(3).enumerate().map(of).collect()
 }
 
-/// Those of the rasteriser that peels layers.
+/// Needs of the rasteriser that peels layers.
 fn peeled(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let exact = |needs: &&SceneNeeds| needs.raster.is_some_and(|raster| raster.depth == RasterDepth::Exact);
     let of = |needs: &SceneNeeds| {
@@ -325,7 +332,7 @@ fn peeled(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     all.iter().filter(exact).filter(|needs| needs.winner.is_none()).map(of).collect()
 }
 
-/// Whether a render with `needs` could show the nearest fragments alone.
+/// Whether a render with `needs` could show only the nearest fragments.
 fn shows_nearest(needs: &SceneNeeds) -> bool {
     let kept = needs.maps.beside(Maps::COMPOSITED).but(&[Map::Depth]).is_empty();
     let colors = matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8);
@@ -333,7 +340,7 @@ fn shows_nearest(needs: &SceneNeeds) -> bool {
     kept && colors && !needs.normal && !needs.lit_splats && (exact || needs.maps.is_empty())
 }
 
-/// Several samples, not as many across as down.
+/// Several samples, with different counts across and down.
 const SAMPLED: Samples = Samples { across: 2, down: 4 };
 
 fn base_needs() -> Vec<SceneNeeds> {
@@ -342,7 +349,7 @@ fn base_needs() -> Vec<SceneNeeds> {
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
-        // Bits that have little to do with the others.
+        // Bits that are nearly independent of the others.
         let mixed = |k: u32| bits.wrapping_mul(0x9e37_79b9) >> k & 1 == 1;
         let (lit, normal_map, sides, alpha) = (bit(0), bit(1), bit(2), bit(3));
         let lit_splats = lit && mixed(24);
@@ -378,7 +385,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 doubled: bits.count_ones() % 5 < 2,
                 tiles: bits * 37 / 8 % 4 == 0,
                 gather: bits * 37 / 8 % 8 == 0,
-                // Both, of each of the others.
+                // Both values occur with both values of each other field.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits * 29 / 16 % 2 == 0,
                 raster: None,
@@ -405,13 +412,14 @@ fn base_needs() -> Vec<SceneNeeds> {
     all
 }
 
-/// The frame's bits: equality of floats would take -0 for 0 and no NaN for itself.
+/// The frame's bits: float equality would equate -0 and 0, and a NaN never equals itself.
 pub fn bits(frame: &Frame) -> Vec<u32> {
     let maps = [Map::Normal, Map::Depth, Map::Weight, Map::Count].into_iter().filter_map(|map| frame.map(map));
     frame.color.iter().flatten().chain(maps.flatten()).map(|value| value.to_bits()).collect()
 }
 
-/// The length of the interval behind the nearest depth `front` in which the device measures depths, world units.
+/// Length of the depth interval behind the nearest depth `front` that the device measures, world
+/// units.
 pub fn depth_span(view: &View, front: f64) -> f64 {
     let world = f64::from(view.world);
     let of_radius = (f64::from(view.epsilon_deepest) * f64::from(view.world)).min(front * f64::from(view.epsilon_most));

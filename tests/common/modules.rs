@@ -1,4 +1,4 @@
-//! The modules of all needs: joined, parsed and validated once for all tests of a binary.
+//! The WGSL modules of all needs, joined, parsed and validated once for all tests of a program.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::all_needs;
 
-/// What [`reflect`] makes of a text.
+/// The result of [`reflect`] for a module's text.
 pub struct Reflected {
     pub module: naga::Module,
     pub bindings: Bindings,
@@ -24,16 +24,16 @@ pub struct Reflected {
 /// A module of a render with `needs`.
 pub struct Made {
     pub needs: SceneNeeds,
-    /// The files that are joined.
+    /// The joined files.
     pub files: Vec<&'static str>,
     /// The kernels that the render dispatches.
     pub kernels: Vec<Kernel>,
-    /// Index of its text among the different ones.
+    /// Index of its text in [`All::texts`].
     text: usize,
 }
 
 impl Made {
-    /// It is the tiles'.
+    /// Whether it is a module of tiles.
     pub fn of_tiles(&self) -> bool {
         self.files.contains(&"tile.wgsl")
     }
@@ -49,7 +49,7 @@ impl Made {
 
 struct All {
     made: Vec<Made>,
-    /// The different texts, in the order in which they come.
+    /// The distinct texts, in order of first use.
     texts: Vec<(String, Reflected)>,
 }
 
@@ -62,7 +62,7 @@ static ALL: LazyLock<All> = LazyLock::new(|| {
                 texts.push(sources.join(&files));
                 texts.len() - 1
             });
-            // What chooses a cut is made before that is known.
+            // Modules that select a cut are built before it is known how much is drawn.
             let needs = if kernels == CHOOSING { needs.before_cut() } else { needs };
             made.push(Made { needs, files, kernels, text });
         }
@@ -74,12 +74,12 @@ static ALL: LazyLock<All> = LazyLock::new(|| {
     All { texts: reflected.collect(), made }
 });
 
-/// The modules of each of all needs.
+/// The modules of all sets of needs.
 pub fn all() -> &'static [Made] {
     &ALL.made
 }
 
-/// Of all needs' modules the first with each text.
+/// The first module of each distinct text.
 pub fn different() -> Vec<&'static Made> {
     let mut known = 0;
     let is_new = |made: &&Made| {

@@ -1,4 +1,4 @@
-//! Numbers that depend on a seed alone.
+//! Random numbers that depend only on a seed.
 
 #![allow(dead_code)]
 
@@ -15,44 +15,44 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// A uniform number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Between `low` and `high`.
+    /// A uniform number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in the logarithm.
+    /// A number whose logarithm is uniform between those of `low` and `high`.
     pub fn scale(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// Puts `values` in another order.
+    /// Shuffles `values` (Fisher-Yates).
     pub fn shuffle<T>(&mut self, values: &mut [T]) {
         for k in (1..values.len()).rev() {
             values.swap(k, (self.bits() % (k as u64 + 1)) as usize);
         }
     }
 
-    /// A number less than `bound`; 0 for a bound of 0.
+    /// A number below `bound`, or 0 for a bound of 0.
     pub fn below(&mut self, bound: usize) -> usize {
         (self.bits() >> 11) as usize % bound.max(1)
     }
 
-    /// True once in `n` times.
+    /// True with probability 1/n.
     pub fn one_in(&mut self, n: usize) -> bool {
         self.below(n) == 0
     }
 
-    /// One of some choices.
+    /// One of the choices.
     pub fn pick<'a, T: ?Sized>(&mut self, choices: &[&'a T]) -> &'a T {
         choices[self.below(choices.len())]
     }
 
-    /// A count: often few, at most `most`.
+    /// A count of at most `most` that is often small.
     pub fn count(&mut self, most: usize) -> usize {
         match self.below(8) {
             0 => self.below(2),

@@ -1,4 +1,5 @@
-//! Seeded scenes of surfels of many kinds, made in camera space so that each kind is what its name says.
+//! Seeded scenes of surfels of many kinds, generated in camera space so that each kind looks as its
+//! name says.
 
 use epsplat::io::{Points, Texture};
 use epsplat::low_level::scene::camera::Lens;
@@ -9,30 +10,30 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Random;
 
-/// What a surfel looks like from the camera.
+/// How a surfel looks from the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Radius under two pixels.
     Small,
-    /// A few pixels.
+    /// Radius of a few pixels.
     Medium,
-    /// A good part of the image.
+    /// Covers much of the image.
     Large,
-    /// Cosine between view ray and normal 1e-2 to 1e-1.
+    /// The cosine between view ray and normal is 1e-2 to 1e-1.
     Tilted,
-    /// The same cosine from 1e-6 to 1e-1, centred on a pixel.
+    /// The same cosine is 1e-6 to 1e-1, and the centre projects to a pixel.
     EdgeOn,
-    /// Half-axes up to 1000:1.
+    /// Ratio of half-axes up to 1000:1.
     Anisotropic,
     /// Behind the camera.
     Behind,
-    /// Centred up to several images outside.
+    /// The centre is up to several image sizes outside the image.
     OffScreen,
-    /// Reaches the near depth.
+    /// Crosses the near depth.
     Crossing,
 }
 
-/// What a test case shows.
+/// A scene and the camera that sees it.
 pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
@@ -41,7 +42,8 @@ pub struct Case {
 
 pub const SIZE: (u32, u32) = (160, 120);
 
-/// A camera in the scene `origin + length * (a few units)`, off-centre and with different focal lengths.
+/// A camera for the region of a few `length` about `origin`, off-centre and with different focal
+/// lengths in x and y.
 fn camera(projection: Projection, origin: DVec3, length: f64, near: f64) -> Camera {
     let lens = match projection {
         Projection::Pinhole => Lens::Intrinsics([150.0, 140.0, 52.3, 71.9]),
@@ -87,7 +89,7 @@ fn surfel(kind: Kind, camera: &Camera, length: f64, near: f64, random: &mut Rand
         }
     };
     let radius = radius * per_pixel;
-    // A frame about the view ray, turned by a random angle, tilted, and turned in itself.
+    // A frame about the view ray: turned by a random angle, tilted, and turned in its own plane.
     let side = ray.any_orthonormal_vector();
     let (sin, cos) = random.between(0.0, std::f64::consts::TAU).sin_cos();
     let along = side * cos + ray.cross(side) * sin;
@@ -116,7 +118,7 @@ fn scene(kinds: &[(Kind, usize)], camera: &Camera, origin: DVec3, length: f64, n
         }
     }
     random.shuffle(&mut surfels);
-    // Colours beyond [0, 1] and differing in alpha: the widest case.
+    // Colours exceed [0, 1] and differ in alpha: the most general case.
     let mut channel = |low, high| random.between(low, high) as f32;
     let colors =
         surfels.iter().map(|_| [channel(-0.5, 3.0), channel(0.0, 1.0), channel(0.2, 0.9), channel(0.1, 1.0)]).collect();
@@ -165,7 +167,7 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// A closed unit sphere of `count` disks of `radius` times their spacing, in 8-bit colours.
+/// A closed unit sphere of `count` disks with 8-bit colours; `radius` is in units of their spacing.
 pub fn sphere(count: usize, radius: f64) -> Scene {
     let spacing = (4.0 * std::f64::consts::PI / count as f64).sqrt();
     let golden = 0.618_033_988_749_895_f64;
@@ -188,7 +190,7 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
     }
 }
 
-/// A view of [`sphere`] that it fills.
+/// A view in which [`sphere`] fills the image.
 pub fn sphere_camera(size: u32, projection: Projection) -> Camera {
     sphere_camera_with(
         size,
@@ -199,12 +201,12 @@ pub fn sphere_camera(size: u32, projection: Projection) -> Camera {
     )
 }
 
-/// The same through another lens.
+/// The view of [`sphere_camera`] through another lens.
 pub fn sphere_camera_with(size: u32, lens: Lens) -> Camera {
     Camera::look_at((size, size), lens, DVec3::new(1.2, 0.7, 2.4), DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
 }
 
-/// The same scene with its surfels in another order.
+/// The same scene with its surfels in random order.
 pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
     let mut order: Vec<usize> = (0..scene.surfels.len()).collect();
     Random(seed).shuffle(&mut order);
@@ -223,22 +225,22 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
     Scene { surfels, low, clips, caps, normals, colors, ..scene.clone() }
 }
 
-/// Scenes with many fragments on a pixel, in both kinds of colour.
+/// Scenes with many fragments on a pixel, with 8-bit and with f32 colours.
 pub fn crowded() -> Vec<(Scene, Camera)> {
     let mut all = vec![(sphere(4000, 4.0), sphere_camera(96, Projection::Pinhole))];
     all.extend(cases().into_iter().take(2).map(|case| (case.scene, case.camera)));
     all
 }
 
-/// An orthographic camera that looks along +z from the origin, a unit a pixel.
+/// An orthographic camera at the origin that looks along +z, with one pixel per world unit.
 pub fn front(size: u32) -> Camera {
     let half = f64::from(size) / 2.0;
     let lens = Lens::OrthographicScale([1.0, 1.0, half, half]);
     Camera::posed((size, size), lens, DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap()
 }
 
-/// `count` coincident disks over the whole image, to be drawn with a kernel of weight 1 everywhere, of linear colour
-/// `value`; and two out of sight that stretch the colours' range to [0, 1].
+/// `count` coincident disks that cover the image, of linear colour `value`, and two hidden ones
+/// that stretch the colour range to [0, 1]. Draw them with a kernel of weight 1.
 pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
     let mut surfels = vec![Surfel::disk(Vec3::new(0.2, 0.1, 5.0), Vec3::NEG_Z, 20.0); count];
     let mut colors = vec![[value, value, value, 1.0]; count];
@@ -258,7 +260,7 @@ pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
     (scene, front(4))
 }
 
-/// The generated surfels of a shape for which `keep` holds, without colours.
+/// The generated surfels of a shape for which `keep` returns true, without colours.
 pub fn generated(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Scene {
     let samples: Vec<Sample> = generate(shape, count).filter(keep).collect();
     let points = Points {
@@ -270,7 +272,7 @@ pub fn generated(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Sc
     build(vec![points], &()).unwrap().0
 }
 
-/// A sphere with a picture on it, or several, of which the second lets through.
+/// A sphere with one or several textures, of which the second is transparent.
 pub fn painted(pictures: u32) -> Scene {
     let scene = sphere(2000, 1.7);
     let centers: Vec<[f32; 3]> = scene.surfels.iter().map(|surfel| surfel.center).collect();
@@ -291,7 +293,8 @@ pub fn painted(pictures: u32) -> Scene {
     build_textured(vec![points], (0..pictures).map(picture).collect(), &()).unwrap().0
 }
 
-/// The scene with each surfel moved to or from its middle, so that nodes of levels of detail lie off what is below them and count as larger.
+/// The scene with each surfel scaled toward or away from its centre, so that nodes of levels of
+/// detail lie off their children and count as larger.
 pub fn roughened(mut scene: Scene) -> Scene {
     for (k, surfel) in scene.surfels.iter_mut().enumerate() {
         surfel.center = surfel.center.map(|c| c * (0.95 + 0.1 * (k * 37 % 97) as f32 / 97.0));

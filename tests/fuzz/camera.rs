@@ -1,4 +1,4 @@
-//! Camera files of random shape.
+//! Fuzzes camera files.
 
 use super::mutate::Grammar;
 use super::random::Random;
@@ -61,7 +61,7 @@ pub fn array(values: impl IntoIterator<Item = f64>) -> String {
     format!("[{}]", values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(", "))
 }
 
-/// A file that says each thing once; the number of points is the scene's own and not looked at.
+/// A file with each field once. It holds no points, so the returned count is ignored.
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let mut fields = Vec::new();
     let mut size = random.one_in(2);
@@ -132,7 +132,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     seen(file, valid)
 }
 
-/// Draws what the camera of a file sees.
+/// Draws the view of a camera file.
 pub fn seen(file: CameraFile, valid: Option<usize>) -> Result<Outcome, String> {
     let scene = &*SCENE;
     let near = file.near.unwrap_or_else(|| Camera::default_near(scene));
@@ -142,7 +142,7 @@ pub fn seen(file: CameraFile, valid: Option<usize>) -> Result<Outcome, String> {
     });
     match posed {
         Ok(camera) => draw(scene, &camera, &shaded(Shading::Lambert)),
-        Err(error) if valid.is_some() => Err(format!("a valid camera cannot be: {error}")),
+        Err(error) if valid.is_some() => Err(format!("a valid camera is refused: {error}")),
         Err(error) => sentence(&error, None).map(|()| Outcome::Read),
     }
 }

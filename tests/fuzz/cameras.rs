@@ -1,4 +1,4 @@
-//! Sets of cameras, as a transforms.json, of random shape.
+//! Fuzzes sets of cameras in a transforms.json.
 
 use super::camera::{array, seen};
 use super::mutate::Grammar;
@@ -48,7 +48,7 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-/// A file that says what it must; the number of points is the scene's own and not looked at.
+/// A file with the required fields. It holds no points, so the returned count is ignored.
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let lens = |random: &mut Random| match random.below(3) {
         0 => format!("\"camera_angle_x\": {}, ", random.between(0.1, 3.0)),
@@ -87,7 +87,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     for camera in &set {
         let leaves = camera.name.split('/').any(|part| matches!(part, "" | "." | ".."));
         if leaves || camera.name.contains(char::is_control) || !names.insert(&camera.name) {
-            return Err(format!("a picture would be called {:?}", camera.name));
+            return Err(format!("a picture would have the file name {:?}", camera.name));
         }
     }
     let outcomes = set.into_iter().map(|camera| seen(camera.camera, valid)).collect::<Result<Vec<_>, _>>()?;

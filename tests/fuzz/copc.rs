@@ -1,4 +1,4 @@
-//! COPC files of which some nodes are read.
+//! Fuzzes COPC files of which only some nodes are read.
 
 use std::path::Path;
 
@@ -25,13 +25,14 @@ pub const TARGET: Target = Target {
 
 static FILE: &[u8] = include_bytes!("../../data/simple.copc.laz");
 
-/// Places of numbers: the header's, those of the record about the octree, and the pages of it.
+/// Offsets and sizes of the numbers in the header, in the COPC info record and in the octree's
+/// pages.
 fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut places = las::numbers(bytes);
     places.extend((0..10).map(|k| (429 + 8 * k, 8)));
     if let Some(start) = bytes.get(469..477).and_then(|start| start.first_chunk()) {
         let start = usize::try_from(u64::from_le_bytes(*start)).unwrap_or(usize::MAX);
-        // A node: its level and place, where its chunk is, its bytes and its points.
+        // An entry of a node: level and position, offset and bytes of its chunk, number of points.
         let of_node = |node: usize| {
             [(0, 4), (4, 4), (8, 4), (12, 4), (16, 8), (24, 4), (28, 4)].map(|(at, size)| (32 * node + at, size))
         };
@@ -45,7 +46,7 @@ fn generate(_: &mut Random) -> (Vec<u8>, usize) {
     (FILE.to_vec(), 1065)
 }
 
-/// Reads every other node, then all.
+/// Reads every other node, then all nodes.
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let refused = |error: epsplat::Error| match valid {
         Some(_) => Err(format!("a valid file is refused: {error}")),
@@ -64,7 +65,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         let promised = file.octree.points(nodes);
         match file.read_raw(nodes, &ReadOptions::default(), &()) {
             Ok(points) if points.positions.len() as u64 > promised => {
-                return Err(format!("{} points of {promised} that the nodes have", points.positions.len()));
+                return Err(format!("{} points are read, but the nodes promise {promised}", points.positions.len()));
             }
             Ok(points) => counts.push(points.positions.len()),
             Err(error) => return refused(error),

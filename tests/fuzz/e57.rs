@@ -1,5 +1,7 @@
-//! E57 files of random attributes. They are damaged without the checksums of their pages, which are put in afterwards: with wrong
-//! ones every file would be refused at once.
+//! Fuzzes E57 files with random attributes.
+//!
+//! They are damaged without their page checksums, which are added afterwards; otherwise every
+//! damaged file would be refused at once.
 
 use super::e57_page::{CONTENT, PAGE, checksum};
 use super::mutate::Grammar;
@@ -54,7 +56,8 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-/// Numbers of the file's header, of the first section's and of its first packet's.
+/// Offsets and sizes of the numbers in the file header, in the first section and in its first
+/// packet.
 const NUMBERS: [(usize, usize); 19] = [
     (8, 4),
     (12, 4),
@@ -81,10 +84,10 @@ fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     NUMBERS.into_iter().filter(|&(at, size)| at + size <= bytes.len()).collect()
 }
 
-/// Puts the pages' checksums in and reads the file.
+/// Adds the page checksums and reads the file.
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let mut content = std::fs::read(path).unwrap();
-    // Where damage moved the end of the XML, the header follows it, so that what is in there is read.
+    // If damage moved the end of the XML, the header is updated, so that the XML is still read.
     if !content.len().is_multiple_of(CONTENT)
         && let Some(start) = content.windows(5).position(|window| window == b"<?xml")
         && let Some(length) = content[start..].windows(10).position(|window| window == b"</e57Root>")

@@ -1,4 +1,4 @@
-//! LAS and LAZ files of random version, point format and size, and a cloud-optimised one.
+//! Fuzzes LAS and LAZ files of random version, point format and size, and a COPC file.
 
 use super::las_forms::{of_las_1_5, pointwise};
 use super::mutate::Grammar;
@@ -24,7 +24,8 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-/// Reads and draws the points, and reads them with those that are deleted: so many more as were counted.
+/// Reads and draws the points, then reads again with withheld points, which must add as many as
+/// were counted.
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let outcome = render::points(path, valid)?;
     let all = io::read_with(path, ReadOptions { keep_withheld: true, ..ReadOptions::default() }, &());
@@ -41,7 +42,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     Ok(outcome)
 }
 
-/// Numbers of the public header block: places and sizes.
+/// Offsets and sizes of the numbers in the public header block.
 const HEADER: [(usize, usize); 30] = [
     (4, 2),
     (6, 2),
@@ -75,7 +76,7 @@ const HEADER: [(usize, usize); 30] = [
     (335, 8),
 ];
 
-/// Those, and the numbers of the LASzip record, of the chunk table and of the first chunk's layers.
+/// The same, with the LASzip record, the chunk table and the layers of the first chunk.
 pub(super) fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut places = HEADER.to_vec();
     if let Some(record) = bytes.windows(14).position(|window| window == b"laszip encoded") {
@@ -122,7 +123,7 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let place = [Place::Grid, Place::Survey, Place::One][random.below(3)];
     let (points, mut kept) = (random.count(120), 0);
     for _ in 0..points {
-        // Within what 32-bit coordinates reach at the finest scale.
+        // Within the range of 32-bit coordinates at the finest scale.
         let [x, y, z] = place.point(random).map(|c| c % 100.0);
         let is_withheld = random.one_in(16);
         kept += usize::from(!is_withheld);

@@ -1,5 +1,5 @@
-//! Files with levels of detail, as `epsplat lod` writes them: curved and clipped surfels under
-//! nodes, read whole and in parts.
+//! Fuzzes files with levels of detail as `epsplat lod` writes them: curved and clipped surfels
+//! under nodes, read whole and in parts.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-/// A cloud on a bent sheet, or anywhere, and the tree over it.
+/// A tree over a cloud, either on a bent sheet or anywhere in space.
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let count = 24 + random.below(120);
     let place = [Place::Unit, Place::Survey][random.below(2)];
@@ -68,7 +68,7 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     (std::fs::read(&path).unwrap(), count)
 }
 
-/// Read whole and drawn; then the part of it that a coarse picture takes.
+/// Reads and draws the whole file, then only the part that a coarse picture needs.
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let whole = render::points(path, valid)?;
     let levels = match Input::open(path, None).and_then(Levels::open) {

@@ -1,11 +1,13 @@
-//! The readers on valid files of random shape and on what mutation makes of them.
+//! Fuzzes the readers with valid files of random shape and with mutations of them.
 //!
-//! Every input is read; what can be read goes on to surfels and a reference image of 16 x 16 pixels. Whatever the bytes:
-//! nothing panics, hangs or takes memory that a header promised; an error is one line that names the file; a file left
-//! as it was generated is read whole; an image holds no NaN.
+//! Each input is read, and if that succeeds, turned into surfels and drawn by the reference at 16 x
+//! 16 pixels. For any bytes: nothing panics, hangs or allocates memory because a header promises
+//! data; an error is one line that names the file; an unmodified file is read completely; an image
+//! has no NaN.
 //!
-//! `EPSPLAT_FUZZ_SECONDS` is the time per format (2 if unset). Each input has a seed of its own, counted up from a start
-//! that is printed: `EPSPLAT_FUZZ_SEED` repeats a run, or with the seed that a failure names that one input first.
+//! `EPSPLAT_FUZZ_SECONDS` is the time per format (default 2). Each input has its own seed, counted
+//! up from a start that is printed. `EPSPLAT_FUZZ_SEED` sets that start: it repeats a run, or
+//! begins with the input of a seed that a failure names.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod camera;
@@ -38,28 +40,29 @@ use mutate::Grammar;
 use random::Random;
 use std::path::Path;
 
-/// What became of an input that broke no promise.
+/// The outcome for an input that broke no promise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Its reader refused it, in one line.
+    /// The reader refused it with a one-line error.
     Refused,
-    /// It was read, but holds nothing to draw or more than is worth drawing here, or is a camera that cannot be.
+    /// It was read, but has nothing to draw, too much to draw here, or an impossible camera.
     Read,
     /// It was read and drawn.
     Drawn,
 }
 
-/// One format's reader under test.
+/// The reader of one format under test.
 pub struct Target {
-    /// The format's name, also of its test.
+    /// The format's name, also used for its test.
     pub name: &'static str,
-    /// Extension of the files.
+    /// File extension.
     pub extension: &'static str,
-    /// A valid file, and how many points it holds.
+    /// Generates a valid file; returns it and its number of points.
     pub generate: fn(&mut Random) -> (Vec<u8>, usize),
-    /// How its files are best damaged.
+    /// Hints on how to damage its files.
     pub grammar: Grammar,
-    /// Reads the file and uses what it holds. With `valid`, the number of points to be found, refusing is an error.
+    /// Reads the file and uses its content. With `valid`, the expected number of points, a refusal
+    /// is an error.
     pub execute: fn(&Path, Option<usize>) -> Result<Outcome, String>,
 }
 

@@ -1,4 +1,4 @@
-//! MTL files beside an OBJ file and an image, as `render mesh.obj` and `render --triangles
+//! Fuzzes MTL files beside an OBJ file and an image, as `render mesh.obj` and `render --triangles
 //! mesh.obj` read them.
 
 use std::fmt::Write;
@@ -75,7 +75,7 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     (out.into_bytes(), 4)
 }
 
-/// Writes the mesh that names them beside the materials, and reads it as points and as triangles.
+/// Writes a mesh that names the materials next to them, and reads it as points and as triangles.
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let mesh = path.with_extension("obj");
     let name = path.file_name().unwrap_or_default().display();
@@ -83,11 +83,11 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let faces = "usemtl m\nf 1/1 2/2 3/3\nusemtl stone\nf 1/1 3/3 4/4\n";
     std::fs::write(&mesh, format!("mtllib {name}\n{corners}{faces}")).map_err(|error| error.to_string())?;
     std::fs::write(path.with_file_name("quad.png"), IMAGE).map_err(|error| error.to_string())?;
-    // An image that a material names may be missing, which is told or refused.
+    // An image that a material names may be missing; then there is a note or an error.
     let names_what_is_there = valid.filter(|_| !std::fs::read(path).is_ok_and(|text| has(&text, b"none.png")));
     let drawn = render::points(&mesh, names_what_is_there)?;
     match io::read_mesh(&mesh, &()) {
-        // Materials that cannot be read are left out and told.
+        // Unreadable materials are left out with a note.
         Ok(mesh) if mesh.triangles.len() == 2 => match mesh.notes.iter().find(|note| note.contains(char::is_control)) {
             Some(note) => Err(format!("a note is more than a line: {note:?}")),
             None if mesh.notes.is_empty() => Ok(drawn),
@@ -95,7 +95,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         },
         Ok(mesh) => Err(format!("two triangles became {}", mesh.triangles.len())),
         Err(error) if names_what_is_there.is_some() => Err(format!("valid materials are refused: {error}")),
-        // The error names the file that is wrong: the mesh, its materials or their image.
+        // The error names the faulty file: the mesh, its materials or their image.
         Err(error) => sentence(&error, None).map(|()| Outcome::Refused),
     }
 }

@@ -1,21 +1,21 @@
-//! Damage: to bytes, to numbers at known places, and to the words of a text.
+//! Damages files: bytes, numbers at known offsets, and the words of a text.
 
 use super::random::Random;
 use std::ops::Range;
 
-/// What is known of a format, so that its files are damaged where it hurts.
+/// Knowledge of a format, used to damage its files effectively.
 pub struct Grammar {
-    /// Words that mean something to the reader.
+    /// Words that the reader interprets.
     pub words: &'static [&'static str],
-    /// Characters beside white space that end a word.
+    /// Characters that end a word, besides white space.
     pub separators: &'static [u8],
-    /// Bytes from the start in which words are looked for.
+    /// Number of bytes from the start that are searched for words.
     pub text: usize,
-    /// Places and sizes of a file's binary numbers.
+    /// Returns offsets and sizes of a file's binary numbers.
     pub numbers: fn(&[u8]) -> Vec<(usize, usize)>,
 }
 
-/// Numbers at the borders of types, as text.
+/// Numbers at the limits of types, as text.
 const EXTREMES: [&str; 24] = [
     "0",
     "-0",
@@ -43,7 +43,7 @@ const EXTREMES: [&str; 24] = [
     "1e18",
 ];
 
-/// Bit patterns at the borders of types, floats among them.
+/// Bit patterns at the limits of integer and float types.
 const PATTERNS: [u64; 14] = [
     0,
     1,
@@ -61,7 +61,7 @@ const PATTERNS: [u64; 14] = [
     0x7fef_ffff_ffff_ffff, // the largest f64
 ];
 
-/// No input grows beyond this, bytes.
+/// Maximum size of an input, bytes.
 const LARGEST: usize = 1 << 17;
 
 /// Damages `bytes` in a few places; `other` is a second file of the format.
@@ -110,13 +110,13 @@ pub fn mutate(random: &mut Random, grammar: &Grammar, bytes: &mut Vec<u8>, other
     }
 }
 
-/// A place before `end`; half of the time near the start, where headers are.
+/// A position before `end`, half of the time near the start, where headers are.
 fn offset(random: &mut Random, end: usize) -> usize {
     let near = if random.one_in(2) { 400 } else { usize::MAX };
     random.below(end.min(near))
 }
 
-/// A run of up to `longest` bytes before `end`.
+/// A range of 1 to `longest` bytes that ends at or before `end`.
 fn range(random: &mut Random, end: usize, longest: usize) -> Range<usize> {
     let start = offset(random, end);
     start..(start + 1 + random.below(longest)).min(end)
@@ -129,7 +129,8 @@ fn on_byte(random: &mut Random, bytes: &mut [u8], change: impl FnOnce(&mut Rando
     }
 }
 
-/// Overwrites a binary number, at a known place if there is one, with a pattern, or moves it by one.
+/// Overwrites a binary number with an extreme pattern or changes it by one; its offset is a known
+/// one if the format has any.
 fn extreme_bits(random: &mut Random, grammar: &Grammar, bytes: &mut [u8]) {
     let known = (grammar.numbers)(bytes);
     let (at, size) = match known.get(random.below(known.len())) {
@@ -146,7 +147,7 @@ fn extreme_bits(random: &mut Random, grammar: &Grammar, bytes: &mut [u8]) {
     }
 }
 
-/// The words of the part that is text.
+/// The words in the text part.
 fn words(grammar: &Grammar, bytes: &[u8]) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut start = 0;

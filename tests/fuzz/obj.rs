@@ -1,4 +1,4 @@
-//! OBJ files of random shape.
+//! Fuzzes OBJ files.
 
 use super::mutate::Grammar;
 use super::random::{Place, Random};

@@ -1,4 +1,4 @@
-//! SuperSplat's compressed Gaussians.
+//! Fuzzes SuperSplat's compressed Gaussians.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! PCD files of random fields, in each of the three ways they are written.
+//! Fuzzes PCD files with random fields, in ASCII, binary and compressed binary form.
 
 use super::mutate::Grammar;
 use super::random::{Place, Random};
@@ -43,10 +43,10 @@ pub const TARGET: Target = Target {
     execute: render::points,
 };
 
-/// What ends the header of compressed data.
+/// Last line of the header of compressed data.
 const COMPRESSED: &[u8] = b"DATA binary_compressed\n";
 
-/// The lengths and the first tokens of compressed data.
+/// Offsets and sizes of the two lengths and the first LZF tokens of compressed data.
 fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     let Some(header) = bytes.windows(COMPRESSED.len()).position(|window| window == COMPRESSED) else { return vec![] };
     let data = header + COMPRESSED.len();
@@ -55,7 +55,7 @@ fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     places.filter(|&(at, size)| at + size <= bytes.len()).collect()
 }
 
-/// A field of a point.
+/// A field of a point: `count` numbers of `size` bytes each.
 struct Field {
     name: &'static str,
     size: usize,
@@ -156,7 +156,7 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
             }
         }
         "binary" => out.extend(rows.iter().flat_map(|row| (0..fields.len()).flat_map(|index| of_field(row, index)))),
-        // Writers leave out even the lengths where there are no points.
+        // Without points, writers omit even the lengths.
         _ if points == 0 => {}
         _ => {
             let by_field = (0..fields.len()).flat_map(|index| rows.iter().flat_map(move |row| of_field(row, index)));
@@ -170,7 +170,8 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     (out, points)
 }
 
-/// LZF of a kind: three bytes like the one before them are a copy, others runs of one.
+/// A minimal LZF encoder: three bytes equal to their predecessor are a back-reference, all others
+/// are literal runs of one.
 fn pack(bytes: &[u8]) -> Vec<u8> {
     let mut packed = Vec::new();
     let mut at = 0;

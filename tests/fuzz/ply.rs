@@ -1,4 +1,4 @@
-//! PLY files of random shape, in text and in both byte orders.
+//! Fuzzes PLY files in ASCII and in both byte orders.
 
 use super::mutate::Grammar;
 use super::random::{Place, Random};
@@ -70,7 +70,7 @@ const INTEGERS: [&str; 12] =
     ["char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int", "int32", "uint", "uint32"];
 const REALS: [&str; 4] = ["float", "float32", "double", "float64"];
 
-/// Terms of spherical harmonics.
+/// Names of the spherical harmonic coefficients above degree 0.
 const REST: [&str; 45] = [
     "f_rest_0",
     "f_rest_1",
@@ -119,7 +119,7 @@ const REST: [&str; 45] = [
     "f_rest_44",
 ];
 
-/// How numbers are written.
+/// The encoding of numbers.
 #[derive(Clone, Copy)]
 enum Encoding {
     Ascii,
@@ -149,7 +149,7 @@ fn put(out: &mut Vec<u8>, encoding: Encoding, kind: &str, value: f64) {
     }
 }
 
-/// A property: its types (a list has two) and its name.
+/// A property: type of a list's length (`None` for a scalar), type of its values, and name.
 type Property = (Option<&'static str>, &'static str, &'static str);
 
 fn scalar(random: &mut Random, name: &'static str) -> Property {
@@ -181,7 +181,7 @@ fn vertex_properties(random: &mut Random) -> Vec<Property> {
             "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2", "scale_0", "scale_1",
         ]);
         names.extend(random.one_in(3).then_some("scale_2"));
-        // Of the degrees 0 to 3.
+        // Coefficients of degree 0, 1, 2 or 3.
         names.extend(&REST[..[0, 9, 24, 45][random.below(4)]]);
     }
     let one_color_type = random.one_in(2).then_some("uchar");

@@ -2,18 +2,18 @@
 
 pub use crate::numbers::Random;
 
-/// Where the points of a generated file lie.
+/// The distribution of a generated file's points.
 #[derive(Clone, Copy)]
 pub enum Place {
     /// In the unit cube.
     Unit,
-    /// On a coarse grid, so that positions repeat.
+    /// On a coarse grid, so positions repeat.
     Grid,
-    /// Far from the origin, as surveys are.
+    /// Far from the origin, as in surveys.
     Survey,
-    /// All at one place.
+    /// All at one position.
     One,
-    /// Of all magnitudes, numbers that are none among them.
+    /// Values of all magnitudes, including NaN and infinities.
     Wild,
 }
 
@@ -22,12 +22,12 @@ const WILD: [f64; 12] =
     [0.0, -0.0, 1e-320, 1e-40, 1e18, -1.1e18, 3.5e38, 1e300, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 2147483648.0];
 
 impl Place {
-    /// One of them.
+    /// A random distribution, favouring the unit cube.
     pub fn any(random: &mut Random) -> Self {
         [Self::Unit, Self::Unit, Self::Grid, Self::Survey, Self::One, Self::Wild][random.below(6)]
     }
 
-    /// A point there.
+    /// A random point of this distribution.
     pub fn point(self, random: &mut Random) -> [f64; 3] {
         [0, 1, 2].map(|axis| match self {
             Self::Unit => random.between(-1.0, 1.0),

@@ -1,4 +1,4 @@
-//! What is done with points that were read, and what an image must be.
+//! Builds and draws the points that were read, and checks the image.
 
 use super::Outcome;
 use super::session::sentence;
@@ -11,10 +11,10 @@ use epsplat::low_level::surfels::{LARGEST_COORDINATE, build};
 use epsplat::{Error, io};
 use std::path::Path;
 
-/// Scenes with more points are not drawn: a damaged file may hold as many as a small one can describe.
+/// Scenes with more points are not drawn: a small damaged file can describe very many.
 const MOST_POINTS: usize = 2000;
 
-/// The image's width and height, pixels.
+/// Width and height of the image, pixels.
 pub const SIZE: (u32, u32) = (16, 16);
 
 /// Reads a file of points and draws them.
@@ -34,9 +34,9 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         return Ok(Outcome::Read);
     }
     let usable = |p: &[f64; 3]| p.iter().all(|c| c.abs() <= LARGEST_COORDINATE);
-    // Gaussians may lack what cannot be estimated.
+    // Gaussians may lack attributes that cannot be estimated.
     let drawable = points.positions.iter().any(usable) && !points.encoded;
-    // What is narrower has half-axes whose products an f32 cannot hold.
+    // In narrower scenes, products of half-axes underflow f32.
     let narrow = epsplat::low_level::surfels::bounds(&points).extent().max_element() < 1e-15;
     let (scene, _) = match build(vec![points], &()) {
         Ok(built) => built,
@@ -47,9 +47,9 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     };
     let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {
         Ok(camera) => camera,
-        // A camera must be within as much of the world's origin as points, and one that sees a scene end on is moved
-        // far from it: what lies near that border may be out of reach. Nor can a camera keep a distance that is lost
-        // in the digits of its place.
+        // A camera must be as close to the world's origin as points must be, and one that sees a
+        // scene edge-on is moved far away; so a scene near that limit may be out of reach. Nor can
+        // a camera keep a distance that is below the precision of its position.
         Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE || size(&scene) < 1e-12 * reach(&scene) => {
             return sentence(&error, None).map(|()| Outcome::Read);
         }
@@ -91,12 +91,12 @@ fn check_lengths(points: &Points) -> Result<(), String> {
     }
 }
 
-/// The default with a shading.
+/// The default options with this shading.
 pub fn shaded(shading: Shading) -> RenderOptions {
     RenderOptions { shading, ..RenderOptions::default() }
 }
 
-/// What Gaussians are drawn with.
+/// The options that Gaussians are drawn with.
 fn gaussians() -> RenderOptions {
     RenderOptions {
         kernel: gaussian::KERNEL,
@@ -106,7 +106,7 @@ fn gaussians() -> RenderOptions {
     }
 }
 
-/// Draws `scene` with the reference and looks at each pixel of each map.
+/// Draws `scene` with the reference and checks every pixel of every map.
 pub fn draw(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Outcome, String> {
     let maps = Maps::ON_DEVICE.and(&[Map::Decision]);
     let options = RenderOptions { maps, ..options.clone() };
@@ -132,7 +132,7 @@ fn check(frame: &Frame) -> Result<(), String> {
             "fragments without weight or depth"
         } else if count == 0.0 && (weight != 0.0 || depth != f32::INFINITY || *color != [0.0; 4] || normal != [0.0; 3])
         {
-            "a background that is none"
+            "a background with values"
         } else {
             continue;
         };

@@ -1,4 +1,4 @@
-//! Input after input for as long as was asked, and what is done about the one that breaks a promise.
+//! Runs inputs for the requested time and reports the one that breaks a promise.
 
 use super::memory::Peak;
 use super::mutate::mutate;
@@ -10,12 +10,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use std::time::{Duration, Instant};
 
-/// An input that takes longer hangs.
+/// An input that takes longer counts as a hang.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// One target at a time, so that memory and panics are known to be its own.
+/// Serialises the targets, so that memory and panics can be attributed.
 static TURN: Mutex<()> = Mutex::new(());
-/// While an input is read, panics are noted rather than printed: a decoder's are survived, ours end the test.
+/// While an input is read, panics are recorded, not printed: those of a decoder are survived, ours
+/// fail the test.
 static QUIET: AtomicBool = AtomicBool::new(false);
 static PANICS: AtomicU64 = AtomicU64::new(0);
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
@@ -27,7 +28,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn note_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // The readers' hook, which hushes decoders, is set when one runs; over it, this one hears them.
+        // The readers install a hook that silences decoders when one first runs; ours must be
+        // installed over it.
         let _ =
             epsplat::io::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/readers/deep_gps_time.laz")), &());
         let usual = std::panic::take_hook();
@@ -42,7 +44,7 @@ fn note_panics() {
     });
 }
 
-/// A number from the environment.
+/// An integer from the environment.
 fn setting(name: &str) -> Option<u64> {
     let text = std::env::var(name).ok()?;
     Some(text.parse().unwrap_or_else(|_| panic!("{name} is a whole number, not {text:?}")))
@@ -53,11 +55,12 @@ pub fn run(target: &Target) {
     let _turn = lock(&TURN);
     note_panics();
     let seconds = setting("EPSPLAT_FUZZ_SECONDS").unwrap_or(2);
-    // The same inputs every time, unless another seed is asked for: a test must not fail by chance.
+    // The same inputs every time unless another seed is given: a test must not fail by chance.
     let first = setting("EPSPLAT_FUZZ_SEED").unwrap_or(1);
     eprintln!("{}: from seed {first}", target.name);
 
-    // The file under test stays on disk if the process dies, which is why it has no temporary's name.
+    // The folder has a fixed name and is not temporary, so the file under test survives if the
+    // process dies.
     let folder = std::env::temp_dir().join(format!("epsplat-fuzz-{}-{}", target.name, std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join(format!("input.{}", target.extension));
@@ -70,7 +73,7 @@ pub fn run(target: &Target) {
         watch.begin(seed);
         let (bytes, valid) = input(target, seed);
         let result = execute(target, &path, &bytes, valid);
-        // The first inputs start the threads and make the tables.
+        // The first inputs start threads and build tables, which is not counted.
         let executions: u64 = outcomes.iter().sum();
         if executions == 20 {
             before = Some(Peak::now());
@@ -97,11 +100,11 @@ pub fn run(target: &Target) {
         target.name,
         refused + read + drawn
     );
-    // A session that only ever sees one outcome tests nothing.
+    // A session with only one kind of outcome tests nothing.
     assert!(refused > 0 && drawn > 0, "{}: of all inputs, {refused} were refused and {drawn} drawn", target.name);
 }
 
-/// The input of a seed; with its number of points, if it is as it was generated.
+/// The input of a seed, with its number of points if it is unmodified.
 fn input(target: &Target, seed: u64) -> (Vec<u8>, Option<usize>) {
     let mut random = Random(seed);
     let (mut bytes, points) = (target.generate)(&mut random);
@@ -114,7 +117,8 @@ fn input(target: &Target, seed: u64) -> (Vec<u8>, Option<usize>) {
 }
 
 fn execute(target: &Target, path: &Path, bytes: &[u8], valid: Option<usize>) -> Result<Outcome, String> {
-    // File systems flush a file that is written over, but not one that replaces a deleted one: ten times as fast.
+    // File systems flush an overwritten file, but not one that replaces a deleted one: this is ten
+    // times as fast.
     let _ = std::fs::remove_file(path);
     std::fs::write(path, bytes).unwrap();
     QUIET.store(true, Ordering::Relaxed);
@@ -123,7 +127,7 @@ fn execute(target: &Target, path: &Path, bytes: &[u8], valid: Option<usize>) -> 
     result.unwrap_or_else(|_| Err(lock(&LAST_PANIC).clone()))
 }
 
-/// What an error must be: one line that names the file, if one is given.
+/// Checks that an error is one line and names the file, if one is given.
 pub fn sentence(error: &epsplat::Error, path: Option<&Path>) -> Result<(), String> {
     let message = error.to_string();
     let name = path.map(|path| path.display().to_string()).unwrap_or_default();

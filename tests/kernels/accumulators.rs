@@ -1,6 +1,7 @@
-//! Every accumulator, with every kernel and every form of epsilon, against the f64 reference: the stated bound of the sums
-//! and the derived uncertainty of the fragments' weights are all that a pixel may be off. And what happens to sums that
-//! do not fit.
+//! Tests every accumulator, with every kernel and form of epsilon, against the f64 reference.
+//!
+//! A pixel may differ by the stated bound of the sums and the derived uncertainty of the fragments'
+//! weights, and by no more. Also tests overflowing sums.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -24,7 +25,7 @@ const KERNELS: [&str; 7] =
 const EPSILONS: [Epsilon; 4] =
     [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4), Epsilon::Ray(0.05)];
 
-/// What a device's frame is compared with.
+/// A scene and everything that a device's frame of it is compared with.
 struct Case {
     name: String,
     scene: Scene,
@@ -35,8 +36,8 @@ struct Case {
     view: View,
 }
 
-/// A sphere of overlapping disks before three large, tilted ones that fill the image: some get an invocation each, some a
-/// workgroup.
+/// A sphere of overlapping disks behind three large, tilted ones that fill the image; so some disks
+/// are drawn by one invocation and some by a workgroup.
 fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
     let mut scene = sphere(2500, 2.0);
     let camera = sphere_camera(96, projection);
@@ -71,13 +72,13 @@ fn cases() -> Vec<Case> {
     all
 }
 
-/// What of a frame lies outside the bounds.
+/// Counts of compared pixels, and violations of the bounds.
 #[derive(Default)]
 struct Findings {
     covered: usize,
     open: usize,
     wrong: Vec<String>,
-    /// The largest share of a bound that was used up: colour, depth, normal, weight.
+    /// The largest used fraction of a bound: colour, depth, normal, weight.
     used: [f64; 4],
 }
 
@@ -111,11 +112,12 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
             }
         };
         let sums = (row.error_bound)(n, weight, fraction_bits);
-        // The means move by no more than the weights do, as a share of their sum; attributes are mapped in f32.
+        // The relative uncertainty of the weights bounds the change of the means; attributes are
+        // mapped in f32.
         let weights = (known.weight.high - known.weight.low) / weight;
         let mean = sums + weights + 8.0 * E;
         for k in 0..4 {
-            // A colour's value is rounded twice more, to units of its own size.
+            // A colour is rounded twice more, relative to its own magnitude.
             let range = f64::from(high[k]) - f64::from(low[k]);
             let (a, b) = (f64::from(device.color[pixel][k]), f64::from(twin.color[pixel][k]));
             check(0, (a - b).abs(), range * mean + 4.0 * E * b);
@@ -125,7 +127,8 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
         let behind = common::depth_span(&case.view, front);
         check(1, (depth.0 - depth.1).abs(), behind * mean + depth.1 * (known.depth_error + 4.0 * E));
         let normals = [device, twin].map(|f| Vec3::from_array(f.normals().unwrap()[pixel]).as_dvec3());
-        // Components have a range of 2; the mean is normalised, and a short one magnifies its error.
+        // Components have a range of 2. The mean is normalised, so a short mean magnifies its
+        // error.
         if known.normal.iter().any(|sum| (2.0 * sum.low / known.weight.high - 1.0).abs() > 0.6) {
             check(2, (normals[0] - normals[1]).length(), 2.0 * 3f64.sqrt() * mean / 0.6 + 4.0 * E);
         }
@@ -135,7 +138,7 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
     findings
 }
 
-/// Renders by `row`; a frame that fell back to another accumulator would show nothing about this one.
+/// Renders with the accumulator `row`, and fails if the frame fell back to another one.
 fn run(case: &Case, row: &AccumulatorRow, backend: &Backend) -> Findings {
     let options = RenderOptions { accumulator: row.of, ..case.options.clone() };
     let (frame, report) = render(&case.scene, &case.camera, &options, backend, &()).unwrap();
@@ -171,7 +174,7 @@ fn broken(file: &str, from: &str, to: &str, gpu: Gpu) -> Backend {
 fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let noticed = |case: &Case, row: &AccumulatorRow, file: &str, from: &str, to: &str| {
-        // `fixed` is kept in other files by an adapter that can do more.
+        // A more capable adapter runs `fixed` in other files.
         let gpu = if row.of == Accumulator::Fixed { common::gpu_for(file) } else { common::gpu() };
         let Some(gpu) = gpu else { return };
         let findings = run(case, row, &broken(file, from, to, gpu));
@@ -221,7 +224,7 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
         ..Default::default()
     };
     let exact = Accumulator::Fixed;
-    // 255 full weights of 2^24 units fit 32 bits, 256 do not.
+    // 255 full weights of 2^24 units fit in 32 bits, 256 do not.
     for (disks, fits) in [(200, true), (255, true), (256, false), (300, false), (100_000, false)] {
         let (scene, camera) = stack(disks, 0.3);
         let (expected, report) = render(&scene, &camera, &with(exact), &backend, &()).unwrap();
@@ -241,7 +244,7 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                 let blind = broken(row.file, counting, "", gpu);
                 let (frame, report) = render(&scene, &camera, &with(row.of), &blind, &()).unwrap();
                 assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
-                assert!(bits(&frame) != bits(&expected), "{name}: an overflow does not show");
+                assert!(bits(&frame) != bits(&expected), "{name}: an overflow is not noticed");
             } else {
                 assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
                 assert!(
@@ -250,7 +253,8 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                     "{name}"
                 );
                 let n = disks as f64;
-                // Every term is the same, so float's sums, of exact weights, err by what the sum of one colour does.
+                // All terms are equal and float's weights are exact, so only the error of one
+                // colour sum counts.
                 let bound = (row.error_bound)(n, n, row.fraction_bits(scene.surfels.len() as u64)) + 2.0 * E;
                 let color = |frame: &Frame| f64::from(frame.color[9][0]);
                 let apart = (color(&frame) - color(&expected)).abs();
@@ -261,7 +265,7 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
     }
 }
 
-/// What wrapped in one view is not held against the next.
+/// An overflow in one view does not affect the accumulator of the next.
 #[test]
 fn a_view_whose_sums_fit_is_rendered_as_asked_after_one_whose_do_not() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,5 +1,5 @@
-//! The order of the surfels, the schedule, pages and bands: accumulators that claim to do not show them, in any bit.
-//! Others may, within their bounds.
+//! The order of surfels, the schedule, pages and bands do not change a bit of the frame with
+//! accumulators that promise this. With others the frame may change within their error bounds.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -26,7 +26,8 @@ fn options(accumulator: Accumulator) -> RenderOptions {
     RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
 }
 
-/// All scenes for the default; for others the first, of 8-bit colours, and the last, of f32 and large splats.
+/// All scenes for `fixed`; for other accumulators the first (8-bit colours) and the last (f32
+/// colours, large splats).
 fn scenes(row: &AccumulatorRow) -> Vec<(Scene, Camera)> {
     let mut all = crowded();
     if row.of != Accumulator::Fixed {
@@ -35,15 +36,15 @@ fn scenes(row: &AccumulatorRow) -> Vec<(Scene, Camera)> {
     all
 }
 
-/// Renders; a frame that fell back to another accumulator would show nothing about this one.
+/// Renders, and fails if the frame fell back to another accumulator.
 fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
     let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
     assert_eq!((report.accumulator, report.overflows), (options.accumulator.name(), 0));
     frame
 }
 
-/// Kernels that draw each batch from its last surfel to its first: the order in which surfels are stored hardly depends on
-/// that of the scene.
+/// Kernels that draw each batch from its last surfel to its first. (Shuffling the scene hardly
+/// changes the order, as the renderer sorts surfels.)
 fn reversed(sources: Sources) -> Sources {
     let (own, reversed) = ("workgroup.x * WORKGROUP + local", "(BATCH - 1u - (workgroup.x * WORKGROUP + local))");
     sources.replace("cull.wgsl", own, reversed).unwrap()
@@ -61,21 +62,22 @@ fn order_and_repetition_do_not_change_a_bit() {
         for (scene, camera) in scenes(row) {
             let first = bits(&frame(&scene, &camera, &options, &backend));
             assert!(bits(&frame(&scene, &camera, &options, &backend)) == first, "{name}: a second run differs");
-            // As they come, which a device else stores in an order of its own.
+            // Without `Order` the device stores surfels in the scene's order; otherwise it sorts
+            // them.
             let given = RenderOptions { without: vec![Optimisation::Order], ..options.clone() };
             for (seed, options) in [(5, &given), (6, &given), (7, &options)] {
                 let other = frame(&shuffled(&scene, seed), &camera, options, &backend);
                 assert!(bits(&other) == first, "{name}: order {seed} differs");
             }
             assert!(bits(&frame(&scene, &camera, &options, &backwards)) == first, "{name}: backwards differs");
-            // The comparison sees every surfel moved by a unit in the last place.
+            // The control: every surfel moved by one ulp is noticed.
             let mut moved = scene.clone();
             for surfel in &mut moved.surfels {
                 surfel.center[0] = surfel.center[0].next_up();
             }
             assert!(bits(&frame(&moved, &camera, &options, &backend)) != first, "{name}");
         }
-        // And a sum in which the last fragment wins.
+        // The control: a sum that keeps only the last fragment is noticed.
         let Some(gpu) = common::gpu_for(row.file) else { return };
         let sources = Sources::default();
         let sources = [
@@ -101,7 +103,7 @@ fn order_and_repetition_do_not_change_a_bit() {
     }
 }
 
-/// `fixed` keeps the same sums in another way where the adapter adds 64 bits at once.
+/// `fixed` computes the same sums with 64-bit atomics as without.
 #[test]
 fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let Some(with) = common::gpu() else { return };
@@ -132,20 +134,21 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
         assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));
         seen[usize::from(report.needs.contains(&"wide-sums"))] = true;
         assert!(bits(&one) == bits(&other), "{name}: other bits without 64-bit atomics");
-        // Most of a case's time is to compile its kernels: each control is tried until it is noticed.
+        // Most of a case's time goes to compiling kernels, so each control runs only until it is
+        // noticed.
         for (backend, noticed) in broken.iter().zip(&mut noticed).filter(|(_, noticed)| !**noticed) {
             let (frame, _) = render(&scene, &camera, &options, backend, &()).unwrap();
             *noticed = bits(&frame) != bits(&other);
         }
     }
     assert_eq!(seen, [true; 2], "both widths of terms");
-    assert_eq!(noticed, [true; 2], "wrong carries do not show");
+    assert_eq!(noticed, [true; 2], "wrong carries are not noticed");
 }
 
-/// A control that more cases than this notice is one.
+/// A control must be noticed by more cases than this.
 const ENOUGH: u32 = 3;
 
-/// Splats that are left out as hidden would have added nothing; those that are left out wrongly show.
+/// Skipping hidden splats does not change a bit; skipping too many does.
 #[test]
 fn hidden_splats_do_not_change_a_bit() {
     let Some(own) = common::gpu().map(Backend::gpu) else { return };
@@ -162,19 +165,19 @@ fn hidden_splats_do_not_change_a_bit() {
     for (name, scene, camera, options) in crowded.chain(hard) {
         let shown = |backend| bits(&render(&scene, &camera, &options, backend, &()).unwrap().0);
         let all = shown(&none);
-        assert!(shown(&own) == all, "{name}: leaving out hidden splats shows");
-        // Most of a case's time is to compile its kernels: the control is tried until it is noticed often enough.
+        assert!(shown(&own) == all, "{name}: skipping hidden splats changes bits");
+        // Most of a case's time goes to compiling kernels, so the control runs only until it is
+        // noticed often enough.
         noticed += u32::from(noticed <= ENOUGH && shown(&too_many) != all);
     }
     assert!(noticed > ENOUGH, "{noticed}");
 }
 
-/// Batches that are left out, as they are hidden or out of view, would have added nothing; those that are left out wrongly
-/// show.
+/// Skipping batches that are hidden or out of view does not change a bit; skipping too many does.
 #[test]
 fn batches_left_out_do_not_change_a_bit() {
     let Some(gpu) = common::gpu() else { return };
-    // Several pages, one band: the sums of 128 x 128 pixels take 1.5 MB.
+    // Several pages but one band: the sums of 128 x 128 pixels need 1.5 MB.
     let Some(small) = common::gpu() else { return };
     let runs = [
         (gpu, vec![LowPass::None, LowPass::Max, LowPass::Ewa]),
@@ -185,7 +188,8 @@ fn batches_left_out_do_not_change_a_bit() {
     let every = replaced("!near && any(pixels.first > pixels.last)", "false");
     let wrong = replaced("!(reached > deepest_accepted(", "!(1.5 * reached > deepest_accepted(");
     let scene = sphere(200_000, 1.5);
-    // The tolerance of the control reaches the back, which shows where surfels have no sides.
+    // The control's epsilon reaches the back of the sphere, which is visible if surfels have no
+    // sides.
     let without_sides = Scene { oriented: false, ..scene.clone() };
     let look = |eye: DVec3, lens| Camera::look_at((128, 128), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
     let outside = DVec3::new(1.0, 0.7, 3.0);
@@ -208,7 +212,7 @@ fn batches_left_out_do_not_change_a_bit() {
                 let options = RenderOptions { low_pass, ..options(Accumulator::Fixed) };
                 let (own, report) = frame(Sources::default(), &scene, camera, &options);
                 let (all, of_all) = frame(shown(&every), &scene, camera, &options);
-                assert!(bits(&own) == bits(&all), "{name}: leaving out batches shows");
+                assert!(bits(&own) == bits(&all), "{name}: skipping batches changes bits");
                 assert!(report.needs.contains(&"cull"));
                 let drawn = [report, of_all].map(|report| report.splats_drawn);
                 let share = drawn[0] as f64 / scene.surfels.len() as f64;
@@ -219,7 +223,7 @@ fn batches_left_out_do_not_change_a_bit() {
             let options = RenderOptions { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(Accumulator::Fixed) };
             let (own, _) = frame(Sources::default(), &without_sides, camera, &options);
             let (less, _) = frame(wrong.clone(), &without_sides, camera, &options);
-            assert!(bits(&own) != bits(&less), "what is left out wrongly does not show");
+            assert!(bits(&own) != bits(&less), "wrongly skipped batches are not noticed");
         }
     }
 }
@@ -233,7 +237,8 @@ fn pages_and_bands_do_not_change_a_bit() {
     let whole = Backend::gpu(whole);
     for row in all.into_iter().filter(|row| row.deterministic) {
         let (name, options) = (row.name, options(row.of));
-        // 160 pixels of 12 sums, or of 10 words of the image: a row of the image a band, and some 200 surfels a page.
+        // A band of one row, which has 160 pixels of 12 sums, or of 10 image words, and pages of
+        // about 200 surfels.
         let one_row = 160 * 4 * u64::from(12 * row.words).max(10) + 700;
         for limit in [one_row, 40_000] {
             let Some(small) = common::gpu() else { return };
@@ -255,7 +260,7 @@ fn pages_and_bands_do_not_change_a_bit() {
     }
 }
 
-/// Disks of many sizes, tilts and colours over one another: thousands of fragments on a pixel.
+/// Overlapping disks of many sizes, tilts and colours, with thousands of fragments on a pixel.
 fn pile() -> (Scene, Camera) {
     let mut random = Random(21);
     let mut surfels = Vec::new();
@@ -279,7 +284,8 @@ fn pile() -> (Scene, Camera) {
     (scene, front(16))
 }
 
-/// What does not claim to be independent of the order may differ from run to run; its means stay within its bound.
+/// Accumulators that depend on the order may differ from run to run; their means stay within their
+/// bounds.
 #[test]
 fn sums_that_show_the_order_stay_within_their_bounds() {
     let Some(gpu) = common::gpu() else { return };
@@ -308,7 +314,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
             assert_eq!(run.map(Map::Count), exact.map(Map::Count), "{}", row.name);
             for pixel in 0..camera.pixels() {
                 let (n, w) = (counts[pixel].into(), weights[pixel].into());
-                // Both sides err, and both map back to a range of at most 1 in f32.
+                // Both frames have errors, and both are mapped back in f32 to a range of at most 1.
                 let bound = (row.error_bound)(n, w, 24) + (Accumulator::Fixed.row().error_bound)(n, w, 24);
                 for k in 0..3 {
                     let difference = f64::from((run.color[pixel][k] - exact.color[pixel][k]).abs());

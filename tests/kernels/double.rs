@@ -1,4 +1,4 @@
-//! The doubled arithmetic of `wgsl/double.wgsl` on the device, against f64.
+//! The double-f32 arithmetic of `wgsl/double.wgsl` on the device, against f64.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -11,7 +11,7 @@ use epsplat::low_level::gpu::layout::View;
 use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::inspect::evaluate;
 
-/// All functions on one pair of doubles each.
+/// Applies every function to one pair of doubles.
 const KERNEL: &str = "
 @group(0) @binding(20) var<storage, read> inputs: array<vec4<f32>>;
 @group(0) @binding(21) var<storage, read_write> outputs: array<vec2<f32>>;
@@ -44,7 +44,8 @@ fn evaluate(
 
 const NAMES: [&str; 6] = ["two_sum", "two_product", "sum", "product", "quotient", "tail"];
 
-/// Pairs of doubles of both signs: exponents up to 12 apart, significands random, few-bit, or all ones.
+/// Pairs of doubles of both signs: exponents up to 12 apart; significands random, short, or all
+/// ones.
 fn pairs() -> Vec<[f32; 4]> {
     let mut random = Random(11);
     let mut double = |near: f64| {
@@ -66,7 +67,7 @@ fn pairs() -> Vec<[f32; 4]> {
         let (_, b) = double(exponent);
         all.push([a[0], a[1], b[0], b[1]]);
     }
-    // What cancels to the last bit.
+    // Sums that cancel to the last bits.
     for k in 0..2000u32 {
         let a = 1.0 + k as f32 / 2000.0;
         let b = -f32::from_bits(a.to_bits() + k % 5);
@@ -75,8 +76,10 @@ fn pairs() -> Vec<[f32; 4]> {
     all
 }
 
-/// The largest error of each function: of exact ones in absolute terms, of others relative to the magnitudes that
-/// entered (the sum) or to the result (product and quotient); last, the largest trailing part over its leading one.
+/// The largest error of each function, and last the largest ratio of trailing to leading part.
+///
+/// Errors of exact functions are absolute; that of the sum is relative to the magnitudes of its
+/// terms, those of product and quotient to the result.
 fn errors(gpu: &Gpu, double: &str) -> [f64; 6] {
     let layout = FILES.iter().find(|(name, _)| *name == "layout.wgsl").unwrap().1;
     let text = [
@@ -109,7 +112,7 @@ fn errors(gpu: &Gpu, double: &str) -> [f64; 6] {
     worst
 }
 
-/// The trailing part over the leading one.
+/// The ratio of the trailing part to the leading one.
 fn tail([high, low]: [f32; 2]) -> f64 {
     if low == 0.0 { 0.0 } else { f64::from((low / high).abs()) }
 }
@@ -149,7 +152,7 @@ fn the_comparison_notices_lost_digits() {
     assert!(sloppy[2] > 1e-10, "{}", in_words(&sloppy));
     let coarse = errors(&gpu, &changed("rest / b.high);", "0.0);"));
     assert!(coarse[4] > 1e-10, "{}", in_words(&coarse));
-    // Whether this adapter's compiler needs `keep` is its own affair: said, not asserted.
+    // Some compilers do not need `keep`, so this result is printed, not asserted.
     let bare = errors(&gpu, &changed("return bitcast<f32>(bitcast<u32>(x) ^ held.zero);", "return x;"));
     eprintln!("{} without keep: {}", gpu.adapter.name, in_words(&bare));
 }

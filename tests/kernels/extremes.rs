@@ -1,4 +1,4 @@
-//! Scenes at the ends of the number line: the GPU against the f64 reference.
+//! Scenes of extreme sizes and distances: the GPU against the f64 reference.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -13,7 +13,7 @@ use epsplat::low_level::surfels::analytic::{Shape, generate};
 use epsplat::low_level::surfels::build;
 use glam::DVec3;
 
-/// A unit sphere, scaled and shifted, with more points beside it.
+/// A unit sphere, scaled and shifted, with additional points.
 fn sphere(scale: f64, shift: DVec3, more: &[DVec3]) -> Scene {
     let samples: Vec<_> = generate(Shape::Sphere, 3000).collect();
     let mut points = Points::default();
@@ -52,7 +52,7 @@ fn small_large_and_distant_scenes_are_the_same_picture() {
         let scene = sphere(scale, DVec3::ZERO, &[]);
         check(&format!("scale {scale:e}"), &scene, &view(scale, DVec3::ZERO), Epsilon::Relative(0.01));
     }
-    // Map coordinates, and detail of millimetres.
+    // Map coordinates with surfels of millimetres.
     let shift = DVec3::new(6.26e6, 4.4e5, 1200.0);
     check("map", &sphere(0.05, shift, &[]), &view(0.05, shift), Epsilon::Relative(0.01));
 }
@@ -71,7 +71,8 @@ fn radii_of_all_sizes_are_right_and_none_is_larger_than_a_plane() {
     for (k, sample) in generate(Shape::Sphere, 3000).enumerate() {
         points.positions.push(sample.position);
         points.normals.as_mut().unwrap().push(sample.normal);
-        // From 1e-9 to 1e9 in steps of 100, ten of each but of the sphere's own.
+        // Ten points each have a radius of 1e-9, 1e-7, ... 1e9; all others keep the sphere's own
+        // radius.
         let exponent = -9 + 2 * (k as i32 % 30);
         let odd = k % 30 < 10 && k / 30 % 10 == 0;
         points.radii.as_mut().unwrap().push(if odd { 10f32.powi(exponent) } else { sample.radius });
@@ -81,7 +82,7 @@ fn radii_of_all_sizes_are_right_and_none_is_larger_than_a_plane() {
     assert!(preparation.notes().iter().any(|note| note.contains("20 points had a radius")));
     assert!(!scene.low.is_empty(), "disks of 1e-9 need more digits than f32 has");
     check("radii", &scene, &view(1.0, DVec3::ZERO), Epsilon::Relative(0.01));
-    // Nearer than a millionth of the scene nothing is drawn, however large a disk is.
+    // A huge disk must not push the near depth out: it stays below 1e-5.
     assert!(Camera::default_near(&scene) < 1e-5);
 }
 

@@ -1,4 +1,6 @@
-//! The map that names the strongest surfel of each pixel: against its twin, in every organisation, page, band and order of the points.
+//! The index map, which names the strongest surfel of each pixel.
+//!
+//! The device must equal its f64 twin, for every organisation, page, band and order of the points.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -23,7 +25,7 @@ fn options() -> RenderOptions {
     RenderOptions { maps: WANTED, ..RenderOptions::default() }
 }
 
-/// Points of a sphere, each with a colour of its own, of sizes that reach several neighbours.
+/// Points on a sphere, each with its own colour, with radii that reach several neighbours.
 fn points(count: u64) -> Points {
     let samples: Vec<_> = generate(Shape::Sphere, count).collect();
     let spacing = (4.0 * std::f64::consts::PI / count as f64).sqrt();
@@ -36,7 +38,7 @@ fn points(count: u64) -> Points {
     }
 }
 
-/// The points at `order`.
+/// The points in the order `order`.
 fn ordered(points: &Points, order: &[usize]) -> Points {
     let Some(Colors::Srgb8(codes)) = &points.colors else { panic!("of 8 bits") };
     Points {
@@ -56,12 +58,12 @@ fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
     render(scene, &sphere_camera(96, Projection::Pinhole), options, backend, &()).unwrap().0
 }
 
-/// Input and point of each pixel.
+/// The pair (input, point) of each pixel.
 fn named(frame: &Frame) -> &[[u32; 2]] {
     frame.numbers(Map::Index).unwrap().as_chunks().0
 }
 
-/// Pixels in which two maps differ, of those that anything covers.
+/// The number of pixels in which two maps differ, and the number of covered pixels of `b`.
 fn different(a: &Frame, b: &Frame) -> (usize, usize) {
     let differ = named(a).iter().zip(named(b)).filter(|(a, b)| a != b).count();
     (differ, named(b).iter().filter(|name| **name != [NOTHING; 2]).count())
@@ -78,7 +80,8 @@ fn the_device_names_whom_the_twin_names() {
         let twin = frame(&scene, &options, &Backend::Reference);
         let device = frame(&scene, &options, &backend);
         let (differ, covered) = different(&device, &twin);
-        // Where two weights are nearly the same, or a fragment's fate nearly the other, f32 may decide otherwise.
+        // f32 may decide differently if two weights are nearly equal or a fragment is nearly
+        // accepted.
         assert!(covered > 4000 && differ * 1000 <= covered, "{count}, {low_pass:?}: {differ} of {covered} differ");
         let bare = |frame: &Frame| -> Vec<bool> { named(frame).iter().map(|name| *name == [NOTHING; 2]).collect() };
         let empty = |frame: &Frame| -> Vec<bool> {
@@ -102,7 +105,7 @@ fn a_kernel_that_takes_any_fragment_is_noticed() {
 #[test]
 fn every_organisation_page_and_band_names_the_same() {
     let Some(gpu) = common::gpu() else { return };
-    // Enough surfels for batches to be left out, and for tiles to gather.
+    // Enough surfels to skip batches and to gather tiles.
     let scene = scene(&points(20_000));
     let all = |gpu: Gpu| -> Vec<Frame> {
         let backend = Backend::gpu(gpu);
@@ -125,7 +128,7 @@ fn every_organisation_page_and_band_names_the_same() {
 fn ties_go_by_what_surfels_are_and_not_by_where_they_stood() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
-    // Every weight is 1.
+    // With this kernel every weight is 1, so every pixel is a tie.
     let options = RenderOptions { kernel: Kernel::Constant, ..options() };
     let given = points(3000);
     let mut order: Vec<usize> = (0..3000).collect();
@@ -138,7 +141,7 @@ fn ties_go_by_what_surfels_are_and_not_by_where_they_stood() {
             .map(|[input, point]| [*input, order.get(*point as usize).map_or(NOTHING, |k| *k as u32)])
             .collect();
         let differ = back.iter().zip(named(&first)).filter(|(a, b)| a != b).count();
-        // Of the reference, rims: nothing else is decided.
+        // The reference may differ at disk rims only.
         assert!(differ == 0 || matches!(backend, Backend::Reference) && differ < 10, "{differ}");
     }
 }
@@ -165,13 +168,13 @@ fn numbers_are_those_of_the_files() {
     succeeds(&line);
     let frame = io::exr::read(&image).unwrap();
     let at = |x: usize, y: usize| named(&frame)[y * 80 + x];
-    // The second file lies in front; its first point has the middle, whose radius is small, and nobody has the corner.
+    // The second file is in front. Its points 1 and 2 are found; nothing covers the corner.
     assert_eq!([at(30, 20), at(50, 20), at(0, 0)], [[1, 1], [1, 2], [NOTHING; 2]]);
     line.remove(2);
     succeeds(&line);
     let frame = io::exr::read(&image).unwrap();
     let at = |x: usize, y: usize| named(&frame)[y * 80 + x];
-    // The first point of the file is not finite, and the others keep their numbers.
+    // Point 0 of the file is dropped as not finite; the others keep their numbers.
     assert_eq!([at(30, 20), at(50, 20)], [[0, 1], [0, 2]]);
     line.extend(["--backend", "raster"]);
     line.drain(line.iter().position(|word| *word == "reference").map(|at| at - 1..=at).unwrap());

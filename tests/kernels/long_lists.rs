@@ -1,4 +1,5 @@
-//! Lists that one invocation of a processor cannot go through: they are sorted and composited in rounds.
+//! Fragment lists too long for one invocation of a software adapter are sorted and composited in
+//! rounds; the result must equal the twin's.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,7 +18,8 @@ use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
 use glam::Vec3;
 
-/// Eight pixels squared, in whose middle about `deep` disks lie behind one another, fronts and backs, and fewer toward the corners.
+/// A scene for 8 x 8 pixels: about `deep` disks cover the middle, facing to and fro; fewer cover
+/// the corners.
 fn pile(deep: usize) -> Scene {
     let mut random = Random(9);
     let mut disk = |_| {
@@ -57,7 +59,7 @@ fn all_bits(frame: &Frame) -> Vec<u32> {
     bits(frame).into_iter().chain(maps.into_iter().flat_map(of)).collect()
 }
 
-/// The adapter, if it is one that ends loops; a card goes through any list at once.
+/// The adapter, if it is a software one, which limits loops; a card processes any list in one go.
 fn software() -> Option<Gpu> {
     common::gpu().filter(|gpu| gpu.adapter.is_software())
 }
@@ -68,7 +70,8 @@ fn with(changes: &[(&str, &str, &str)]) -> Backend {
     Backend::Gpu { gpu: Box::new(software().unwrap()), sources }
 }
 
-/// Ways to composite that each go through lists in another way: all surfaces, a few and a long tail, every fragment.
+/// Composite modes that traverse lists differently: all surfaces, three and a long tail, every
+/// fragment.
 const WAYS: [Composite; 3] = [Composite::Layers(ALL_LAYERS), Composite::Layers(3), Composite::Sorted];
 
 #[test]
@@ -91,7 +94,8 @@ fn the_twin_composites_alike() {
             }
             let mut compared = 0;
             for (pixel, (a, b)) in twin.color.iter().zip(&device.color).enumerate() {
-                // Of thousands of fragments some are near a decision at almost any pixel, but one of them changes little.
+                // With thousands of fragments, almost any pixel has some near a decision, but each
+                // changes little.
                 let near = if decided[pixel] > DECISION_MARGIN { 2e-5 } else { 2e-3 };
                 compared += usize::from(a[3] > 0.002);
                 assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < near), "{composite:?} {pixel}: {a:?} {b:?}");
@@ -101,8 +105,10 @@ fn the_twin_composites_alike() {
     }
 }
 
-/// How much a dispatch does, in which order fragments came, and whether a list is gone through at once show in no bit; what a dispatch
-/// forgets does, and so do loops that an adapter ends.
+/// The work per dispatch, the order of fragments and the threshold for long lists do not change a
+/// bit.
+///
+/// State that is lost between dispatches does, and so do loops that the adapter cuts off.
 #[test]
 fn rounds_do_not_show() {
     let Some(gpu) = software() else { return };
@@ -136,7 +142,8 @@ fn rounds_do_not_show() {
     }
 }
 
-/// The lists of a pixel's samples are gone through together.
+/// The limit divides by the number of samples, as the lists of a pixel's samples are processed
+/// together.
 #[test]
 fn a_list_is_long_by_its_samples() {
     assert_eq!(most_at_once(Samples::ONE), 2048);

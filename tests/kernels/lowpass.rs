@@ -1,4 +1,4 @@
-//! The low-pass: what it is there for, against rays, and the device against the reference.
+//! The low-pass: its benefits measured against rays, and the device against the reference.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use epsplat::low_level::surfels::build;
 use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::{DVec3, Vec3};
 
-/// `count` disks of `radius` spacings on `shape`.
+/// `count` disks on `shape`; `radius` is in units of their spacing.
 fn surfels(shape: Shape, count: u64, radius: f32) -> Scene {
     let samples: Vec<_> = generate(shape, count).collect();
     let of_default = radius / 1.5;
@@ -34,14 +34,14 @@ fn options(low_pass: LowPass) -> RenderOptions {
     RenderOptions { low_pass, shading: Shading::Unlit, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
 }
 
-/// The error of the reference's picture against 16 rays a pixel.
+/// The error of the reference's image against 16 rays per pixel.
 fn against_rays(shape: Shape, scene: &Scene, camera: &Camera, options: &RenderOptions) -> Reconstruction {
     let (frame, _) = render(scene, camera, options, &Backend::Reference, &()).unwrap();
     let truth = Truth::cast(&Surface::Analytic(shape), camera, options, DEFAULT_GRID, &()).unwrap();
     reconstruction(&frame, &truth).unwrap()
 }
 
-/// About one disk a pixel, half as large as their spacing.
+/// About one disk per pixel with a radius of 0.4 spacings: both filters close all holes.
 #[test]
 fn a_surface_of_small_disks_has_no_holes() {
     let scene = surfels(Shape::Sphere, 20_000, 0.4);
@@ -57,7 +57,7 @@ fn a_surface_of_small_disks_has_no_holes() {
     }
 }
 
-/// Squares of 1.5 pixels: both filters are nearer to rays, in dB and by structure.
+/// A checkerboard with squares of 1.5 pixels: both filters come closer to rays in PSNR and SSIM.
 #[test]
 fn a_far_checkerboard_aliases_less() {
     let scene = surfels(Shape::Checkerboard, 200_000, 1.5);
@@ -73,8 +73,8 @@ fn a_far_checkerboard_aliases_less() {
     assert!(ewa.0 > none.0 + 6.0 && ewa.1 > none.1 + 0.2, "{none:?} {ewa:?}");
 }
 
-/// A slanted row of disks whose images shrink from many pixels to a fraction of one: the nearest depth never leaves the
-/// disks' own range, and along each disk's centre it is the plane's.
+/// In a slanted row of disks that shrink from many pixels to a fraction of one, the depth stays
+/// near the plane.
 #[test]
 fn depth_is_continuous_where_the_filter_takes_over() {
     let normal = Vec3::new(0.0, -0.8, 0.6);
@@ -113,9 +113,10 @@ fn depth_is_continuous_where_the_filter_takes_over() {
                 continue;
             }
             covered += 1;
-            // All disks lie in the plane y = 0.75 (z - 1). Filtered, a disk shows where its centre is not, at a depth of
-            // its own: off by its extent in depth, or by what a pixel spans there. A filter that went on with the plane
-            // of a disk, or jumped to its centre's depth, would be off by more.
+            // All disks lie in the plane y = 0.75 (z - 1). A filtered disk also shows beside its
+            // centre, with an error of at most its own extent in depth plus the depth that a pixel
+            // spans. A filter that extrapolated the disk's plane or jumped to the depth of its
+            // centre would exceed that.
             let slope = (y as f64 + 0.5 - 6.0) / 240.0;
             let plane = 0.75 / (0.75 - slope);
             if plane < 20.0 {
@@ -128,7 +129,7 @@ fn depth_is_continuous_where_the_filter_takes_over() {
     }
 }
 
-/// The device's filter against the twin's: pixels in which no decision is near agree.
+/// The device's filter equals the twin's in all pixels that are not near a decision.
 #[test]
 fn the_device_filters_as_the_reference_does() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,5 +1,5 @@
-//! The kernels: against their f64 twins, against each other, and as texts.
-//! One program: shared code and kernels are compiled once.
+//! The kernels: against their f64 twins, against each other, and as WGSL texts.
+//! All in one test program, so that shared code and kernels are compiled once.
 
 mod accumulators;
 #[path = "../common/mod.rs"]

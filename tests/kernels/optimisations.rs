@@ -1,4 +1,5 @@
-//! What makes frames faster changes no bit of them, alone or together, and is really left out where a study asks for it.
+//! Optimisations do not change a bit of the frame, alone or together, and are absent if a study
+//! disables them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,7 +22,8 @@ fn options(without: &[Optimisation]) -> RenderOptions {
     }
 }
 
-/// Splats of many sizes, which are too few for culling, and a closed surface of small ones, half of it hidden.
+/// Splats of many sizes, too few for culling; and a closed surface of small ones, half of it
+/// hidden.
 fn scenes() -> Vec<((Scene, Camera), bool)> {
     vec![(crowded().swap_remove(1), false), ((sphere(3000, 1.8), sphere_camera(90, Projection::Pinhole)), true)]
 }
@@ -42,7 +44,7 @@ fn no_optimisation_shows() {
     let backend = Backend::gpu(gpu);
     for (scene, culled) in scenes() {
         let (expected, whole) = frame(&scene, &[], &backend);
-        // What there is to be left out.
+        // The optimisations that are active by default.
         for (need, exists) in [("cull", culled), ("atomics-u64", pairs), ("long-words", long), ("gather", sharing)] {
             assert_eq!(whole.needs.contains(&need), exists, "{need}");
         }
@@ -50,7 +52,7 @@ fn no_optimisation_shows() {
         let all = Optimisation::ALL.map(|(optimisation, _)| optimisation).to_vec();
         for without in each.into_iter().chain([all]) {
             let (found, report) = frame(&scene, &without, &backend);
-            assert!(bits(&found) == bits(&expected), "{without:?} shows");
+            assert!(bits(&found) == bits(&expected), "without {without:?} bits change");
             let left_out = |needs: &str| !report.needs.contains(&needs);
             for optimisation in without {
                 match optimisation {
@@ -66,7 +68,8 @@ fn no_optimisation_shows() {
     }
 }
 
-/// Kernels that an optimisation would spoil draw the right image without it.
+/// Disabling an optimisation really skips its code: if that code is broken, the frame changes when
+/// it is disabled.
 #[test]
 fn what_is_left_out_is_not_done() {
     let backend = |file: &str, from: &str, to: &str| {
@@ -79,7 +82,7 @@ fn what_is_left_out_is_not_done() {
     // All splats count as hidden.
     let all = "return front == 0u || reached > farthest_accepted(bitcast<f32>(front), radius);";
     let Some(hiding) = backend("occlusion.wgsl", all, "return true;") else { return };
-    // The surfel that is stored first is left out.
+    // The first stored surfel is moved out of view.
     let Some(first) = backend(
         "project.wgsl",
         "let surfel = surfel_at(index);",
@@ -87,7 +90,7 @@ fn what_is_left_out_is_not_done() {
     ) else {
         return;
     };
-    // Of every other surfel the first half-axis ends early.
+    // The first half-axis of every other surfel is cut short.
     let odd = "array<f32, 3>(b.y, c.x, c.y)";
     let Some(long) = backend("words_long.wgsl", odd, "array<f32, 3>(b.y, c.x, select(c.y, 0.0, odd))") else { return };
     let backends = [(Optimisation::Hiding, hiding), (Optimisation::Order, first), (Optimisation::LongWords, long)];

@@ -1,4 +1,5 @@
-//! Plans of typical renders, step by step, where there is no adapter: what a frame does is known before a device is asked.
+//! Plans of typical renders, step by step, without an adapter: a frame is planned before any device
+//! is used.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,7 +16,7 @@ use epsplat::low_level::plan::{
 use epsplat::low_level::render::sequence::steps;
 use epsplat::low_level::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
 
-/// A software adapter with all optional features, as Mesa's is.
+/// A software adapter with all optional features, such as Mesa's.
 fn software() -> AdapterDescription {
     AdapterDescription {
         kind: "software",
@@ -34,7 +35,8 @@ fn camera(size: u32) -> Camera {
     sphere_camera(size, Projection::Pinhole)
 }
 
-/// A stage in a line: its pass, its kernels and what they go over, and its page and band where they are not the only ones.
+/// Formats a stage: its pass, its kernels with their extents, and its page and band unless there is
+/// only one.
 fn line(stage: &Stage) -> String {
     let runs: Vec<_> = stage
         .runs
@@ -71,7 +73,7 @@ fn lines(plan: &Plan) -> Vec<String> {
 const PROJECT: &str = "project: project/Slots(All), arrange_rare, project_rare/Rare, arrange";
 const RESOLVE: &str = "resolve: list_covered/Occlusion, arrange_covered, resolve/Covered";
 
-/// What scatter does.
+/// The steps of scatter.
 fn scattered() -> [&'static str; 8] {
     [
         PROJECT,
@@ -104,10 +106,10 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
             "read back 0",
         ]
     );
-    // What the first frame showed: there are none.
+    // The first frame found no large splats.
     let known = Known { large: Some(false), ..Known::default() };
     assert_eq!(lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known)), scattered());
-    // There are some, of which room for 100 entries was made.
+    // The first frame found some, and the lists have room for 100 entries.
     let known = Known { large: Some(true), entries: [Some(100), None], ..Known::default() };
     let second = lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known));
     let listed: Vec<_> = second.iter().filter(|line| line.contains("tile_") || line.starts_with("bin")).collect();
@@ -151,7 +153,7 @@ fn many_surfels_are_drawn_near_ones_first() {
     );
     let known = Known { slots: true, ..Known::default() };
     assert!(!lines(&planned(&scene, 128, &core, &options, &known)).iter().any(|line| line.starts_with("look")));
-    // A surfel for more than six pixels is not worth a look at what hides.
+    // Culling does not pay with more than six pixels per surfel.
     assert!(!planned(&scene, 512, &core, &options, &Known::default()).needs.cull);
     let without = RenderOptions { without: vec![Optimisation::Culling], ..options };
     assert_eq!(lines(&planned(&scene, 128, &core, &without, &Known::default())), scattered());
@@ -196,15 +198,17 @@ fn small_buffers_make_bands_and_pages() {
     assert!(plan.pages > 1 && !plan.needs.gather && !plan.projects_each_band);
     assert_eq!(plan.bands.iter().map(|band| band.rows).sum::<u32>(), 64);
     let lines = lines(&plan);
-    // Bands share their splats; pages share the lists, which are made for one after the other, and again for the second pass.
+    // Bands share projected splats. Pages share the lists, so the lists are built for each page in
+    // turn, and again for the second pass.
     assert_eq!(lines.iter().filter(|line| line.starts_with("project")).count(), 1);
     assert_eq!(lines.iter().filter(|line| line.starts_with("bin")).count(), 2 * plan.bands.len() * plan.pages);
     assert_eq!(lines.iter().filter(|line| line.starts_with("read back")).count(), 4);
-    // Where batches are left out each band has its own: near ones and far ones, listed and projected.
+    // With culling, each band selects and projects its own near and far batches.
     let plan = planned(&scene, 64, &small, &culled, &known);
     assert!(plan.needs.cull && plan.projects_each_band && plan.looks_for_slots && plan.bands.len() == 4);
     assert_eq!(self::lines(&plan).iter().filter(|line| line.starts_with("project")).count(), 4 * 4);
-    // A limit of Mesa's processor is no card's: 16 million pixels of 16 bytes.
+    // The pixel limit of Mesa's software adapter does not apply to a card: 16 million pixels of 16
+    // bytes.
     let large = AdapterDescription { max_storage_buffer_binding_size: 1 << 30, ..AdapterDescription::core() };
     let large = AdapterDescription { max_buffer_size: 1 << 30, ..large };
     let bands_of = |kind| {
@@ -214,7 +218,7 @@ fn small_buffers_make_bands_and_pages() {
             .len()
     };
     assert_eq!((bands_of("discrete"), bands_of("software")), (1, 2));
-    // A row that does not fit.
+    // One row exceeds a buffer.
     let tiny = AdapterDescription { max_storage_buffer_binding_size: 1000, ..AdapterDescription::core() };
     let error = Plan::of(&Facts::of(&scene), &tiny, &camera(64), &options, &known).unwrap_err();
     assert!(error.to_string().contains("narrower image"), "{error}");
@@ -232,7 +236,7 @@ fn copies_are_drawn_once_and_without_tiles() {
     assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.copies);
 }
 
-/// Where surfaces show through each other fragments are counted and listed; all are opaque, and nothing of it is there.
+/// Transparent surfaces are counted and listed; if all are opaque, the plan has no trace of that.
 #[test]
 fn what_shows_through_is_listed() {
     let scene = sphere(1000, 1.5);
@@ -253,7 +257,7 @@ fn what_shows_through_is_listed() {
             "read back 0",
         ]
     );
-    // Bands that were cut by their fragments.
+    // Bands that were cut by their number of fragments.
     let cuts = vec![Band::of(64, 0, 40), Band::of(64, 40, 24)];
     let cut = planned(&scene, 64, &software(), &options, &Known { cuts: Some(cuts.clone()), ..Known::default() });
     assert_eq!((cut.bands, cut.pages), (cuts, 1));
@@ -263,7 +267,7 @@ fn what_shows_through_is_listed() {
     assert_eq!(opaque.needs, plain.needs);
 }
 
-/// A band with more fragments than there is room for is cut where the next row would be too many.
+/// A band with too many fragments is cut before the row that would exceed the limit.
 #[test]
 fn bands_are_cut_by_their_fragments() {
     let options = RenderOptions { composite: "sorted".parse().unwrap(), opacity: 0.5, ..RenderOptions::default() };
@@ -278,8 +282,8 @@ fn bands_are_cut_by_their_fragments() {
     assert_eq!(of([1; 8], 100), Some(vec![(0, 8)]));
     assert_eq!(of([1; 8], 3), Some(vec![(0, 3), (3, 3), (6, 2)]));
     assert_eq!(of([0, 5, 0, 0, 5, 5, 0, 1], 5), Some(vec![(0, 4), (4, 1), (5, 2), (7, 1)]));
-    assert_eq!(of([0, 0, 0, 6, 0, 0, 0, 0], 5), None, "a row is as little as can be drawn");
-    // Pixels of four samples stay whole.
+    assert_eq!(of([0, 0, 0, 6, 0, 0, 0, 0], 5), None, "a band has at least one row");
+    // Bands contain whole pixels of 2 x 2 samples.
     let options = RenderOptions { samples: "4".parse().unwrap(), ..options };
     let plan = planned(&sphere(1000, 1.5), 8, &software(), &options, &Known::default());
     let bands = fragments::cut(&plan, 0, &[0, 1, 2, 3, 4, 5, 6, 7, 8], 3).unwrap();

@@ -1,4 +1,5 @@
-//! Operations on the device, each rounded by itself and as it stands, against the processor's own.
+//! Arithmetic on the device is rounded after each operation, in the written order, as on the
+//! processor.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -11,7 +12,7 @@ use epsplat::low_level::gpu::layout::View;
 use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::inspect::evaluate;
 
-/// What a compiler may round once, or rewrite, if nothing forbids it.
+/// Expressions that a compiler could fuse or rewrite if allowed.
 const KERNEL: &str = "
 @group(0) @binding(20) var<storage, read> inputs: array<vec4<f32>>;
 @group(0) @binding(21) var<storage, read_write> outputs: array<vec4<f32>>;
@@ -55,13 +56,13 @@ fn inputs() -> Vec<[f32; 4]> {
     (0..20_000).map(|_| std::array::from_fn(|_| number())).collect()
 }
 
-/// Values that differ in a bit.
+/// The number of values that differ in any bit.
 fn wrong(a: &[[f32; 4]], b: &[[f32; 4]]) -> usize {
     assert_eq!(a.len(), b.len());
     a.as_flattened().iter().zip(b.as_flattened()).filter(|(a, b)| a.to_bits() != b.to_bits()).count()
 }
 
-/// Of what Vulkan does; other interfaces have no word for it, so there it is said and not asserted.
+/// Asserted for Vulkan; other APIs give no such guarantee, so there the result is only printed.
 #[test]
 fn sums_and_products_are_those_of_the_processor() {
     let Some(gpu) = common::gpu() else { return };
@@ -74,13 +75,14 @@ fn sums_and_products_are_those_of_the_processor() {
     }
 }
 
-/// The control: what a compiler may make of them is noticed.
+/// The control: expressions rewritten as a compiler might are noticed.
 #[test]
 fn other_roundings_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let inputs = inputs();
     let expected = on_the_processor(&inputs);
-    // A device may round once or twice what is asked of it as one operation; the processor rounds once.
+    // WGSL's fma may be rounded once or twice, so the processor shows that fusing would make a
+    // difference.
     let once = inputs.iter().filter(|[x, y, z, _]| x.mul_add(*y, *z).to_bits() != (x * y + z).to_bits()).count();
     assert!(once > 1000, "{once}");
     for (from, to) in [

@@ -1,4 +1,5 @@
-//! Every kernel that any needs can reach is valid, portable WGSL, and host and device agree about what is set.
+//! Every kernel of every set of needs is valid, portable WGSL, and matches the state that the host
+//! sets.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -22,10 +23,10 @@ use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
 
-/// Storage buffers per stage that core WebGPU grants.
+/// Storage buffers per stage that core WebGPU guarantees.
 const CORE_STORAGE_BUFFERS: usize = 8;
 
-/// What naga must be allowed for a kernel that uses `features`, one by one.
+/// The naga capabilities that a kernel with `features` requires.
 fn capabilities(features: Features) -> Vec<Capabilities> {
     match features {
         Features::None => vec![],
@@ -82,13 +83,14 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         };
         let drawn = drawn.iter().chain(of_mesh).copied();
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
-        // Of a render by tiles or of a cut each module has entry points that only the other needs; weights by depth need no visibility pass.
+        // Modules of tiles and of cuts have entry points that other modules use; weights by depth
+        // need no visibility pass.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles() || needs.levels || needs.gather || needs.oit == Some(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
-            // Only what the rasteriser wrote is a texture.
+            // Only the rasteriser's outputs are textures.
             assert!(buffer || (needs.raster.is_some() && variable.space == AddressSpace::Handle));
         }
         assert!(!made.text().lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
@@ -101,11 +103,11 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     });
     let without: BTreeSet<&str> = without.collect();
     assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles", "triangles"]));
-    // The default runs anywhere.
+    // The default runs on any adapter.
     assert_eq!(Accumulator::Fixed.row().features, Features::None);
 }
 
-/// Names of needs of which a render has one at most.
+/// Names of needs of which a render has at most one.
 const ALTERNATIVES: [&[&str]; 9] = [
     &["pinhole", "orthographic"],
     &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
@@ -118,7 +120,7 @@ const ALTERNATIVES: [&[&str]; 9] = [
     &["join-corrected", "join-blended"],
 ];
 
-/// Needs of renders without triangles.
+/// Needs that exclude triangles.
 const MESHLESS: &[&str] = &[
     "raster-offset",
     "lists-layers",
@@ -132,7 +134,7 @@ const MESHLESS: &[&str] = &[
     "surfaces",
 ];
 
-/// Needs of renders whose surfels no texture paints, and maps that are not made beside samples.
+/// Needs that exclude textures, and maps that exclude multiple samples.
 const PAINTLESS: &[&str] = &[
     "color-constant",
     "color-srgb8",
@@ -155,7 +157,7 @@ const PAINTLESS: &[&str] = &[
     "surfaces",
 ];
 
-/// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
+/// Needs that no render combines (`src/plan/check.rs`, `src/plan/needs.rs`).
 const EXCLUSIVE: [(&str, &[&str]); 40] = [
     ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     (
@@ -341,7 +343,8 @@ fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
 }
 
-/// They leave the order of their terms, and so the rounding, to the driver: `vectors.wgsl`.
+/// No kernel uses built-in products: they leave the order of terms, and so the rounding, to the
+/// driver (`vectors.wgsl`).
 #[test]
 fn no_kernel_uses_a_product_whose_order_is_not_written() {
     let left_open = |text: &str| {
@@ -368,7 +371,7 @@ fn no_kernel_uses_a_product_whose_order_is_not_written() {
     };
     for (file, text) in FILES {
         assert_eq!(left_open(text), [""; 0], "{file}");
-        // Nor are there matrices, whose products would be as open.
+        // Nor does it use matrices, whose products have the same problem.
         assert!(!(2..5).any(|n| text.contains(&format!("mat{n}x"))), "{file}");
     }
     assert_eq!(left_open("let a = dot(b, c) + my_dot(d) + cross (e, f); // dot(e)"), ["dot", "cross"]);
@@ -439,7 +442,7 @@ fn storage_buffers_stay_within_core_limits() {
             most = most.max(count);
         }
     }
-    assert_eq!(most, STORAGE_BUFFERS as usize, "what an adapter is asked for is what the largest kernel uses");
+    assert_eq!(most, STORAGE_BUFFERS as usize, "buffers of the largest kernel, and those requested from adapters");
 }
 
 #[test]
@@ -465,15 +468,16 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
             assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());
         }
-        // At most one channel is there to make pairs whole, and two to start one.
+        // At most one channel completes the last pair, and at most two align the start of a pair.
         assert!(pixel.channels as usize <= sums.len() + 3 && pixel.image_words as usize == image.len());
-        // What is added as a pair starts at an even channel, the colour's second at 2.
+        // Values that are added in pairs start at an even channel; the second pair of the colour
+        // starts at 2.
         let pairs = [pixel.channels, pixel.normal_channel, pixel.place_channel].map(|channel| channel % 2);
         assert_eq!((pairs, COLOR_CHANNEL), ([0; 3], 1));
     }
 }
 
-/// `fn name(parameters) -> result` of a file's functions, by name.
+/// Returns the signature `fn name(parameters) -> result` of each function of a file, by name.
 fn signatures(text: &str) -> BTreeMap<String, String> {
     let code: String = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join(" ");
     let mut found = BTreeMap::new();
@@ -489,8 +493,10 @@ fn text_of(name: &str) -> &'static str {
     FILES.iter().find(|(file, _)| *file == name).unwrap_or_else(|| panic!("no {name}")).1
 }
 
-/// What is absent has the interface of what it stands for: each function of the absent file exists in its partner with
-/// the same parameters and result. (That none is missing is what the validity of every combination shows.)
+/// A file `*_absent.wgsl` has the interface of its partner: each of its functions exists there with
+/// the same signature.
+///
+/// (That none is missing follows from the validity of every combination.)
 #[test]
 fn absent_parts_have_their_partners_signatures() {
     let absent: Vec<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| name.ends_with("_absent.wgsl")).collect();
@@ -518,7 +524,7 @@ fn absent_parts_have_their_partners_signatures() {
             assert_eq!(partner.get(&function), Some(&signature), "{name} and {partners:?}");
         }
     }
-    // What stands for one another has one interface: functions of one file only are its own affair.
+    // Interchangeable files share these functions; other functions may exist in one file only.
     let starting = |prefix: &str| FILES.iter().map(|(name, _)| *name).filter(|name| name.starts_with(prefix)).collect();
     let alike_in = |prefix: &str, all: Vec<&str>, functions: &[&str]| {
         assert!(all.len() >= 2, "{prefix}");
@@ -564,14 +570,14 @@ fn absent_parts_have_their_partners_signatures() {
     }
 }
 
-/// Names in a kernel's code, in order; comments have none.
+/// The names in a kernel's code, in order, without comments.
 fn names(text: &str) -> Vec<&str> {
     let code = text.lines().map(|line| line.split("//").next().unwrap_or(""));
     let part = |c: char| !c.is_alphanumeric() && c != '_';
     code.flat_map(|line| line.split(part).filter(|name| !name.is_empty())).collect()
 }
 
-/// Of a kernel's text, its compute entry points, each with the first name in its body.
+/// The compute entry points of a kernel's text, each with the first name in its body.
 fn beginnings(text: &str) -> Vec<(&str, &str)> {
     let of_entry = |part| -> (&str, &str) {
         let (head, body) = str::split_once(part, "{\n").unwrap();
@@ -580,12 +586,13 @@ fn beginnings(text: &str) -> Vec<(&str, &str)> {
     text.split("@compute").skip(1).map(of_entry).collect()
 }
 
-/// Uniforms are read by hold() alone, with which entry points begin that use any: all invocations still take part there.
+/// Only hold() reads uniforms. Entry points that use them call it first, while all invocations
+/// still take part.
 #[test]
 fn uniforms_are_read_once_and_first() {
     for (file, text) in FILES {
         let read = names(text).into_iter().filter(|name| ["view", "band"].contains(name)).count();
-        // Both are declared, and read, in the one file.
+        // Both are declared and read in that file.
         assert_eq!(read, if *file == "layout.wgsl" { 4 } else { 0 }, "{file}");
         for (entry, first) in beginnings(text) {
             let arranges = ["arrange", "arrange_rare", "arrange_triangles"].contains(&entry);

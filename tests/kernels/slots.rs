@@ -1,4 +1,5 @@
-//! Splats have room for the batches that are drawn, and no more: what is left out shows in the room, and in no bit.
+//! Buffers of splats have slots only for batches that are drawn: skipping batches saves memory and
+//! does not change a bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -12,11 +13,13 @@ use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Camera, Epsilon, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::DVec3;
 
-/// Where the second view is from.
+/// The eye of the second view.
 const OUTSIDE: DVec3 = DVec3::new(1.0, 0.7, 3.0);
 
-/// 199,998 disks on a sphere, and one behind it that faces [`OUTSIDE`], so large that its centre is 60,000 pixels beside the
-/// image and its rim in it. The last batch is not full.
+/// 199,998 disks on a sphere, and behind it a very large one that faces [`OUTSIDE`].
+///
+/// The large disk's centre is 60,000 pixels outside the image, and its rim is inside it. The last
+/// batch is not full.
 fn scene() -> Scene {
     let mut scene = sphere(200_000, 1.5);
     let last = scene.surfels.len() - 1;
@@ -32,7 +35,7 @@ fn scene() -> Scene {
     scene
 }
 
-/// Views that see more and more, and less again.
+/// Views that see more and more of the scene, then less.
 fn views() -> Vec<Camera> {
     let look = |eye: DVec3, lens| Camera::look_at((128, 128), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
     vec![
@@ -44,7 +47,7 @@ fn views() -> Vec<Camera> {
 }
 
 fn options() -> Vec<RenderOptions> {
-    // A tolerance that does not go by the large disk, within which all would be seen.
+    // An epsilon that is independent of the large disk; otherwise all surfels would be visible.
     let plain = RenderOptions { epsilon: Epsilon::Relative(0.01), ..RenderOptions::default() };
     let lit = RenderOptions { maps: Maps::ON_DEVICE, ..plain.clone() };
     vec![
@@ -58,7 +61,8 @@ fn without_culling(options: &RenderOptions) -> RenderOptions {
     RenderOptions { without: vec![Optimisation::Culling], ..options.clone() }
 }
 
-/// The first view has too little room for the next, which is rendered again; what it needs is then kept.
+/// The first view has too few slots for the second, which is rendered again; later views reuse the
+/// larger buffers.
 #[test]
 fn a_view_that_needs_more_slots_gets_them() {
     let Some(gpu) = common::gpu() else { return };
@@ -74,7 +78,7 @@ fn a_view_that_needs_more_slots_gets_them() {
             assert!(bits(&kept) == bits(&all), "{options:?}, {view:?}");
             room.push(renderer.device_bytes().splats);
         }
-        assert!(room.is_sorted() && room[0] < room[1], "there was room enough, so the test tests nothing: {room:?}");
+        assert!(room.is_sorted() && room[0] < room[1], "no buffer had to grow, so this tests nothing: {room:?}");
     }
 }
 
@@ -88,9 +92,10 @@ fn what_is_left_out_takes_no_room() {
             let (_, report) = renderer.frame(view, &()).unwrap();
             (renderer.device_bytes().splats as f64, report.splats_drawn as f64 / scene.surfels.len() as f64)
         };
-        // A surfel has 36 bytes and its colour.
+        // A surfel needs 36 bytes and its colour 4.
         let surfels = 40.0 * scene.surfels.len() as f64;
-        // A part of the sphere, and half of it; tiles draw nothing early enough to hide anything from the projection.
+        // The first view shows part of the sphere, the second half of it. With tiles, nothing is
+        // drawn early enough to hide splats from the projection.
         let half = if options.organisation == Organisation::Tile { 1.01 } else { 0.9 };
         for (view, most) in views().iter().zip([0.15, half]) {
             let ((all, _), (own, drawn)) = (room(&without_culling(&options), view), room(&options, view));
@@ -103,7 +108,7 @@ fn what_is_left_out_takes_no_room() {
 #[test]
 fn wrong_slots_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
-    // In the third view some batches are far and seen.
+    // In the third view some far batches are visible.
     let (scene, views) = (scene(), &views()[1..3]);
     let mut backend = Backend::gpu(gpu);
     let mut image = |sources: Sources, options: &RenderOptions| {
@@ -117,7 +122,7 @@ fn wrong_slots_are_noticed() {
     let wrong = [
         ("cull.wgsl", "spare.y << SPARE.x", "spare.y"),
         ("cull.wgsl", "drawn[1] - workgroups.y + workgroup.y", "workgroup.y"),
-        // The large disk's anchor has more than 16 bits.
+        // The large disk's anchor needs more than 16 bits.
         ("cull.wgsl", "const SPARE: vec2<u32> = vec2<u32>(9u)", "const SPARE: vec2<u32> = vec2<u32>(16u)"),
         ("project.wgsl", "atomicAdd(&rare[0], 1u)], slot)", "atomicAdd(&rare[0], 1u)], place_for(slot))"),
     ];
@@ -126,7 +131,8 @@ fn wrong_slots_are_noticed() {
         for (file, from, to) in wrong {
             assert!(image(broken(file, from, to), &options) != expected, "{from} in {file} may be {to:?}: {options:?}");
         }
-        // The last surfel is repeated to the end of its batch.
+        // Repeating the last surfel to the end of its batch has no effect until the check for
+        // existence is removed.
         let repeated = broken("project.wgsl", "surfel_at(index)", "surfel_at(min(index, surfels_held() - 1u))");
         assert!(image(repeated.clone(), &options) == expected);
         let repeated = repeated.replace("project.wgsl", "exists && faces", "faces").unwrap();

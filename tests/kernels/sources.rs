@@ -1,4 +1,5 @@
-//! Surfels that no scene in memory has: a source that makes its pages when a device asks for them.
+//! A source without a scene in memory, which makes its pages when a device asks for them, draws
+//! like the scene.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,7 +16,7 @@ use epsplat::low_level::plan::{Facts, Optimisation, RenderOptions, SceneNeeds};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
 
-/// The surfels of `common::scenes::sphere`, made one by one.
+/// Makes the surfels of `common::scenes::sphere` one by one.
 struct Made {
     facts: Facts,
     one: fn(usize) -> (Surfel, [u8; 4]),
@@ -75,7 +76,7 @@ impl Page for Part {
     }
 
     fn balls(&self) -> Vec<[f32; 4]> {
-        // Every ball holds the whole sphere: nothing is left out.
+        // Every ball contains the whole sphere, so no batch is skipped.
         vec![[0.0, 0.0, 0.0, 2.0]; self.len.div_ceil(64)]
     }
 
@@ -100,7 +101,7 @@ fn pages_that_are_made_when_they_are_asked_for_draw_what_a_scene_does() {
             let (frame, report) = renderer.frame(&camera, &()).unwrap();
             assert!(bits(&frame) == bits(&expected), "{limit}");
             assert_eq!(report.surfels, COUNT as u64);
-            // Ties apart, which go by the place in memory, the same surfels are named.
+            // The index maps may differ only in ties, which depend on the position in memory.
             let differ = frame.numbers(Map::Index).unwrap().iter().zip(expected.numbers(Map::Index).unwrap());
             assert!(differ.filter(|(a, b)| a != b).count() < 20);
         }

@@ -1,4 +1,4 @@
-//! Sums that leave the device: one form from every adapter, and back to the same picture.
+//! Sums read from a device: they are equal on every adapter, and resolve to the same picture.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ fn of(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Sum
     sums(scene, camera, options, gpu, &Sources::default()).unwrap()
 }
 
-/// The default and what keeps sums otherwise.
+/// The default options, and some that store sums differently.
 fn options() -> Vec<RenderOptions> {
     let plain = RenderOptions { maps: Maps::ON_DEVICE, ..RenderOptions::default() };
     vec![
@@ -61,12 +61,12 @@ fn every_adapter_and_cut_has_the_same_sums() {
         ] {
             let taken = of(&scene, &camera, &options, &other);
             assert!(taken == whole, "{name}, {options:?}");
-            // From one device to the other.
+            // Sums move from one device to another.
             let there = resolve(&whole, &scene, &camera, &options, &other, &Sources::default()).unwrap();
             let here = resolve(&taken, &scene, &camera, &options, &gpu, &Sources::default()).unwrap();
             assert!(bits(&there) == bits(&here), "{name}, {options:?}");
         }
-        // Nor does the order of the surfels show.
+        // The order of the surfels does not matter either.
         assert!(of(&shuffled(&scene, 5), &camera, &options, &gpu) == whole);
     }
 }
@@ -114,7 +114,7 @@ fn a_changed_sum_shows_and_sums_of_another_render_are_refused() {
         let error = picture(&taken, &other).unwrap_err().to_string();
         assert!(error.contains("sums"), "{error}");
     }
-    // Lights are of the picture alone.
+    // Lights affect the picture, not the sums.
     let dark = RenderOptions { lights: vec![Light::Headlight { intensity: 0.5 }], ..options.clone() };
     let [lit, dim] = [&options, &dark].map(|options| picture(&taken, options).unwrap());
     let expected = render(&scene, &camera, &dark, &Backend::gpu(common::gpu().unwrap()), &()).unwrap().0;

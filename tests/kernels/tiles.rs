@@ -1,4 +1,5 @@
-//! Large splats drawn by tiles, by workgroups, or one by one: no threshold between them shows in any bit.
+//! Large splats drawn by tiles, by workgroups or one by one: no threshold between these changes a
+//! bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,7 +16,7 @@ use epsplat::low_level::scene::{
 };
 use glam::{DVec3, Vec3};
 
-/// Kernels that take splats of more than `pixels` pixels for large.
+/// Kernels that treat splats of more than `pixels` pixels as large.
 fn large_from(pixels: u32) -> Sources {
     Sources::default().replace("footprint.wgsl", "size.y > LARGE", &format!("size.y > {pixels}u")).unwrap()
 }
@@ -30,7 +31,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     (frame, report)
 }
 
-/// Scenes whose splats are of all sizes, and options that need each form of the kernels.
+/// Scenes with splats of all sizes, and options that cover each variant of the kernels.
 fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     let plain = RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() };
     let mut all = Vec::new();
@@ -47,7 +48,7 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     all.push(("ewa", globe.clone(), camera.clone(), RenderOptions { low_pass: LowPass::Ewa, ..plain.clone() }));
     let of_radius = RenderOptions { epsilon: Epsilon::Radius(0.5), ..plain.clone() };
     all.push(("radius", globe.clone(), camera.clone(), of_radius));
-    // Weights that fall to nothing take wide sums.
+    // A narrow Gaussian has tiny weights, which require wide sums.
     let wide = RenderOptions { kernel: Kernel::Gaussian { sigma: 0.2 }, ..plain.clone() };
     all.push(("wide", globe, camera.clone(), wide));
     let placed = RenderOptions { maps: plain.maps.and(&[Map::TexZ]), ..plain.clone() };
@@ -59,7 +60,7 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     all
 }
 
-/// Asserts that the drawn scenes called `names` are the same with each of `thresholds`.
+/// Asserts that the scenes called `names` give the same frames with each of `thresholds`.
 fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
     let backend = |pixels| {
         let mut gpu = common::gpu()?;
@@ -74,11 +75,11 @@ fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
         assert!(!report.needs.contains(&"tiles"));
         for (pixels, backend) in &others {
             let (tiled, _) = frame(&scene, &camera, &options, backend);
-            assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels on show");
+            assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels upward change bits");
             let all = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
             let (gathered, report) = frame(&scene, &camera, &all, backend);
             assert!(report.needs.contains(&"gather"));
-            assert!(bits(&gathered) == bits(&expected), "{name}: all tiles, some lists from {pixels} pixels on, show");
+            assert!(bits(&gathered) == bits(&expected), "{name}: gathering from {pixels} pixels on changes bits");
         }
     }
 }
@@ -109,28 +110,29 @@ fn bands_and_pages_of_tiles_do_not_show() {
     let in_pieces = |bytes, sources| on(common::gpu().unwrap().with_buffer_limit(bytes), sources);
     let (name, scene, camera, options) = drawn().swap_remove(1);
     let one = frame(&scene, &camera, &options, &whole);
-    // Each band leaves out batches by its own rows.
+    // Each band skips batches by its own rows.
     let hidden = |options: &RenderOptions, bytes| {
         let many = frame(&scene, &camera, options, &in_pieces(bytes, large_from(30)));
         assert!(bits(&one.0) == bits(&many.0), "{name}: buffers of {bytes} bytes, {options:?}");
         assert!(one.1.needs.contains(&"cull") && many.1.needs.contains(&"cull"), "{name}: {:?}", many.1.needs);
         many.1.needs.contains(&"gather")
     };
-    assert!(!hidden(&options, 40_000), "of several pages no tiles gather");
+    assert!(!hidden(&options, 40_000), "tiles must not gather several pages");
     let tiles = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
-    assert!(hidden(&tiles, 70_000), "tiles gather in every band");
-    // Of a band that leaves out what shows in its first rows something is missing.
+    assert!(hidden(&tiles, 70_000), "tiles must gather in every band");
+    // The control: a band that skips what is visible in its first rows is noticed.
     let above = large_from(30).replace("cull.wgsl", "vec2<f32>(0.0, top));", "vec2<f32>(0.0, top + 40.0));").unwrap();
     let (cut, _) = frame(&scene, &camera, &options, &in_pieces(70_000, above));
-    assert!(bits(&cut) != bits(&one.0), "{name}: a band's first rows do not show");
+    assert!(bits(&cut) != bits(&one.0), "{name}: missing first rows are not noticed");
 }
 
-/// A kernel that draws a tile wrongly is noticed, whatever it does wrong.
+/// The control: each way to draw a tile wrongly is noticed.
 #[test]
 fn a_wrong_tile_is_noticed() {
     let (name, scene, camera, mut options) = drawn().swap_remove(1);
     options.organisation = Organisation::Tile;
-    // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
+    // Changes to tiles that gather all splats, large and small, and (below) to tiles that add large
+    // splats to stored sums of several pages.
     let gathered = [
         ("bin.wgsl", "atomicStore(&lists[at], slot)", "atomicStore(&lists[at], 0u)"),
         ("bin.wgsl", "tile_size(), 0u, 1u, true)", "tile_size(), 1u, 1u, true)"),
@@ -148,7 +150,7 @@ fn a_wrong_tile_is_noticed() {
         ("covered.wgsl", "place < visible[covered_start()]", "place + 1u < visible[covered_start()]"),
         ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
     ];
-    // A unit of 2^-32 would not show, 2^-4 does.
+    // A change of one unit of 2^-32 would be invisible; 2^-4 is not.
     let stored = [
         ("tile.wgsl", "deposit(column.pixel + k * held.width)", "deposit(column.pixel)"),
         ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
@@ -175,34 +177,36 @@ fn a_wrong_tile_is_noticed() {
     }
 }
 
-/// The first frame's lists are too small for the second, which is rendered again with more room.
+/// The first frame's lists are too short for the second, which is rendered again with larger
+/// buffers.
 #[test]
 fn a_view_that_needs_more_room_gets_it() {
     let Some(gpu) = common::gpu() else { return };
     let backend = on(gpu, large_from(30));
     let scene = sphere(900, 2.5);
     let near = common::scenes::sphere_camera(160, Projection::Pinhole);
-    // Another lens keeps the image's size, and with it the buffers.
+    // Another lens keeps the image size, so the renderer reuses its buffers.
     let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
-    // Left to itself the far view, whose splats are tiny, is scattered; both ways of the sums then follow each other.
+    // `Auto` scatters the far view, whose splats are tiny, so the two ways of summing alternate.
     for organisation in [Organisation::Tile, Organisation::Auto] {
         let options = RenderOptions { organisation, ..RenderOptions::default() };
         let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
         renderer.frame(&far, &()).unwrap();
         let small = renderer.device_bytes().pixels;
-        // And back: what is kept does not show either.
+        // Then back to the far view: larger buffers do not change a bit either.
         for view in [&near, &far] {
             let (kept, _) = renderer.frame(view, &()).unwrap();
             let grew = renderer.device_bytes().pixels > small;
             let must = organisation == Organisation::Tile && view == &near;
-            assert!(grew || !must, "there was room enough: the test tests nothing");
+            assert!(grew || !must, "no buffer had to grow, so this tests nothing");
             let (fresh, _) = render(&scene, view, &options, &backend, &()).unwrap();
             assert!(bits(&kept) == bits(&fresh), "{organisation:?}");
         }
     }
 }
 
-/// Bands have splats of their own, and one may need much more room than the next: what is learned of one must not hold for another.
+/// Each band has its own splats and may need far longer lists than the next, so lengths are
+/// recorded per band.
 #[test]
 fn bands_that_need_different_room_get_it() {
     let Some(gpu) = common::gpu() else { return };
@@ -210,7 +214,7 @@ fn bands_that_need_different_room_get_it() {
     let scene = sphere(900, 2.5);
     let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
     let near = common::scenes::sphere_camera(160, Projection::Pinhole);
-    // In the first band, the last, and a sliver of it.
+    // The sphere is in the first band, in the last, and with only a sliver of it in view.
     let [up, down, sliver] = [-60.0, 60.0, 140.0].map(|moved| Camera { cy: near.cy + moved, ..near.clone() });
     for organisation in [Organisation::Auto, Organisation::Tile] {
         let options = RenderOptions { organisation, ..RenderOptions::default() };
@@ -224,7 +228,7 @@ fn bands_that_need_different_room_get_it() {
     }
 }
 
-/// The longest lists that are drawn, of large and of small splats over the same tile, both of its halves.
+/// The longest lists that tiles draw, of large and small splats over both halves of a tile.
 #[test]
 fn the_longest_lists_are_drawn_to_their_end() {
     const LONGEST: usize = 8_000;
@@ -233,7 +237,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
         gpu.adapter.subgroups &= subgroups;
         let backend = on(gpu, large_from(100));
         let disk = |radius: f32| Surfel::disk(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, radius);
-        // Of eight pixels across, and of the whole image.
+        // Radius of 4 pixels, and one that covers the whole image.
         let surfels = [4.0, 20.0].iter().flat_map(|&radius| vec![disk(radius); LONGEST]).collect();
         let colors = Colors::Constant([1.0; 4]);
         let scene =
@@ -255,7 +259,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
     }
 }
 
-/// Lists longer than what one loop of any driver runs through are left to scatter and the workgroups.
+/// Lists that exceed a driver's loop limit are left to scatter and workgroups.
 #[test]
 fn long_lists_are_drawn_to_their_end() {
     let Some(gpu) = common::gpu() else { return };
@@ -267,7 +271,7 @@ fn long_lists_are_drawn_to_their_end() {
         shading: Shading::Unlit,
         maps: Maps::ON_DEVICE,
         epsilon: Epsilon::Absolute(1.0),
-        // They are all the same.
+        // All surfels are equal, and would otherwise be drawn once.
         without: vec![Optimisation::Copies],
         ..Default::default()
     };

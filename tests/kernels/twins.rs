@@ -1,5 +1,6 @@
-//! Each kernel against its f64 twin, within the bounds of `src/hardcases/precision.rs`; and each comparison against a kernel
-//! that is broken a little, which it must notice.
+//! Each kernel against its f64 twin, within the bounds of `src/hardcases/precision.rs`.
+//!
+//! Each comparison has a control: it must notice kernels that are broken slightly.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -38,7 +39,7 @@ fn broken(file: &str, from: &str, to: &str) -> Sources {
     Sources::default().replace(file, from, to).unwrap()
 }
 
-/// rho and depth of the device's record at (x, y), evaluated in f64; depth in world units.
+/// Evaluates the device's record at (x, y) in f64; returns rho and depth in world units.
 fn record_at(splat: &layout::Splat, projection: Projection, x: u32, y: u32, world: f64) -> Option<(f64, f64)> {
     let (dx, dy) = (f64::from(x) - f64::from(splat.anchor_x), f64::from(y) - f64::from(splat.anchor_y));
     let row = |r: [f32; 3]| f64::from(r[0]) * dx + f64::from(r[1]) * dy + f64::from(r[2]);
@@ -49,12 +50,12 @@ fn record_at(splat: &layout::Splat, projection: Projection, x: u32, y: u32, worl
     }
 }
 
-/// What a comparison found: how much it looked at, and what lies outside the bounds.
+/// The result of a comparison: the number of values compared, and those outside the bounds.
 #[derive(Default)]
 struct Findings {
     looked: usize,
     wrong: Vec<String>,
-    /// The largest share of a bound that was used up.
+    /// The largest used fraction of a bound.
     used: f64,
 }
 
@@ -87,7 +88,7 @@ impl Findings {
     }
 }
 
-/// Stage 1.
+/// Stage 1: projected splats.
 fn compare_splats(case: &Case, twins: &[Splat], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     let world = f64::from(device.view.world);
@@ -111,7 +112,8 @@ fn compare_splats(case: &Case, twins: &[Splat], device: &Stages) -> Findings {
                     findings
                         .fail(name(&format!("pixel {x} {y} is hit, but lies outside the bounds {first:?} {last:?}")));
                 }
-                // Beyond the disk's neighbourhood nobody evaluates the record; bounds of first order hold near it.
+                // Records are not evaluated away from the disk, and the first-order bounds hold
+                // only near it.
                 if empty || at.rho2 > 4.0 || bound.depth > 0.1 {
                     continue;
                 }
@@ -129,7 +131,7 @@ fn compare_splats(case: &Case, twins: &[Splat], device: &Stages) -> Findings {
     findings
 }
 
-/// Stage 2.
+/// Stage 2: nearest depths.
 fn compare_nearest(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     for (index, pixel) in enclosure.iter().enumerate() {
@@ -142,7 +144,7 @@ fn compare_nearest(case: &Case, enclosure: &[Pixel], device: &Stages) -> Finding
     findings
 }
 
-/// Stage 3.
+/// Stage 3: weighted sums.
 fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     for (index, pixel) in enclosure.iter().enumerate() {
@@ -182,8 +184,10 @@ fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     findings
 }
 
-/// The twins themselves lie in the enclosures, and enclosures are worth something: nearly all pixels are decided, and
-/// depth and weight are known to few digits less than f32 has.
+/// Checks that the twins lie in the enclosures, and that these are tight.
+///
+/// Nearly all pixels must be decided, and the intervals of depth and weight only a few digits wider
+/// than f32 precision.
 fn check_enclosure(case: &Case, options: &RenderOptions, twins: &[Splat], enclosure: &[Pixel]) {
     let height = case.camera.height;
     let nearest = visibility::reference(twins.iter(), &case.camera, LowPass::None, 0, height);
@@ -219,7 +223,8 @@ fn check_enclosure(case: &Case, options: &RenderOptions, twins: &[Splat], enclos
 
 #[test]
 fn scenes_hold_what_they_claim() {
-    // The widest range of cosines and the edge-on disks are hit somewhere, or the bounds are not tried.
+    // The widest range of cosines and the edge-on disks hit some pixels; otherwise the bounds would
+    // not be exercised.
     let case = &cases()[0];
     let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
     let mut hit_below = [0usize; 6];
@@ -282,7 +287,7 @@ fn a_broken_projection_is_noticed() {
 fn visibility_and_accumulate_match_their_twins() {
     let Some(gpu) = common::gpu() else { return };
     for (index, case) in cases().into_iter().enumerate() {
-        // Each form of the kernel's power is compiled by itself.
+        // Each variant of the kernel's power is compiled separately.
         let n = [3.0, 2.0, 4.0, 1.7][index % 4];
         let options = options(Kernel::Ellipse { a: 6.0, n, smooth: false });
         let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
@@ -349,13 +354,15 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 }
                 let difference =
                     (0..4).map(|k| (device.color[pixel][k] - twin.color[pixel][k]).abs()).fold(0.0, f32::max);
-                // The documented bound of the sums, of ranges of 1 (colour) and 2 (normal), and a few units of f32.
+                // The documented bound of the sums, for ranges of 1 (colour) and 2 (normal), and a
+                // few f32 units.
                 let weight = twin.map(Map::Weight).unwrap()[pixel];
                 let count = twin.map(Map::Count).unwrap()[pixel];
                 let bound = Accumulator::Fixed.row().error_bound;
                 let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
-                // A highlight's cosine moves by four times what the normal does, and its power by the exponent times that.
+                // The error of a highlight's cosine is four times that of the normal, and its power
+                // multiplies that by the exponent.
                 let highlight = if shading == Shading::Phong { 1.0 + 4.0 * options.shininess } else { 0.0 };
                 let of_color = limit * (1.0 + HIGHLIGHT as f32 * highlight);
                 assert!(

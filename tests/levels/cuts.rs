@@ -1,4 +1,5 @@
-//! Cuts of levels of detail on a device: the twin's, to the bit, however the tree lies in buffers.
+//! Cuts of levels of detail on a device equal the twin's cut bit by bit, however the tree is split
+//! into buffers.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,7 +22,8 @@ use epsplat::low_level::scene::{
 };
 use glam::{DVec3, Vec3};
 
-/// One whose buffers hold 1,900 surfels and nodes, so that a tree has several branches.
+/// An adapter whose buffers hold 1,900 surfels and nodes, so that a tree is split into several
+/// branches.
 fn small() -> Gpu {
     common::gpu().unwrap().with_buffer_limit(70_000)
 }
@@ -32,12 +34,12 @@ fn at(pixels: f64) -> RenderOptions {
     RenderOptions { detail: Detail::Pixels(pixels), cull: Cull::None, maps: MAPS, ..RenderOptions::default() }
 }
 
-/// The same, but that cuts fade into each other.
+/// The same options with fading cuts.
 fn fading(options: &RenderOptions) -> RenderOptions {
     RenderOptions { detail_fades: true, ..options.clone() }
 }
 
-/// Spheres in all that a surfel may have, and one of which a part lies far off.
+/// Spheres with every kind of surfel attribute, and one with a distant part.
 fn all() -> Vec<(&'static str, Scene)> {
     let plain = sphere(6000, 1.7);
     let number = |k: usize, step: usize| (k * step % 97) as f32 / 97.0;
@@ -64,7 +66,7 @@ fn all() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// The frame of a cut that the device makes is that of the twin's cut, to the bit.
+/// The frame of a cut that the device selects equals that of the twin's cut, bit by bit.
 #[test]
 fn a_device_makes_the_cut_of_its_twin() {
     let Some(gpu) = common::gpu() else { return };
@@ -87,7 +89,7 @@ fn a_device_makes_the_cut_of_its_twin() {
                 },
             ),
         ];
-        // All that there is of one scene; of the others what they add.
+        // The first scene is drawn in all ways, the others only in the first.
         let (ways, adapters) = if name == "plain" { (4, 4) } else { (1, 2) };
         let options = options.into_iter().take(ways);
         let fading = options.clone().map(|(projection, options)| (projection, fading(&options)));
@@ -97,8 +99,8 @@ fn a_device_makes_the_cut_of_its_twin() {
             let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
             assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
             assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
-            // The first adapter draws all of them, and the others a third each, as kernels take
-            // seconds to compile.
+            // The first adapter draws all of them and the others a third each, as compiling kernels
+            // takes seconds.
             let draws = |on: usize| name != "plain" || on == 0 || (on + step).is_multiple_of(3);
             for (_, (on, backend)) in backends.iter().take(adapters).enumerate().filter(|(on, _)| draws(*on)) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
@@ -112,7 +114,7 @@ fn a_device_makes_the_cut_of_its_twin() {
     }
 }
 
-/// Backs are left out by the cones of their nodes, from without, from within and beside the image.
+/// Nodes that face away are culled by their normal cones, from outside, from inside and off-centre.
 #[test]
 fn a_device_leaves_out_what_its_twin_does() {
     let Some(gpu) = common::gpu() else { return };
@@ -146,7 +148,8 @@ fn a_device_leaves_out_what_its_twin_does() {
     assert!(left_out >= 5, "{left_out}");
 }
 
-/// All that shows through, by lists whose ties go by the order of the cut.
+/// Cuts with transparency and with the rasteriser; ties in fragment lists follow the order of the
+/// cut.
 #[test]
 fn cuts_are_composited_and_rasterised() {
     let Some(gpu) = common::gpu() else { return };
@@ -158,23 +161,23 @@ fn cuts_are_composited_and_rasterised() {
         let expected = bits(&frame(&scene, &camera, &options, &own));
         assert!(expected == bits(&frame(&scene, &camera, &options, &small)), "{composite:?}");
         let (twins, flat) = cut(&scene, &camera, &options);
-        // Of a scene by itself ties go by another order, and depths start elsewhere.
+        // As a scene of its own, the cut has another order of ties and another least depth.
         let alike = || expected == bits(&frame(&twins, &camera, &flat, &own));
         assert!(!matches!(composite, Composite::Layers(_)) || alike(), "{composite:?}");
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
         let wrong = differ(&frame(&scene, &camera, &options, &own), &reference);
-        // Fragments at nearly one depth may be sorted the other way: as in a scene of the cut
-        // alone.
+        // Fragments at almost equal depths may be sorted differently, as in a scene that consists
+        // of the cut.
         let alone = differ(&frame(&twins, &camera, &flat, &own), &frame(&twins, &camera, &flat, &Backend::Reference));
         assert!(wrong < 5 + alone && alone < 10, "{composite:?}: {wrong} {alone}");
     }
     let raster = RenderOptions { raster: Some(Default::default()), maps: Maps::of(&[Map::Depth]), ..at(100.0) };
-    // It draws flat disks.
+    // The rasteriser draws flat disks.
     let disks = RenderOptions { raster: None, detail_caps: false, ..raster.clone() };
     let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
-    // By its own depths, moved by the radius of each surfel, it draws the twin's cut as it draws
-    // that alone.
+    // With its own depths, offset by each surfel's radius, it draws the cut like a scene that
+    // consists of it.
     let moved = Raster { depth: RasterDepth::Offset, ..Raster::default() };
     let moved = RenderOptions { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
     let (twins, flat) = cut(&scene, &camera, &moved);
@@ -185,14 +188,14 @@ fn cuts_are_composited_and_rasterised() {
     assert!(right < 5 && wrong > 10, "{right} {wrong}");
 }
 
-/// Pixels whose colours are not nearly the same.
+/// The number of pixels whose colours differ by 0.01 or more.
 fn differ(shown: &Frame, truth: &Frame) -> usize {
     let near = |(a, b): (&[f32; 4], &[f32; 4])| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
     shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
 }
 
-/// The same bits for any order of the surfels, on one thread or more, view after view, with room
-/// for them or without.
+/// The same bits for any order of the surfels, any number of threads, and any sequence of views,
+/// whether or not buffers must grow.
 #[test]
 fn a_cut_depends_on_tree_and_camera_alone() {
     let Some(gpu) = common::gpu() else { return };
@@ -204,8 +207,8 @@ fn a_cut_depends_on_tree_and_camera_alone() {
     assert!(expected == bits(&frame(&levels(shuffled(&flat, 3)), &camera, &options, &backend)));
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(expected == one.install(|| bits(&frame(&levels(flat.clone()), &camera, &options, &backend))));
-    // From afar little is drawn, and from near more than there was room for; then there is too
-    // much.
+    // Far views draw little; near ones need more than the buffers hold; then the buffers are too
+    // large.
     let view = |distance: f64| {
         let eye = DVec3::new(1.2, 0.7, 2.4) * distance;
         Camera::look_at((100, 100), Lens::Fov(45.0), eye, DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
@@ -221,7 +224,7 @@ fn a_cut_depends_on_tree_and_camera_alone() {
     }
 }
 
-/// A leaf of more surfels than one invocation copies, or a buffer holds.
+/// A leaf with more surfels than one invocation copies or one buffer holds.
 #[test]
 fn crowded_leaves_are_drawn_whole() {
     let Some(gpu) = common::gpu() else { return };
@@ -234,7 +237,7 @@ fn crowded_leaves_are_drawn_whole() {
     let scene = levels(scene);
     assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 40_000));
     let camera = sphere_camera(90, Projection::Pinhole);
-    // Copies of one surfel are one where all are drawn.
+    // Otherwise the copies would be drawn as one surfel.
     let options = RenderOptions { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
     assert_eq!(twins.scene.surfels.len(), 42_000);
@@ -242,7 +245,7 @@ fn crowded_leaves_are_drawn_whole() {
         let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
         assert_eq!(report.cut, Some(42_000));
         assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
-        // In some of the cuts the leaf is divided, in others not.
+        // Some of the fading cuts divide the leaf and others do not.
         let both =
             (7..12).map(|k| fading(&RenderOptions { detail: Detail::Pixels(f64::from(k).exp2()), ..options.clone() }));
         for options in both {
@@ -254,18 +257,18 @@ fn crowded_leaves_are_drawn_whole() {
         let coarse = RenderOptions { detail: Detail::Pixels(1e7), ..options.clone() };
         let few = cut(&scene, &camera, &coarse).0.scene.surfels.len() as u64;
         assert_eq!(render(&scene, &camera, &coarse, &backend, &()).unwrap().1.cut, Some(few));
-        // But for nodes as wide as the sphere the leaf is one.
+        // With nodes as large as the sphere, the leaf is drawn as one node.
         assert!(few < 100, "{few}");
     }
 }
 
-/// Several such leaves at depths of their own: loops of one invocation would take more rounds than
-/// llvmpipe ends them after.
+/// Several such leaves at different depths of the tree: a loop in one invocation would exceed
+/// llvmpipe's iteration limit.
 #[test]
 fn crowds_at_several_depths_are_drawn_whole() {
     const COPIES: usize = 33_000;
     let Some(gpu) = common::gpu() else { return };
-    // Means divide off the farthest first.
+    // Splitting at means separates the farthest crowd first.
     let crowd = |k: i32| vec![Surfel::disk(Vec3::X * 2f32.powi(-2 * k), Vec3::Z, 0.05); COPIES];
     let surfels: Vec<Surfel> = (0..4).flat_map(crowd).collect();
     let colors = Colors::Srgb8((0..surfels.len()).map(|k| [(k / COPIES * 60) as u8, 90, 20, 255]).collect());
@@ -280,8 +283,8 @@ fn crowds_at_several_depths_are_drawn_whole() {
     assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
 }
 
-/// Views through which the camera's plane goes, in samples, far from the origin and of a number of
-/// splats: the twin's cut.
+/// Unusual views have the cut of the twin: the camera plane crosses the scene, several samples, far
+/// from the origin, a fixed number of splats.
 #[test]
 fn odd_views_have_the_cut_of_the_twin() {
     let Some(gpu) = common::gpu() else { return };
@@ -289,8 +292,7 @@ fn odd_views_have_the_cut_of_the_twin() {
     let plain = sphere(6000, 1.7);
     let mut far = plain.clone();
     far.low = vec![[0.0; 3]; 6000];
-    // Two spheres, of which the one that is looked at is so far off that f32 has no room for its
-    // digits.
+    // Two spheres; the visible one is so far away that f32 cannot hold its coordinates.
     for (index, surfel) in far.surfels.iter_mut().enumerate().skip(3000) {
         let x = f64::from(surfel.center[0]) + 3e7;
         surfel.center[0] = x as f32;
@@ -314,12 +316,12 @@ fn odd_views_have_the_cut_of_the_twin() {
                 let (reference, of_twin) = render(scene, camera, &options, &Backend::Reference, &()).unwrap();
                 assert_eq!(report.cut, of_twin.cut, "{camera:?} {options:?}");
                 let drawn = report.cut.unwrap();
-                // From within a sphere nothing faces the eye.
+                // From inside a sphere all surfels face away.
                 let least = if cull == Cull::None { 50 } else { 0 };
                 assert!(drawn < most, "{drawn} {options:?}");
                 assert!(detail != Detail::Splats(200) || (least..=200).contains(&drawn), "{drawn} {options:?}");
                 assert!(differ(&shown, &reference) < 3, "{camera:?} {options:?}");
-                // What is left out does not show.
+                // Culled surfels do not change the picture.
                 let whole = RenderOptions { detail: Detail::FINEST, ..options.clone() };
                 let all = frame(scene, camera, &whole, &backend);
                 assert!(detail != Detail::Pixels(1e-6) || differ(&shown, &all) == 0, "{camera:?} {cull:?}");
@@ -328,13 +330,13 @@ fn odd_views_have_the_cut_of_the_twin() {
     }
 }
 
-/// A kernel that makes a cut wrongly is noticed, whatever it does wrong.
+/// The control: each way to break a kernel of the selection is noticed.
 #[test]
 fn broken_kernels_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let scene = levels(sphere(6000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
-    // Of which the second has several branches and pages.
+    // The second of these has several branches and pages.
     let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(1e-6) }];
     let whole = [Backend::gpu(gpu), Backend::gpu(small())];
     let right = [0, 1].map(|way| {
@@ -371,14 +373,14 @@ fn broken_kernels_are_noticed() {
     }
 }
 
-/// For the first levels, which are a workgroup's, and for levels with so many nodes that an
-/// invocation sums the counts of several.
+/// Levels with so many nodes that an invocation sums several counts, besides the first levels,
+/// which one workgroup handles.
 #[test]
 fn large_levels_are_summed() {
     let Some(gpu) = common::gpu() else { return };
     let scene = levels(sphere(400_000, 1.7));
     let camera = sphere_camera(90, Projection::Pinhole);
-    // By area each is judged.
+    // With the area measure every node is tested.
     let options = RenderOptions { detail_measure: DetailMeasure::Area, maps: Maps::NONE, ..at(1e-3) };
     let (twins, _) = cut(&scene, &camera, &options);
     let right = Some(twins.scene.surfels.len() as u64);
@@ -388,10 +390,10 @@ fn large_levels_are_summed() {
     };
     let whole = of(&Backend::gpu(gpu.clone()));
     assert_eq!(whole.1, right);
-    // In branches levels are smaller, but of some larger than what a workgroup judges.
+    // Branches have smaller levels, but some still exceed what one workgroup handles.
     let branches = Backend::gpu(gpu.clone().with_buffer_limit(2_000_000));
     assert!(of(&branches) == whole);
-    // Of cuts that fade into each other not all come to a node.
+    // With fading, not every cut reaches every node.
     let fading = fading(&at(4.0));
     let right = Some(cut(&scene, &camera, &fading).0.scene.surfels.len() as u64);
     let [one, other] = [Backend::gpu(gpu.clone()), branches].map(|backend| {
@@ -411,8 +413,9 @@ fn large_levels_are_summed() {
     }
 }
 
-/// Children that are drawn without being judged are those that would be, wherever nodes lie in the
-/// image and before it; and what tells so is needed.
+/// Children that are drawn without a test of their own are exactly those that would pass it,
+/// wherever nodes lie in the image and relative to the camera; each condition for this is
+/// necessary.
 #[test]
 fn children_are_drawn_together_where_each_would_be() {
     const TOGETHER: &str = "MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball)";
@@ -450,7 +453,7 @@ fn children_are_drawn_together_where_each_would_be() {
     assert_eq!(noticed, [true; 2]);
 }
 
-/// What `drawn_at` of a text of select.wgsl says of each (runs, stride, place, first).
+/// Runs `drawn_at` of a text of select.wgsl for each (runs, stride, place, first).
 fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
     const KERNEL: &str = "
         const RUN: u32 = 512u;
@@ -480,8 +483,8 @@ fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
     evaluate(gpu, &text, &View::zeroed(), inputs, inputs.len() as u64).unwrap()
 }
 
-/// Remainders are found by f32 and corrected: they are those of integers, up to the most runs that
-/// a page has.
+/// Remainders computed in f32 and corrected equal integer remainders, up to the largest number of
+/// runs of a page.
 #[test]
 fn places_are_dealt_out_exactly() {
     let Some(gpu) = common::gpu() else { return };
@@ -491,7 +494,7 @@ fn places_are_dealt_out_exactly() {
             let mut below = |most: u64| (random.bits() % most.max(1)) as u32;
             let runs = if k % 3 == 0 { 65_535 - below(9) } else { below(1 << (1 + k % 16)) };
             let stride = if k % 2 == 0 { below(runs.into()) } else { (f64::from(runs) * 0.618_033_988_75) as u32 };
-            // Those of the rest among them.
+            // Includes places in the incomplete last run.
             [runs, stride, 512 * below(u64::from(runs) + 1) + below(512), below(1000)]
         })
         .collect();

@@ -1,4 +1,5 @@
-//! Cuts of levels of detail that fade into each other: each sample shows one of them, weights are shared, and nothing pops.
+//! Fading cuts of levels of detail: each sample shows one of 64 cuts, and nothing pops along a
+//! camera path.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,18 +22,19 @@ use epsplat::low_level::scene::{
 use epsplat::low_level::surfels::analytic::{Shape, generate};
 use glam::{DVec3, Vec3};
 
-/// Nodes of up to so many square pixels, which fade.
+/// Options with fading, for nodes of up to `pixels` square pixels.
 fn fading(pixels: f64) -> RenderOptions {
     RenderOptions { detail: Detail::Pixels(pixels), detail_fades: true, cull: Cull::None, ..RenderOptions::default() }
 }
 
-/// A pixel has something exactly where the cut of its number has, whose size is one of 64 from half of the largest on.
+/// A pixel is covered exactly where the cut of its number covers it. The 64 cuts have node sizes
+/// from half the largest size upward.
 #[test]
 fn a_sample_shows_the_cut_of_its_number() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
-    // Of flat nodes, as outlines of caps are nearly the same at any size.
+    // Flat nodes, as the outlines of caps hardly depend on their size.
     let options = RenderOptions { detail_caps: false, ..fading(400.0) };
     let [device, reference] =
         [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
@@ -47,7 +49,7 @@ fn a_sample_shows_the_cut_of_its_number() {
             let of_cut = Fade::threshold(index as u32 % 96, index as u32 / 96) == number;
             let shows = [&device, &reference].map(|color| color[index][3] == 1.0);
             assert!(!of_cut || shows == [*expected; 2], "{number}: {index}");
-            // A number that is not the pixel's does not always do.
+            // Cuts of other numbers often differ.
             others += usize::from(!of_cut && shows[0] != *expected);
             some += usize::from(of_cut);
         }
@@ -62,7 +64,8 @@ fn differ(shown: &Frame, truth: &Frame) -> usize {
     shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
 }
 
-/// However it is drawn: by tiles or one by one, with a low-pass, in samples, by every accumulator, in any order.
+/// The same fades by tiles and one by one, with a low-pass, with several samples, with every
+/// accumulator and in any order.
 #[test]
 fn fades_are_those_of_the_twin_in_every_organisation() {
     let Some(gpu) = common::gpu() else { return };
@@ -82,7 +85,7 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
         assert!(bits(&all[0]) == bits(&frame(&levels(shuffled(&flat, 3)), &camera, &options, &backend)));
         let wrong = differ(&all[0], &reference);
         assert!(wrong < 4, "{low_pass:?}: {wrong}");
-        // A size of a hundredth more makes other fades.
+        // A node size that is 1 % larger gives other fades.
         let other = RenderOptions { detail: Detail::Pixels(202.0), ..options.clone() };
         let others = differ(&frame(&scene, &camera, &other, &backend), &reference);
         assert!(others > 100, "{low_pass:?}: {others}");
@@ -92,13 +95,13 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
     let counted = |shown: &Frame| shown.map(Map::Count).unwrap().to_vec();
     let mut sums = 0;
     for row in ACCUMULATORS {
-        // Not every adapter has all of them.
+        // Not every adapter supports all accumulators.
         let options = RenderOptions { accumulator: row.of, ..maps.clone() };
         let Ok((shown, _)) = render(&scene, &camera, &options, &backend, &()) else { continue };
         sums += 1;
         let counts = counted(&shown).iter().zip(&counted(&reference)).filter(|(a, b)| a != b).count();
         assert!(counts < 4, "{}: {counts}", row.name);
-        // Of 24 bits the rim of a 64th of a disk has 9.
+        // With 24 fraction bits, the rim of 1/64 of a disk has only 9 significant bits.
         let colors = shown.color.as_flattened().iter().zip(reference.color.as_flattened());
         let off = colors.filter(|(a, b)| (*a - *b).abs() > 2e-3).count();
         assert!(off < 4, "{}: {off}", row.name);
@@ -110,7 +113,7 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
     assert!(sums >= 3, "{sums}");
 }
 
-/// A plane of 64x64 squares that fills the view.
+/// A plane with a checkerboard of 64 x 64 squares that fills the view.
 fn squares(count: usize) -> Scene {
     let side = (count as f64).sqrt();
     let all: Vec<_> = generate(Shape::Plane, count as u64).collect();
@@ -126,7 +129,7 @@ fn squares(count: usize) -> Scene {
     }
 }
 
-/// Views of a dolly, each nearer by the same part.
+/// Views of a dolly shot; each distance is the same fraction of the previous one.
 fn dolly(size: u32, views: u32) -> Vec<Camera> {
     let view = |k: u32| {
         let distance = 1.6 * 0.7f64.powf(f64::from(k) / f64::from(views - 1));
@@ -137,7 +140,8 @@ fn dolly(size: u32, views: u32) -> Vec<Camera> {
     (0..views).map(view).collect()
 }
 
-/// The largest change of a pixel from a view to the next, and the largest of its parts that are beyond the full cloud's.
+/// The largest change of a pixel from one view to the next, and the largest difference of that
+/// change from the full cloud's.
 fn changes(shown: &[Frame], full: &[Frame]) -> [f32; 2] {
     let mut most = [0.0f32; 2];
     for (views, all) in shown.windows(2).zip(full.windows(2)) {
@@ -152,8 +156,9 @@ fn changes(shown: &[Frame], full: &[Frame]) -> [f32; 2] {
     most
 }
 
-/// Along a dolly of 120 views no pixel of the cut changes more than one and a half times as much as one of the full cloud does, and what is beyond
-/// the same pixel's change is less than half of what it is without fades.
+/// Along a dolly of 120 views no pixel changes more than 1.5 times as much as any of the full cloud
+/// does. The difference from the full cloud's change of the same pixel is less than half of that
+/// without fades.
 #[test]
 fn nothing_pops_along_a_dolly() {
     let Some(gpu) = common::gpu() else { return };
@@ -177,15 +182,15 @@ fn nothing_pops_along_a_dolly() {
     assert!(of_pops > largest && popped > 2.0 * beyond, "{of_pops} {largest} {popped} {beyond}");
 }
 
-/// What fades wrongly is noticed.
+/// The control: each way to break fading is noticed.
 #[test]
 fn broken_fades_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let small = || common::gpu().unwrap().with_buffer_limit(70_000);
     let (scene, camera) = (levels(sphere(6000, 1.7)), sphere_camera(100, Projection::Pinhole));
-    // By tiles all splats or large ones alone, and one by one.
+    // Tiles draw all splats, or only large ones, or none.
     let by = |organisation| RenderOptions { organisation, ..fading(800.0) };
-    // And such that a root of branches is reached in some of the cuts alone.
+    // With these sizes, only some of the cuts reach the root of a branch.
     let above = (12..18).map(|k| fading(f64::from(k).exp2()));
     let ways: Vec<_> =
         [Organisation::Tile, Organisation::Auto, Organisation::Scatter].map(by).into_iter().chain(above).collect();
@@ -216,7 +221,7 @@ fn broken_fades_are_noticed() {
     }
 }
 
-/// Where nothing can fade that is said, and `--cameras` switches from one cut to the next.
+/// Options that exclude fading are refused with a hint at `--lod-fade off`.
 #[test]
 fn what_does_not_fade_is_refused() {
     for options in [
@@ -236,7 +241,7 @@ fn what_does_not_fade_is_refused() {
     }
 }
 
-/// Views of a set of cameras fade, those of one camera do not, and both as it is asked for.
+/// Views of a set of cameras fade by default and single views do not; `--lod-fade` overrides both.
 #[test]
 fn views_of_many_cameras_fade() {
     let folder = Folder::new();
@@ -262,7 +267,7 @@ fn views_of_many_cameras_fade() {
     let many = |more: &[&str]| picture(&[&["--cameras", text(&cameras)], more].concat());
     assert!(many(&[]) == many(&["--lod-fade", "on"]) && many(&[]) != many(&["--lod-fade", "off"]));
     assert!(picture(&[]) == picture(&["--lod-fade", "off"]) && picture(&[]) != picture(&["--lod-fade", "on"]));
-    // What cannot fade does not, unless it is asked to.
+    // By default, options that exclude fading turn it off; with `--lod-fade on` they are refused.
     many(&["--composite", "layers:2"]);
     let output = folder.path("no");
     let base = ["render", text(&levels), "-o", text(&output), "--cameras", text(&cameras), "--lod-fade", "on"];

@@ -1,4 +1,4 @@
-//! Levels of detail: what `epsplat lod` writes, and what a file of them must be.
+//! Levels of detail: the files that `epsplat lod` writes, and the checks on such files.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -23,14 +23,15 @@ fn path_in(folder: &tempfile::TempDir, name: &str) -> String {
     folder.path().join(name).to_str().unwrap().to_owned()
 }
 
-/// The files of a sphere's surfels, and of these with levels of detail.
+/// Writes a file of a sphere's surfels; returns its path and one for the file with levels of
+/// detail.
 fn spheres(folder: &tempfile::TempDir, count: &str) -> [String; 2] {
     let [surfels, levels] = ["sphere.ply", "levels.ply"].map(|name| path_in(folder, name));
     assert_eq!(epsplat(&["generate", "sphere", "--count", count, "-o", &surfels]).0, 0);
     [surfels, levels]
 }
 
-/// A sphere's points in 8-bit or linear colours, far from the origin.
+/// Points of a sphere far from the origin, with 8-bit or linear colours.
 fn points(count: usize, linear: bool) -> Points {
     let scene = common::scenes::sphere(count, 1.5);
     let code = |k: usize| [k as u8, (k / 5) as u8, 90, 255];
@@ -50,7 +51,7 @@ fn lod(points: Points) -> Scene {
     hierarchy::build(build(vec![points], &()).unwrap().0, &()).unwrap().0
 }
 
-/// The tree of a file is the one that was made, and other ways to read the file see a cloud.
+/// A file keeps its tree; if points are missing or files are joined, it is read as a cloud.
 #[test]
 fn a_file_keeps_levels_of_detail() {
     let folder = tempfile::tempdir().unwrap();
@@ -66,7 +67,7 @@ fn a_file_keeps_levels_of_detail() {
         let [made, kept] = [&scene, &again].map(|scene| scene.hierarchy.as_ref().unwrap());
         assert!(made.nodes == kept.nodes);
     }
-    // Of several files, or fewer points, there is no tree.
+    // Several files together, or a file with a dropped point, have no tree.
     let read = || io::read(&path, &()).unwrap();
     assert!(build(vec![read(), read()], &()).unwrap().0.hierarchy.is_none());
     let mut nearly = read();
@@ -85,7 +86,7 @@ fn normals_without_a_side_stay_without_one() {
     assert!(!again.oriented && again.hierarchy.is_some());
 }
 
-/// A file whose tree is none ends in a sentence, whatever is wrong with it.
+/// A file with an invalid tree is refused in one sentence.
 #[test]
 fn broken_trees_are_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,7 +113,7 @@ fn broken_trees_are_told() {
     assert!(rejected(&|tree| tree.nodes[last].count = 0).contains("no children or points"));
     let told = rejected(&|tree| tree.nodes[3].surfel.center[0] = f32::INFINITY);
     assert!(told.contains("not finite"), "{told}");
-    // Cut off in what it says of all points, and in its nodes.
+    // Files truncated in the element `scene` and in the nodes.
     ply::write_scene(&path, &whole, None, &()).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     for (less, element) in [(40, "scene"), (400, "node")] {
@@ -136,7 +137,7 @@ fn the_command_writes_what_it_says() {
     let read = io::read(Path::new(&levels), &()).unwrap();
     assert_eq!(report["surfels"], 2000);
     assert_eq!(report["nodes"], read.tree.unwrap().rows.len());
-    // The same surfels in another order are the same file.
+    // The order of the input surfels does not change the file.
     let mut turned = io::read(Path::new(&surfels), &()).unwrap();
     turned.positions.reverse();
     turned.normals.iter_mut().for_each(|all| all.reverse());
@@ -152,7 +153,9 @@ fn the_command_writes_what_it_says() {
     assert!(code == 2 && told.contains(".ply"), "{told}");
 }
 
-/// `--lod 0` is the picture of all surfels to the bit, with and without levels in the file; a coarser cut is near it, of fewer; made levels are those of
+/// `--lod 0` draws the same bits as all surfels, with and without levels in the file.
+///
+/// A coarser cut has fewer surfels and a similar picture. Levels built on the fly equal those of
 /// the file.
 #[test]
 fn a_cut_is_drawn() {
@@ -169,7 +172,7 @@ fn a_cut_is_drawn() {
     };
     let flat = draw(&surfels, "flat.png", &[]).0;
     assert!(flat == draw(&levels, "all.png", &[]).0 && flat == draw(&levels, "zero.png", &["--lod", "0"]).0);
-    // All is in view, and no node is so small: a cut of all surfels.
+    // Everything is in view and no node is that small, so the cut has all surfels.
     assert!(flat == draw(&levels, "finest.png", &["--lod", "0.000001px"]).0);
     let (coarse, told) = draw(&levels, "coarse.png", &["--lod", "80px"]);
     let drawn = |told: &str| -> u64 {
@@ -201,8 +204,8 @@ fn a_cut_is_drawn() {
     }
 }
 
-/// From within a closed surface its inside is seen, in a cut too, though what is in view does not lie around the eye; from without, a cut that leaves
-/// out backs has no holes at outlines; and a set of cameras draws what one does.
+/// From inside a closed surface, its inside is visible in cuts too. From outside, culling back
+/// faces leaves no holes at outlines.
 #[test]
 fn cuts_of_closed_scenes_are_whole() {
     let folder = tempfile::tempdir().unwrap();
@@ -228,7 +231,8 @@ fn cuts_of_closed_scenes_are_whole() {
     assert!(all > 4000 && cut + 60 > all && cut < all + 400, "{all} {cut}");
 }
 
-/// With a bound for memory what a picture takes is read, whatever the size of the file, for the same picture; and what does not go with that is told.
+/// With `--memory`, only the part of the file that the picture needs is read, and the picture is
+/// the same. Options that exclude this are refused.
 #[test]
 fn memory_is_bounded() {
     let folder = tempfile::tempdir().unwrap();
@@ -264,14 +268,15 @@ fn memory_is_bounded() {
         let (code, _, told) = epsplat(&all);
         assert!(code == 2 && told.contains(words) && !Path::new(&output).exists(), "{arguments:?}: {told}");
     }
-    // From where nothing shows, why is told as of the whole.
+    // If nothing is visible, the warning is about the whole scene.
     let away = ["--lod", "10px", "--memory", "1GiB", "--eye", "0,0,9", "--target", "0,0,12"];
     let output = path("away.png");
     let (code, _, told) = epsplat(&[&["render", &levels, "-o", &output, "--backend", "reference"], &away[..]].concat());
     assert!(code == 0 && told.contains("all lie behind the camera"), "{told}");
 }
 
-/// With a bound for memory points are sorted in files, and the file is the same; a folder of tiles is one tree; and what does not go with that is told.
+/// With `--memory`, points are sorted in temporary files and the result is the same. A folder of
+/// tiles makes one tree. Options that exclude this are refused.
 #[test]
 fn trees_are_made_within_memory() {
     let folder = tempfile::tempdir().unwrap();
@@ -279,7 +284,7 @@ fn trees_are_made_within_memory() {
     let [surfels, levels] = spheres(&folder, "200000");
     let bounded = path("bounded.ply");
     assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
-    // What so many threads take, and room for less than half of the points.
+    // The memory that the threads need, and enough for less than half of the points.
     let threads = std::thread::available_parallelism().unwrap().get();
     let memory = format!("{}MiB", 96 + 48 * threads + 15);
     let (code, text, told) = epsplat(&["lod", &surfels, "-o", &bounded, "--memory", &memory, "--json", "-"]);
@@ -288,7 +293,7 @@ fn trees_are_made_within_memory() {
     assert!(report["surfels"] == 200_000 && report["subtrees"].as_u64().unwrap() >= 8, "{report}");
     let same = || std::fs::read(&levels).unwrap() == std::fs::read(&bounded).unwrap();
     assert!(same());
-    // Two tiles, and something else.
+    // Two tiles and a file that is not one.
     let tiles = folder.path().join("tiles");
     std::fs::create_dir(&tiles).unwrap();
     let whole = io::read(Path::new(&surfels), &()).unwrap();
@@ -327,7 +332,7 @@ fn trees_are_made_within_memory() {
         let (code, _, told) = epsplat(&[&["lod", "-o", &refused], arguments].concat());
         assert!(code == 2 && told.contains(words) && !Path::new(&refused).exists(), "{arguments:?}: {told}");
     }
-    // The least that is named is enough, whether points were looked at or not.
+    // The minimum that an error names is sufficient, whether or not the points were already read.
     for memory in ["1MiB".to_owned(), format!("{}MiB", 96 + 48 * threads + 10)] {
         let lod = |memory: &str| epsplat(&["lod", &surfels, "-o", &refused, "--memory", memory]);
         let (code, _, told) = lod(&memory);
@@ -340,8 +345,8 @@ fn trees_are_made_within_memory() {
     }
 }
 
-/// Nodes at the camera's plane and at outlines are divided at any size: where that makes more than
-/// was asked for it is told.
+/// Nodes at the camera plane and at outlines are always divided; a warning says if that exceeds the
+/// requested number of splats.
 #[test]
 fn more_splats_than_asked_for_are_told() {
     let folder = tempfile::tempdir().unwrap();

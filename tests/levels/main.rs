@@ -1,5 +1,5 @@
 //! Levels of detail.
-//! One program: shared code and kernels are compiled once.
+//! All in one test program, so that shared code and kernels are compiled once.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,5 @@
-//! COPC files with `--lod`: pictures read the nodes that they take, and depend on camera and file alone.
+//! COPC files with `--lod`: a picture reads only the nodes that it needs, and depends only on
+//! camera and file.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -7,14 +8,14 @@ use crate::common;
 use common::command::{DATA, Folder, fails, succeeds, text};
 use std::path::{Path, PathBuf};
 
-/// The extent of the octree's root: its points lie near z = 500.
+/// Centre (x, y) of the octree's root cube; its points lie near z = 500.
 const CENTER: [f64; 2] = [637_937.7, 851_217.6];
 
 fn file() -> String {
     Path::new(DATA).join("simple.copc.laz").to_str().unwrap().to_owned()
 }
 
-/// Renders the file, and returns what the report says was read.
+/// Renders the file and returns the report's field `read`.
 fn read(output: &Path, more: &[&str]) -> serde_json::Value {
     let file = file();
     let run = succeeds(&[&["render", &file, "--size", "96x96", "--json", "-", "-o", text(output)], more].concat());
@@ -22,13 +23,13 @@ fn read(output: &Path, more: &[&str]) -> serde_json::Value {
     report["read"].clone()
 }
 
-/// Straight down on a place from so far above, as a frame of a transforms.json.
+/// A frame of a transforms.json that looks straight down at (x, y) from `height` above the points.
 fn down(name: &str, [x, y]: [f64; 2], height: f64) -> String {
     let rows = [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, y], [0.0, 0.0, 1.0, 500.0 + height], [0.0, 0.0, 0.0, 1.0]];
     format!(r#"{{"file_path": "{name}", "transform_matrix": {rows:?}}}"#)
 }
 
-/// Frames of 96x96 pixels.
+/// Writes a transforms.json with frames of 96 x 96 pixels.
 fn cameras(folder: &Folder, name: &str, frames: &[String]) -> PathBuf {
     let lens = r#""w": 96, "h": 96, "fl_x": 90, "fl_y": 90, "cx": 48, "cy": 48"#;
     folder.file(name, format!(r#"{{{lens}, "frames": [{}]}}"#, frames.join(", ")))
@@ -40,7 +41,7 @@ fn a_picture_reads_what_it_takes() {
     let [all, fine, coarse] = ["all.png", "fine.png", "coarse.png"].map(|name| folder.path(name));
     assert_eq!(read(&all, &[]), serde_json::Value::Null);
     assert_eq!(read(&all, &["--lod", "0"]), serde_json::Value::Null);
-    // All of it is all of it, to the bit.
+    // A cut with all points equals the whole file, bit by bit.
     let whole = read(&fine, &["--lod", "0.01px"]);
     assert_eq!((&whole["points"], &whole["nodes"]), (&serde_json::json!([1065, 1065]), &serde_json::json!([65, 65])));
     assert_eq!(std::fs::read(&fine).unwrap(), std::fs::read(&all).unwrap());
@@ -52,7 +53,7 @@ fn a_picture_reads_what_it_takes() {
         let some = read(&coarse, &["--splats", &most.to_string()]);
         assert!((most / 2..=most).contains(&some["points"][0].as_u64().unwrap()), "{some}");
     }
-    // Beside a file of another kind it is read whole, and levels are made.
+    // Together with another file it is read whole, and levels are built.
     let bunny = Path::new(DATA).join("bunny.obj");
     let run = ["render", &file(), text(&bunny), "--lod", "30px", "--size", "32x32", "--json", "-", "-o", text(&coarse)];
     let report: serde_json::Value = serde_json::from_slice(&succeeds(&run).stdout).unwrap();
@@ -105,7 +106,7 @@ fn a_view_of_nothing_is_told() {
     let output = folder.path("a.png");
     let arguments =
         ["render", &file(), "--lod", "4px", "--eye", &eye, "--target", &target, "--up", "y", "-o", text(&output)];
-    // The picture is empty, and says why.
+    // The picture is empty, and a warning says why.
     let run = succeeds(&arguments);
     let said = String::from_utf8(run.stderr).unwrap();
     assert!(output.exists() && said.contains("behind"), "{said}");
@@ -113,12 +114,12 @@ fn a_view_of_nothing_is_told() {
     fails(&["render", text(&damaged), "--lod", "4px", "-o", text(&output)], 1, &["a.copc.laz: a page of its octree"]);
 }
 
-/// The fewer points are read the larger are disks, but they end near where all points do.
+/// With fewer points disks are larger, but they still end near the border of all points.
 #[test]
 fn a_part_ends_where_the_cloud_does() {
     let folder = Folder::new();
     let cameras = cameras(&folder, "down.json", &[down("a", CENTER, 5000.0)]);
-    // Alpha outside of the box that the file tells, which is 60 pixels wide and 83 high at most.
+    // Sum of alpha outside the file's bounding box, which is at most 60 pixels wide and 83 high.
     let outside = |detail: &str| {
         let output = folder.path(detail);
         succeeds(&["render", &file(), "--lod", detail, "--cameras", text(&cameras), "-o", text(&output)]);
@@ -128,7 +129,7 @@ fn a_part_ends_where_the_cloud_does() {
             |(x, y, pixel): (u32, u32, &image::Rgba<u8>)| if is_inside(x, y) { 0 } else { u64::from(pixel.0[3]) };
         picture.enumerate_pixels().map(alpha).sum::<u64>() as f64
     };
-    // Disks that were not cut would cover three times as much there.
+    // Disks that were not clipped would have three times as much alpha there.
     let [all, part] = ["0", "30px"].map(outside);
     assert!(all > 0.0 && part < 2.2 * all, "{all} {part}");
 }

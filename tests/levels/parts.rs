@@ -1,4 +1,5 @@
-//! Parts of files with levels of detail: the picture of what it takes is that of all of the file, to the bit.
+//! Partly read files with levels of detail: the part that a picture needs gives the same bits as
+//! the whole file.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -41,7 +42,8 @@ fn part(path: &Path, camera: &Camera, options: &RenderOptions) -> Result<(Scene,
     taken(&opened(path), &[(camera, options)], |_| Ok(()), &())
 }
 
-/// Spheres in what a file may have: far from the origin, in one colour, in codes, in light, with lines, with normals, with trailing parts.
+/// Spheres with everything that a file can hold: map coordinates, one colour, 8-bit and linear
+/// colours, clip lines, normals, low parts of coordinates.
 fn all() -> Vec<(&'static str, Scene)> {
     let plain = Scene { closed: true, ..sphere(8000, 1.7) };
     let count = plain.surfels.len();
@@ -70,7 +72,8 @@ fn all() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Places whose middle is nearly as far from one origin that they may get as from another, which it takes that f32 numbers round them.
+/// Points whose middle is almost equally far from two candidates for the scene's origin, so that
+/// f32 rounding matters.
 fn rounded() -> Scene {
     let plain = sphere(8000, 1.7);
     let places = plain.surfels.iter().map(|surfel| {
@@ -82,7 +85,7 @@ fn rounded() -> Scene {
     surfels::build(vec![points], &()).unwrap().0
 }
 
-/// Views of a scene like a ball of radius 1.
+/// Views of a scene that resembles a ball of radius 1.
 fn views(scene: &Scene) -> Vec<(&'static str, Camera)> {
     let body = scene.body().0;
     let (center, radius) = (scene.origin + body.center(), 0.5 * body.extent().max_element());
@@ -113,7 +116,8 @@ fn ways() -> Vec<RenderOptions> {
         RenderOptions { detail_measure: DetailMeasure::Area, samples: Samples { across: 2, down: 1 }, ..at(20.0) },
         RenderOptions { cull: Cull::Back, detail_caps: false, ..at(300.0) },
         RenderOptions { detail: Detail::Splats(300), maps: Maps::NONE, ..at(0.0) },
-        // Of these, backs are seen in the colour and left out of maps, or the other way round, and samples differ.
+        // In these two, back faces are visible in the colours but not in the maps or vice versa,
+        // and samples differ.
         RenderOptions {
             composite: Composite::Layers(4),
             opacity: 0.5,
@@ -136,7 +140,7 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
         let path = written(scene, folder.path());
         let whole = whole(&path);
         let (nodes, count) = (whole.hierarchy.as_ref().unwrap().nodes.len() as u64, whole.surfels.len() as u64);
-        // All ways of one scene; of the others what they add.
+        // The first scene is drawn in all ways, the others in one each.
         let ways = if number == 0 { ways() } else { ways().into_iter().skip(number % 2).take(1).collect() };
         for (way, options) in ways.into_iter().enumerate() {
             let mut last: Option<Scene> = None;
@@ -144,12 +148,12 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
                 let (part, taken) = part(&path, &camera, &options).unwrap();
                 let held = (part.hierarchy.as_ref().unwrap().nodes.len() as u64, part.surfels.len() as u64);
                 assert_eq!((taken.nodes, taken.surfels), held);
-                // One way on all backends.
+                // The first combination runs on all backends.
                 let turn = (number + way) % 2;
                 let on = match options.composite {
                     Composite::Opaque if number + way == 0 => 0..3,
                     Composite::Opaque => turn..turn + 1,
-                    // The small one has no room for lists.
+                    // The small adapter has no memory for fragment lists.
                     _ => 0..1,
                 };
                 for backend in &backends[on] {
@@ -157,7 +161,7 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
                     let (some, report) = render(&part, &camera, &options, backend, &()).unwrap();
                     assert!(bits(&all) == bits(&some), "{name} {view} {options:?}");
                     assert_eq!(report.cut, all_report.cut, "{name} {view} {options:?}");
-                    // What another picture takes is not enough.
+                    // The control: the part of another view is not sufficient.
                     if let Some(last) = last.as_ref().filter(|_| way == 0) {
                         let (other, _) = render(last, &camera, &options, backend, &()).unwrap();
                         apart += usize::from(bits(&all) != bits(&other));
@@ -171,7 +175,7 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
     assert!(less > 30 && apart > 15, "{less} {apart}");
 }
 
-/// What several pictures take together is enough for each of them, and what one of them takes alone is not.
+/// The part for several pictures together suffices for each of them; that for one alone does not.
 #[test]
 fn a_part_of_several_pictures_is_enough_for_each() {
     let Some(gpu) = common::gpu() else { return };
@@ -190,14 +194,15 @@ fn a_part_of_several_pictures_is_enough_for_each() {
         assert!(bits(&all) == bits(&render(&part, camera, options, &backend, &()).unwrap().0), "{options:?}");
         let of_one = taken(&opened(&path), &[(*camera, *options)], |_| Ok(()), &()).unwrap().1;
         assert!(of_one.nodes <= of_all.nodes && of_one.surfels <= of_all.surfels);
-        // What one of them takes is not enough for another.
+        // The control: the part for the first picture is not sufficient for the others.
         let other = taken(&opened(&path), &pictures[..1], |_| Ok(()), &()).unwrap().0;
         apart += usize::from(bits(&all) != bits(&render(&other, camera, options, &backend, &()).unwrap().0));
     }
     assert!(apart >= 2 && of_all.surfels < 8000, "{apart} {of_all:?}");
 }
 
-/// What a picture takes is enough for it; of a finer one some nodes are missed, which are drawn as they are and leave no holes.
+/// If a picture needs nodes that are missing in the part, their parents are drawn, which leaves no
+/// holes.
 #[test]
 fn what_is_missing_leaves_no_holes() {
     let Some(gpu) = common::gpu() else { return };
@@ -214,7 +219,7 @@ fn what_is_missing_leaves_no_holes() {
         for backend in &backends {
             let (shown, report) = render(&part, &camera, &fine, backend, &()).unwrap();
             let (all, of_all) = render(&whole, &camera, &fine, backend, &()).unwrap();
-            // Outlines of coarse nodes are others.
+            // Pixels that the coarse cut covers too, as its outline differs.
             let (outline, _) = render(&whole, &camera, &coarse, backend, &()).unwrap();
             let covers = |frame: &Frame, pixel: usize| frame.color[pixel][3] > 0.0;
             let both = |pixel: &usize| covers(&all, *pixel) && covers(&outline, *pixel);
@@ -227,7 +232,7 @@ fn what_is_missing_leaves_no_holes() {
     }
 }
 
-/// What a file says of all of its points is what they are.
+/// The element `scene` of a file describes the scene that a full read finds.
 #[test]
 fn a_file_says_what_a_reader_of_all_finds() {
     let folder = tempfile::tempdir().unwrap();
@@ -252,7 +257,7 @@ fn a_part_may_not_fit() {
     assert!(matches!(limited(taken.nodes - 1), Err(Error::Usage(_))));
 }
 
-/// Where a file's node `index` has its `first`, `count` and `leaf`: the last nine bytes of its row.
+/// Offset of `first`, `count` and `leaf` of node `index`: the last nine bytes of its row.
 fn place_of(bytes: &[u8], levels: &Levels, index: u64) -> usize {
     let rows = levels.bytes(0, u64::from(levels.whole.nodes) - index - 1) + 8 * 44;
     bytes.len() - rows as usize - 9
@@ -286,9 +291,10 @@ fn damaged_files_are_told() {
     for count in [0u32, 9, u32::MAX] {
         told(root + 4, &count.to_le_bytes(), "no tree");
     }
-    // A leaf in place of the root names points that do not exist, or all of them but for what is said.
+    // As a leaf, the root would name points that do not exist.
     told(root + 4, &[255, 255, 255, 255, 1], "levels of detail");
-    // Nodes in the middle: one whose children are another one's, and a leaf whose points are.
+    // An inner node with another node's children, one with children outside the file, and a leaf
+    // with another leaf's points.
     let tree = &io::read(&path, &()).unwrap().tree.unwrap().rows;
     let of_kind = |leaf: bool| (1..tree.len()).filter(move |&k| tree[k].leaf == leaf && (!leaf || tree[k].count > 1));
     let inner: Vec<usize> = of_kind(false).take(3).collect();
@@ -297,12 +303,12 @@ fn damaged_files_are_told() {
     let leaves: Vec<usize> = of_kind(true).collect();
     let [first, last] = [leaves[0], leaves[leaves.len() - 1]];
     told(place_of(&bytes, &levels, last as u64), &tree[first].first.to_le_bytes(), "do not follow");
-    // What all points say is no number, or not what they are.
+    // NaN in the element `scene`, and bounds that do not cover the points.
     let whole = bytes.len() - 8 * 44;
     told(whole, &f64::NAN.to_le_bytes(), "not a number");
     told(whole + 8 * 6, &(-9.0f64).to_le_bytes(), "does not cover");
     told(whole + 8 * 35, &1e-9f64.to_le_bytes(), "does not cover");
-    // A point without a place, one without a disk.
+    // Surfels without a position or an axis.
     let header = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     let size = levels.bytes(1, 0) as usize;
     let mut some = 0;
@@ -317,13 +323,14 @@ fn damaged_files_are_told() {
         }
     }
     assert!(some > 10, "{some}");
-    // What ends early is left to a reader of all.
+    // A truncated file is left to the full reader.
     let other = folder.path().join("short.ply");
     std::fs::write(&other, &bytes[..bytes.len() - 1]).unwrap();
     assert!(Levels::open(Input::open(&other, None).unwrap()).unwrap().is_none());
 }
 
-/// Without the element `scene`, which other versions do not write, or beside other things, nothing is read in parts.
+/// Files without the element `scene` (of other versions), or with other content, are not read in
+/// parts.
 #[test]
 fn other_files_are_read_whole() {
     let folder = tempfile::tempdir().unwrap();
@@ -347,7 +354,7 @@ fn other_files_are_read_whole() {
     assert!(Levels::open(Input::open(&obj, None).unwrap()).unwrap().is_none());
 }
 
-/// A scene of nothing is what a view of nothing takes, and one of a single surfel is itself.
+/// A view of nothing needs no surfel; a scene of one surfel is read as itself.
 #[test]
 fn the_smallest_parts() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Images too large are refused by their headers, and what the system has no room for ends in a sentence.
+//! Images that are too large are refused by their headers, and lack of memory or disk space ends in
+//! one sentence.
 
 use super::common::command::{Folder, epsplat, fails, ply, succeeds, text};
 use epsplat::low_level::frame::Frame;
@@ -6,7 +7,7 @@ use epsplat::low_level::scene::Map;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A PNG whose header says so large, in a bit a pixel, and whose pixels are missing.
+/// A 1-bit PNG with a header for this size, and without its pixels.
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
     let mut chunk = |name: &[u8], data: &[u8]| {
@@ -22,13 +23,13 @@ fn png(width: u32, height: u32) -> Vec<u8> {
     file
 }
 
-/// As PNG has it.
+/// The CRC-32 of PNG.
 fn crc32(bytes: &[u8]) -> u32 {
     let step = |crc: u32, _| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
     !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
 }
 
-/// An EXR whose header says so large.
+/// An EXR with a header for this size.
 fn exr(folder: &Folder, name: &str, width: u32, height: u32) -> PathBuf {
     let path = folder.path(name);
     let frame = Frame::of_colors(3, 2, vec![[0.5; 4]; 6]);
@@ -43,7 +44,7 @@ fn exr(folder: &Folder, name: &str, width: u32, height: u32) -> PathBuf {
     path
 }
 
-/// Runs with so much address space, KiB.
+/// Runs the program with an address space of `kib` KiB.
 fn within(kib: u64, arguments: &[&str]) -> Output {
     let script = format!("ulimit -v {kib} && exec \"$0\" \"$@\"");
     Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_epsplat")]).args(arguments).output().unwrap()
@@ -64,13 +65,13 @@ fn images_beyond_the_limit_are_refused_by_their_headers() {
         folder.file("m.mtl", "newmtl x\nKd 1 0 0\nmap_Kd huge.png\n");
         let told = String::from_utf8(succeeds(&sample).stderr).unwrap();
         assert!(said.iter().all(|word| told.contains(word)), "{told}");
-        // An EXR says where its last pixel is, by a number with a sign.
+        // An EXR stores the last pixel's coordinates as signed integers.
         if width < 1 << 24 {
             let huge = exr(&folder, "huge.exr", width, height);
             fails(&["compare", text(&huge), text(&huge)], 1, &said);
         }
     }
-    // Control: what is as large as can be is refused for the pixels that it lacks.
+    // Control: an image within the limit is refused only for its missing pixels.
     let whole = folder.file("whole.png", png(4_000, 3));
     fails(&["compare", text(&whole), text(&whole)], 1, &["whole.png", "not a readable PNG"]);
 }
@@ -95,14 +96,14 @@ fn what_the_system_has_no_room_for_is_said() {
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
         assert!(said.contains("cannot read ") && said.contains("large.") && said.contains("out of memory"), "{said}");
     }
-    // Control: a small image has room there.
+    // Control: a small image fits in that memory.
     let small = folder.path("small.png");
     succeeds(&["render", text(&cloud), "-o", text(&small), "--backend", "reference", "--size", "16x16"]);
     let output = within(1_500_000, &["compare", text(&small), text(&small)]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A command that needs memory in many parts asks for all of it first.
+/// A command that allocates many small parts checks the total first.
 #[cfg(target_os = "linux")]
 #[test]
 fn counts_that_memory_has_no_room_for_are_said() {
@@ -137,13 +138,13 @@ fn counts_that_memory_has_no_room_for_are_said() {
         assert_eq!(output.status.code(), Some(1), "{said}");
         assert!(said.contains(words) && said.contains("no memory"), "{said}");
     }
-    // Control: fewer have room there.
+    // Control: smaller counts fit in that memory.
     assert_eq!(sample("3000").0, Some(0));
     let output = within(2_000_000, &["bench", text(&scene("shape = \"sphere\"\ncount = 99"))]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A limit of the size of files ends no run at once: what was written goes, and it is told.
+/// A file size limit does not kill the run: it removes the partial file and reports the error.
 #[cfg(unix)]
 #[test]
 fn at_a_limit_of_the_size_of_files_nothing_is_left() {
@@ -160,7 +161,7 @@ fn at_a_limit_of_the_size_of_files_nothing_is_left() {
         &["simplify", text(&cloud), "-o", &out, "--tolerance", "abs:1e-9"],
         &["render", &bunny, "-o", text(&folder.path("o.exr")), "--backend", "reference", "--size", "300x300"],
     ] {
-        // In blocks of 512 bytes or of a kilobyte, as the shell has it.
+        // The unit is 512 bytes or a kilobyte, depending on the shell.
         let script = "ulimit -f 40 && exec \"$0\" \"$@\"";
         let mut command = Command::new("sh");
         let output = command.args(["-c", script, env!("CARGO_BIN_EXE_epsplat")]).args(arguments).output().unwrap();
@@ -192,14 +193,14 @@ fn compare_names_what_only_one_image_has_and_prints_no_largest_number() {
     let b = written("b.exr", &frame(Some(vec![1.5, 1.5]), None, 0.75));
     let c = written("c.exr", &frame(Some(vec![1.0, f32::NAN]), None, 1.0));
     let table = |a: &Path, b: &Path| String::from_utf8(succeeds(&["compare", text(a), text(b)]).stdout).unwrap();
-    // A value that is not finite gives no measure: the table is printed, and the run fails.
+    // Differences that are not finite are printed as such, and the run fails.
     let failed = |a: &Path, b: &Path| {
         fails(&["compare", text(a), text(b)], 1, &["a value that is not finite in one image and differs"]);
         String::from_utf8(epsplat(&["compare", text(a), text(b)]).stdout).unwrap()
     };
     let said = table(&a, &b);
     assert!(said.contains("a.exr has: weight\n") && !said.contains("e38") && said.lines().count() == 11, "{said}");
-    // All alphas of B are one, and so are its depths: errors are parts of them.
+    // All alphas of B are equal, and so are its depths, so errors are relative to these values.
     let row =
         |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap().split_whitespace().collect::<Vec<_>>();
     assert_eq!(row("alpha")[1..], ["7.5000e-1", "2.500e-1", "3.333e-1"]);

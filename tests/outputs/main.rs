@@ -1,5 +1,5 @@
-//! What a command writes: never over what it reads, whole or not at all whatever ends it, and no more than the machine has
-//! room for.
+//! Outputs: they never overwrite inputs, are whole or absent however a run ends, and respect the
+//! machine's limits.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -1,14 +1,14 @@
-//! Outputs overwrite neither inputs nor each other, under whatever name.
+//! Outputs overwrite neither inputs nor each other, under any name.
 
 use super::common::Random;
 use super::common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Stands for the output in a command line.
+/// Placeholder for the output in a command line.
 const OUT: &str = "OUT";
 
-/// A folder with one of all that commands read.
+/// A folder with every kind of input.
 fn inputs() -> Folder {
     let folder = Folder::new();
     let data = |name: &str| std::fs::read(Path::new(DATA).join(name)).unwrap();
@@ -37,7 +37,7 @@ fn inputs() -> Folder {
     folder
 }
 
-/// The bytes of all files in a folder and those below.
+/// The contents of all files in a folder and its subfolders.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     entries
@@ -48,7 +48,7 @@ fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         .collect()
 }
 
-/// Every command with every output that it has, and the inputs that this output must not overwrite.
+/// Every command with each of its outputs, and the inputs that this output must not overwrite.
 const COMMANDS: &[(&str, &[&str])] = &[
     ("info s.ply --json OUT", &["s.ply"]),
     ("info cube.obj --json OUT", &["cube.obj", "cube.mtl", "cube.png"]),
@@ -69,7 +69,7 @@ const COMMANDS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// A command line with its files in `folder`, and its output.
+/// The arguments of a command, with its files in `folder` and its output at `output`.
 fn line(command: &str, folder: &Folder, output: &Path) -> Vec<String> {
     let there = |word: &str| folder.path(word).exists() || word.starts_with("made") || word == "views";
     let word = |word: &str| match word {
@@ -115,7 +115,7 @@ fn no_output_overwrites_an_input_by_any_name() {
             refuses(command, &alias);
             std::fs::remove_file(&alias).unwrap();
         }
-        // Control: another name does, and no input is changed by it.
+        // Control: with another name it runs, and changes no input.
         let line = line(command, &folder, &others.path(&format!("new.{extension}")));
         let output = run(&line);
         assert!(output.status.success(), "{line:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -128,7 +128,7 @@ fn no_output_overwrites_an_input_by_any_name() {
         let _ = std::fs::remove_dir_all(folder.path("views"));
         others.names().iter().for_each(|name| std::fs::remove_file(others.path(name)).unwrap());
     }
-    // A report is three files of given names.
+    // A report has three files with fixed names.
     let study = folder.path("study.toml");
     for (name, input) in [("results.csv", "s.ply"), ("results.json", "study.toml")] {
         let report = others.path("report");
@@ -153,7 +153,7 @@ fn two_outputs_are_two_files() {
         let line = simplify(text(json));
         fails(&line.each_ref().map(String::as_str), 2, &["the same file", "overwrite"]);
     };
-    // While it is not there yet, then when it is.
+    // First while the output does not exist yet, then when it does.
     std::os::unix::fs::symlink("made.ply", &linked).unwrap();
     for _ in 0..2 {
         [&made, &folder.path("colmap/../made.ply"), &linked].into_iter().for_each(|json| refused(json));
@@ -167,8 +167,8 @@ fn two_outputs_are_two_files() {
     let json = views.join("p.png");
     let render = ["render", text(&cloud), "--cameras", text(&cameras), "-o", text(&views), "--json", text(&json)];
     fails(&render, 2, &["the same file"]);
-    // What is no file is written to, by one command for two outputs too.
-    // By a link of one's own: a program that replaces what it writes to would replace the machine's.
+    // Devices and pipes are written to directly, even for two outputs of one command.
+    // The link protects the machine: a faulty program would replace the link, not /dev/stdout.
     let stdout = folder.path("stdout");
     std::os::unix::fs::symlink("/dev/stdout", &stdout).unwrap();
     for json in ["-", "/dev/null", text(&stdout)] {
@@ -182,7 +182,7 @@ fn two_outputs_are_two_files() {
     assert!(null.is_symlink() && std::fs::metadata("/dev/null").unwrap().len() == 0);
 }
 
-/// A redirected stdout is a file, which what was there before and what comes after are written to as well.
+/// Redirected standard output is a file that others also write to, before and after.
 #[cfg(unix)]
 #[test]
 fn stdout_by_name_is_written_to_and_not_replaced() {
@@ -196,13 +196,13 @@ fn stdout_by_name_is_written_to_and_not_replaced() {
     assert!(run(script).status.success());
     let log = std::fs::read_to_string(folder.path("log")).unwrap();
     assert!(log.starts_with("first\n{") && log.ends_with("}\nlast\n") && log.contains("\"points\": 36"), "{log}");
-    // What is read from stdin is not written over either.
+    // A file read through standard input is not overwritten either.
     let script = "$BIN compare a.png /dev/stdin --json b.png < b.png";
     let output = run(script);
     assert_eq!(output.status.code(), Some(2), "{output:?}");
 }
 
-/// Whatever is given as input and output: a run that reads a file never changes it.
+/// With random inputs and outputs, a run never changes a file that it reads.
 #[cfg(unix)]
 #[test]
 fn no_choice_of_names_changes_an_input() {
@@ -259,14 +259,14 @@ fn no_choice_of_names_changes_an_input() {
             assert_eq!(code, 2, "{line:?}: {}", String::from_utf8_lossy(&result.stderr));
         }
         *outcomes.entry(code).or_insert(0) += 1;
-        // Files that were outputs of one round are inputs of the next, so they are made anew.
+        // Outputs of one round may be inputs of the next, so inputs are restored.
         let fresh = inputs_again(&folder);
         assert!(fresh, "{line:?}");
     }
     assert!(outcomes[&0] > 20 && outcomes[&2] > 20, "{outcomes:?}");
 }
 
-/// Puts back what may have been written over in a round.
+/// Restores the inputs that a round may have overwritten.
 #[cfg(unix)]
 fn inputs_again(folder: &Folder) -> bool {
     use std::sync::OnceLock;

@@ -1,13 +1,13 @@
-//! Files that are read at second hand, because an input names them, are inputs too; and so is the
-//! file that standard input is.
+//! Files that an input names are inputs too, and so is the file behind standard input: outputs must
+//! not overwrite them.
 
 use super::common::command::{DATA, Folder, epsplat, ply, succeeds, text};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// Surfels that name an OBJ file, which names a library, which names an image; the OBJ file under
-/// another name; and the pair and the image that `epsplat hybrid` makes of a painted cube.
+/// The inputs: surfels that name an OBJ file, its material library and its image, the OBJ file
+/// under another name, and the files that `epsplat hybrid` writes for a textured cube.
 fn inputs() -> Folder {
     let folder = Folder::new();
     let data = |name: &str| std::fs::read(Path::new(DATA).join(name)).unwrap();
@@ -30,7 +30,7 @@ fn contents(folder: &Folder) -> BTreeMap<String, Vec<u8>> {
     folder.names().into_iter().map(|name| (name.clone(), std::fs::read(folder.path(&name)).unwrap())).collect()
 }
 
-/// Runs a line of a shell in the folder, where `$E` is the program.
+/// Runs a shell command in the folder; `$E` is the program.
 fn shell(folder: &Folder, line: &str) -> Output {
     let mut command = Command::new("sh");
     command.args(["-c", line]).env("E", env!("CARGO_BIN_EXE_epsplat")).current_dir(folder.path(""));
@@ -68,7 +68,7 @@ fn what_is_read_at_second_hand_is_not_overwritten() {
         "$E sample p.mesh.ply --count 9 -o p.mesh.ply".into(),
         "$E hybrid cube.dat --input-format obj -o q.ply --json cube.mtl".into(),
         "$E coverage s.ply --mesh p.mesh.ply --views 1 --side 8 --json p.mesh-1.png".into(),
-        // By standard input, a file or a pipe, and by a pipe with a name.
+        // Through standard input from a file or a pipe, and through a named pipe.
         format!("$E render - -o cube.png {others} < s.ply"),
         format!("cat s.ply | $E render - -o x.png --json cube.obj {others}"),
         format!("cat p.ply | $E render - -o p.mesh-1.png {others}"),
@@ -88,12 +88,12 @@ fn what_is_read_at_second_hand_is_not_overwritten() {
         refused(&folder, &format!("$E render {input} -o alias.png {others}"));
         std::fs::remove_file(folder.path("alias.png")).unwrap();
     }
-    // An image that is named and not there yet.
+    // An image that is named but does not exist yet.
     folder.file("cube.mtl", "newmtl x\nmap_kd sub/../other.png\n");
     std::fs::create_dir(folder.path("sub")).unwrap();
     let output = shell(&folder, &format!("$E render s.ply -o other.png {others}"));
     assert_eq!(output.status.code(), Some(2), "{output:?}");
-    // Control: other names do, by pipes too, and what comes through a pipe is read whole.
+    // Control: other names are allowed, and piped input is read completely.
     for line in [
         format!("$E render s.ply -o new.png --json new.json {others}"),
         format!("cat s.ply | $E render - -o new.png {others}"),
@@ -124,20 +124,20 @@ fn the_file_that_standard_input_is_is_an_input() {
         "$E render - -o b.png --json a.ply --backend reference < a.ply",
         "ln a.ply c.ply; $E lod - -o c.ply < a.ply; code=$?; rm c.ply; exit $code",
         "ln -s a.ply c.ply; $E lod - -o c.ply < a.ply; code=$?; rm c.ply; exit $code",
-        // Standard output is a stream, but not into what is read.
+        // Standard output is a stream, but must not append to an input.
         "$E info a.ply --json /dev/stdout >> a.ply",
     ] {
         refused(&folder, line);
     }
-    // Control: from a file and from the middle of one.
+    // Control: from the start of a file and from its middle.
     assert!(shell(&folder, "$E lod - -o b.ply < a.ply").status.success());
     let output = shell(&folder, "(echo junk; cat a.ply) > d; (read junk; $E info - --json e.json) < d");
     assert!(output.status.success(), "{output:?}");
     assert!(std::fs::read_to_string(folder.path("e.json")).unwrap().contains("\"points\": 36"));
 }
 
-/// `hybrid` replaces, of the files beside its output, those alone that it wrote, and removes those
-/// that it does not write again.
+/// `hybrid` replaces only files beside its output that it wrote itself, and deletes those that it
+/// does not write again.
 #[test]
 fn hybrid_replaces_only_what_it_wrote_itself() {
     let folder = inputs();
@@ -152,7 +152,7 @@ fn hybrid_replaces_only_what_it_wrote_itself() {
     let json = epsplat(&["hybrid", text(&cube), "-o", text(&output), "--pixels", "2000", "--json", "-"]);
     let json: serde_json::Value = serde_json::from_slice(&json.stdout).unwrap();
     assert!(json["files"][0].as_str().unwrap().ends_with("p.mesh.ply") && json["files"].as_array().unwrap().len() == 2);
-    // Without a texture no image is left, and of a mesh of small triangles nothing.
+    // Without a texture no image remains, and for a mesh of small triangles no mesh remains either.
     folder.file("bare.obj", std::fs::read(Path::new(DATA).join("cube.obj")).unwrap());
     let bare = run(&folder.path("bare.obj"), "2000");
     assert!(bare.status.success() && told(&bare).contains("p.mesh-1.png: removed"), "{}", told(&bare));
@@ -160,7 +160,7 @@ fn hybrid_replaces_only_what_it_wrote_itself() {
     let small = run(&Path::new(DATA).join("bunny.obj"), "8");
     assert!(small.status.success() && told(&small).contains("p.mesh.ply: removed"), "{}", told(&small));
     assert!(!folder.path("p.mesh.ply").exists());
-    // Whatever else has these names stays.
+    // Other files with these names stay.
     let others: &[(&str, &[u8])] = &[
         ("p.mesh.ply", b"a text"),
         ("p.mesh.ply", b""),
@@ -184,7 +184,7 @@ fn hybrid_replaces_only_what_it_wrote_itself() {
         assert!(!folder.path("elsewhere.ply").exists());
         std::fs::remove_file(folder.path("p.mesh.ply")).unwrap();
     }
-    // A mesh of its own kind that names other images leaves these alone.
+    // A mesh that epsplat wrote but that names other images leaves these images alone.
     folder.file("kept.png", std::fs::read(folder.path("cube.png")).unwrap());
     let own = "ply\nformat ascii 1.0\ncomment epsplat 1\ncomment hybrid\ncomment TextureFile kept.png\n\
                element vertex 0\nproperty float x\nend_header\n";

@@ -1,4 +1,5 @@
-//! Whatever ends a run: no temporary file is left, and an output is the old one or the whole new one.
+//! However a run ends, no temporary file remains, and an output is either the old file or the
+//! complete new one.
 
 use super::common::Random;
 use super::common::command::{DATA, Folder, ply, text};
@@ -10,7 +11,8 @@ use std::time::{Duration, Instant};
 
 const SIGNALS: [(&str, i32); 3] = [("INT", 130), ("TERM", 143), ("HUP", 129)];
 
-/// Starts a run that heeds signals, whatever those who started the tests ignore: a shell's jobs in the background ignore SIGINT.
+/// Starts a run with default signal handling: background jobs of a shell would inherit an ignored
+/// SIGINT.
 fn start(arguments: &[String]) -> Child {
     let mut command = Command::new("env");
     command
@@ -23,17 +25,18 @@ fn start(arguments: &[String]) -> Child {
 }
 
 fn signal(child: &Child, name: &str) {
-    // What has ended already takes no signal; that is no failure here.
+    // A process that has already ended cannot receive a signal; that is no failure.
     let kill = format!("kill -s {name} {} 2>/dev/null", child.id());
     Command::new("sh").args(["-c", &kill]).status().unwrap();
 }
 
-/// The exit code as a shell gives it: the first milliseconds of a run know no handler yet.
+/// The exit code as a shell reports it, as the handler is not yet installed in the first
+/// milliseconds.
 fn code(status: ExitStatus) -> i32 {
     status.code().or_else(|| Some(128 + status.signal()?)).unwrap()
 }
 
-/// All files in a folder and those below, temporary ones too.
+/// All files in a folder and its subfolders, including temporary ones.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
@@ -44,13 +47,14 @@ fn is_temporary(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_str().unwrap().starts_with(".epsplat-"))
 }
 
-/// Waits until something is being written.
+/// Waits until an output is being written.
 fn wait_for_temporary(folder: &Path, child: &mut Child) {
     let start = Instant::now();
     while !files(folder).iter().any(|path| is_temporary(path)) {
         assert!(start.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none(), "it never wrote");
     }
-    // It is made once to try the folder, and again to be filled; that it is there is seen again a little later.
+    // A temporary file is created first to test the folder, then again for the data; this waits for
+    // the second.
     std::thread::sleep(Duration::from_millis(30));
 }
 
@@ -88,7 +92,7 @@ fn a_signal_that_is_ignored_stays_ignored() {
     assert!(std::fs::metadata(&output).unwrap().len() > 20_000_000);
 }
 
-/// Commands that write in different ways, each with the folder or file that it writes, in a folder of inputs.
+/// Commands with different kinds of output, whose outputs are in `out`.
 fn commands(inputs: &Folder, out: &Path) -> Vec<Vec<String>> {
     let bunny = format!("{DATA}/bunny.obj");
     let of = |line: String| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
@@ -108,19 +112,19 @@ fn commands(inputs: &Folder, out: &Path) -> Vec<Vec<String>> {
     ]
 }
 
-/// What is in a folder, but for what no two runs have in common: times.
+/// The contents of a folder, without the times, which differ between runs.
 fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let of_times = |path: &Path| path.extension().is_some_and(|e| ["json", "html", "csv"].iter().any(|x| e == *x));
     let read = |path: PathBuf| {
         let bytes = std::fs::read(&path).unwrap();
-        // Of these the last byte, a line feed, tells whether they are whole.
+        // For these files, the final line feed shows that they are complete.
         let bytes = if of_times(&path) { bytes.last().map(|last| vec![*last]).unwrap_or_default() } else { bytes };
         (path, bytes)
     };
     files(folder).into_iter().map(read).collect()
 }
 
-/// `EPSPLAT_KILLS` times; 30 if unset.
+/// Sends `EPSPLAT_KILLS` signals (default 30).
 #[test]
 fn a_signal_at_any_time_leaves_old_or_whole_files() {
     let kills = std::env::var("EPSPLAT_KILLS").map_or(30, |kills| kills.parse().unwrap());
@@ -132,7 +136,7 @@ fn a_signal_at_any_time_leaves_old_or_whole_files() {
     inputs.file("study.toml", study);
     let out = outputs.path("out");
     let commands = commands(&inputs, &out);
-    // What each makes when nothing ends it, how long that takes, and the old files.
+    // The outputs and duration of each command when it is not interrupted.
     let mut made = Vec::new();
     for command in &commands {
         let _ = std::fs::remove_dir_all(&out);

@@ -1,18 +1,18 @@
-//! Files that strangers' files name, and inputs without an end.
+//! Untrusted files that name other files, and inputs without an end.
 
 use super::common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
 use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-/// Surfels that say they are drawn beside `name`.
+/// Surfels that name the triangles `name` to be drawn with.
 fn naming(name: &str) -> String {
     let rows: String = (0..36).map(|i| format!("{} {} 9 0 0 1 1\n", i % 6, i / 6)).collect();
     ply("x y z nx ny nz radius", 36, &rows)
         .replace("ascii 1.0\n", &format!("ascii 1.0\ncomment epsplat 1\ncomment triangles {name}\n"))
 }
 
-/// Commands that read surfels, each without a name for its output but with what it needs.
+/// Commands that read surfels, with all arguments except an output.
 fn commands(folder: &Folder, input: &Path) -> Vec<Vec<String>> {
     let output = |name: &str| text(&folder.path(name)).to_owned();
     let of = |line: String| line.split(' ').map(str::to_owned).collect();
@@ -66,15 +66,15 @@ fn triangles_are_a_file_of_the_same_folder() {
         }
         assert!(!folder.path("o.ply").exists() && !folder.path("o.png").exists(), "{name}");
     }
-    // Control: a name of the same folder, also by a link within it, and one of a file that is not
-    // there, which only a picture needs.
+    // Control: a name in the same folder is allowed, also through a link within it, and so is one
+    // of a missing file, which only a picture needs.
     symlink("m.obj", folder.path("within.obj")).unwrap();
     for name in ["m.obj", "within.obj"] {
         let input = folder.file("s.ply", naming(name));
         for command in commands(&folder, &input) {
             succeeds(&command.iter().map(String::as_str).collect::<Vec<_>>());
         }
-        // Files made of them in the same folder name the mesh too, by no more than its name.
+        // Files derived from them in the same folder also name the mesh, relative to that folder.
         let header = String::from_utf8_lossy(&std::fs::read(folder.path("o.ply")).unwrap()).into_owned();
         assert!(header.contains(&format!("\ncomment triangles {name}\n")), "{name}");
     }
@@ -85,7 +85,7 @@ fn triangles_are_a_file_of_the_same_folder() {
     fails(&render, 1, &["none.obj", "No such file"]);
 }
 
-/// In another folder the name would be of another file, so it is left out and told.
+/// In another folder the name would mean another file, so it is dropped with a note.
 #[test]
 fn derived_files_of_other_folders_name_no_triangles() {
     let (folder, other) = (Folder::new(), Folder::new());
@@ -101,7 +101,7 @@ fn derived_files_of_other_folders_name_no_triangles() {
     }
 }
 
-/// Runs a line of a shell where `$E` is the program, for half a minute at most; it fails in one
+/// Runs a shell command for at most 30 seconds, with `$E` as the program; it must fail with one
 /// sentence.
 fn refused(folder: &Folder, line: &str, words: &[&str]) {
     let line = format!("timeout 30 sh -c '{line}'");
@@ -150,8 +150,7 @@ fn devices_and_streams_without_an_end_are_refused() {
     ] {
         refused(&folder, line, &["it is a device, not a file"]);
     }
-    // Streams whose first bytes are of no such file; those of a text are read up to a length that
-    // is told.
+    // Streams whose first bytes fit no format are refused; text is read up to a stated length.
     for format in ["ply", "las", "obj", "pcd", "e57"] {
         refused(&folder, &format!("cat /dev/zero | $E info - --input-format {format}"), &["its first"]);
     }
@@ -161,7 +160,7 @@ fn devices_and_streams_without_an_end_are_refused() {
         "yes v | $E render s.ply --camera /dev/stdin --backend reference -o o.png",
         &["longer than 256 MiB"],
     );
-    // A library that is a device, or a pipe that nobody writes to, is a material that is left out.
+    // A library that is a device, or a pipe without a writer, is left out.
     let told = epsplat(&["sample", text(&folder.path("m.obj")), "-o", text(&folder.path("o.ply")), "--count", "9"]);
     let told = (told.status.success(), String::from_utf8(told.stderr).unwrap());
     assert!(told.0 && told.1.contains("the materials in z.json are left out: it is a device"), "{told:?}");

@@ -1,11 +1,13 @@
-//! Outputs are tried before anything is read: in folders where nothing can be made, as root or not.
+//! Output folders are tested before anything is read: folders where no file can be created, as root
+//! or not.
 
 use super::common::command::{Folder, fails, ply, text};
 use std::os::unix::fs::{PermissionsExt, chown};
 use std::path::Path;
 use std::process::Command;
 
-/// In /proc nobody makes a file, root neither; its mode does not say so. No input exists, so reading would fail otherwise.
+/// Not even root can create files in /proc, though its mode does not show that. The inputs do not
+/// exist, so reading first would give another error.
 #[test]
 fn a_folder_in_which_nothing_can_be_made_is_told_before_anything_is_read() {
     let said = |line: &str| {
@@ -33,7 +35,8 @@ fn a_folder_in_which_nothing_can_be_made_is_told_before_anything_is_read() {
     fails(&["render", missing, "--cameras", cameras, "-o", "/proc/views"], 1, &["cannot write /proc/views"]);
 }
 
-/// The program as a user whom modes concern: oneself, or of root's nobody, by a copy that nobody may run.
+/// The program as a user to whom file modes apply: the current one, or, for root, user 65534
+/// running a copy.
 fn as_user(folder: &Folder) -> Command {
     let binary = Path::new(env!("CARGO_BIN_EXE_epsplat"));
     if !is_root() {
@@ -73,7 +76,7 @@ fn a_user_without_rights_is_told_before_anything_is_read() {
     assert!(code == Some(1) && said.contains("closed/x.ply: Permission denied") && said.lines().count() == 1, "{said}");
     let (code, said) = run(&cloud, "open/x.ply");
     assert_eq!(code, Some(0), "{said}");
-    // A file that may only be read, by the user or by all, in a folder where it could be replaced.
+    // A read-only file in a folder in which it could be replaced.
     mode("open/x.ply", 0o444);
     let before = std::fs::read(folder.path("open/x.ply")).unwrap();
     let (code, said) = run(&cloud, "open/x.ply");

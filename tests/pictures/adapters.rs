@@ -1,4 +1,4 @@
-//! Other adapters than the one that the tests run on: a second driver, OpenGL, and what is done on a card alone.
+//! Other adapters than the one that the tests run on: a second driver, OpenGL, and graphics cards.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -14,24 +14,28 @@ use epsplat::low_level::scene::Projection;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// SwiftShader shares no code with Mesa, and Chromium brings it along. Its subgroups have four invocations and it has no 64-bit
-/// integers, as Windows' WARP. Where Debian's and Ubuntu's packages have it.
+/// SwiftShader in the Chromium packages of Debian and Ubuntu.
+///
+/// It shares no code with Mesa. Like Windows' WARP, it has subgroups of four invocations and no
+/// 64-bit integers.
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib/chromium-browser/vk_swiftshader_icd.json"];
 
-/// Draws three scenes by `render`, which is given the program's arguments and whether an adapter is asked for, and finds them as
-/// the reference has them. The adapter's name must hold `name`.
+/// Draws three scenes with `render`, and compares them with the reference.
+///
+/// `render` gets the program's arguments and whether they ask for an adapter. The adapter's name
+/// must contain `name`.
 fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) {
     let folder = Folder::new();
     let [many, few, theirs, ours] = ["many.ply", "few.ply", "theirs.exr", "ours.exr"].map(|name| folder.path(name));
     succeeds(&["generate", "sphere", "--count", "20000", "-o", text(&many)]);
     succeeds(&["generate", "sphere", "--count", "300", "-o", text(&few)]);
     let bunny = format!("{DATA}/bunny.obj");
-    // Culled and scattered; large splats; disks of a mesh through a low-pass.
+    // Culled and scattered splats; large splats; disks of a mesh with a low-pass.
     let scenes: [&[&str]; 3] = [&[text(&many), "--shading", "unlit"], &[text(&few)], &[&bunny, "--lowpass", "ewa"]];
     for scene in scenes {
         let render = |out: &Path, backend: &str, maps: &str| {
-            // SwiftShader takes a minute to compile what maps beside several samples need, and may die of it.
+            // For maps with several samples SwiftShader compiles for a minute, and may crash.
             let rest = [
                 "--samples",
                 "1",
@@ -57,8 +61,8 @@ fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) 
         render(&ours, "reference", "depth,weight,count,decision");
         let output = succeeds(&["compare", text(&theirs), text(&ours), "--json", "-"]);
         let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        // The studies' own limit, over the pixels in which no fragment is within rounding of a decision: one lost fragment of one
-        // of them is a thousand times as much.
+        // The studies' own limit, over pixels where no fragment is within rounding of a decision:
+        // one lost fragment in one of them is a thousand times as much.
         assert!(comparison["rmse_decided"].as_f64().unwrap() < 1e-6, "{scene:?}: {comparison}");
         assert!(comparison["excused"].as_f64().unwrap() < 0.01, "{scene:?}: {comparison}");
     }
@@ -76,7 +80,8 @@ fn another_driver_draws_the_same_picture() {
     });
 }
 
-/// OpenGL comes last where it is not asked for; asked for it draws, whatever others there are.
+/// Without `--adapter`, OpenGL is the last choice; with `--adapter gl` it draws, whatever other
+/// adapters there are.
 #[test]
 fn opengl_draws_the_same_picture() {
     if common::opengl().is_none() {
@@ -117,7 +122,8 @@ fn an_adapter_is_chosen_by_its_api_or_by_a_part_of_its_name() {
     check("no such adapter", None);
 }
 
-/// A card reads its own clock, shares nothing by subgroups, and has its large splats alone drawn by tiles.
+/// A graphics card is timed by its own clock, uses no subgroups, and draws only large splats by
+/// tiles; the bits are the same.
 #[test]
 fn a_card_is_timed_by_its_own_clock_and_draws_the_same() {
     let (Some(software), Some(mut card)) = (common::gpu(), common::gpu()) else { return };

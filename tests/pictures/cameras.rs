@@ -1,4 +1,5 @@
-//! Many views of one scene: the pictures are those of single renders, whatever program wrote the cameras.
+//! Files of many cameras: pictures equal single renders in every format, and bad files end in a
+//! sentence.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -11,10 +12,10 @@ use epsplat::io::cameras;
 use glam::{DMat3, DQuat, DVec3, EulerRot};
 use std::path::{Path, PathBuf};
 
-/// An intrinsic camera of 64x48 pixels whose principal point is not the centre.
+/// Intrinsics of a camera of 64x48 pixels whose principal point is off-centre, as JSON.
 const LENS: &str = r#""w": 64, "h": 48, "fl_x": 70, "fl_y": 75, "cx": 30, "cy": 26"#;
 
-/// A frame of a transforms.json.
+/// One frame of a transforms.json.
 fn frame(path: &str, to_world: DMat3, eye: DVec3) -> String {
     let rows: Vec<_> = (0..3)
         .map(|k| [to_world.row(k).x, to_world.row(k).y, to_world.row(k).z, eye[k]])
@@ -27,7 +28,7 @@ fn transforms(lens: &str, frames: &[String]) -> String {
     format!(r#"{{{lens}, "frames": [{}]}}"#, frames.join(", "))
 }
 
-/// Renders a scene by `cameras` into a new folder, and returns that.
+/// Renders a scene with all `cameras` into a new folder, and returns the folder.
 fn views(folder: &Folder, scene: &str, cameras: &Path, more: &[&str]) -> PathBuf {
     let output = folder.path("views");
     let _ = std::fs::remove_dir_all(&output);
@@ -39,7 +40,7 @@ fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The bunny, as it is and at the coordinates of a map, where an f32 has steps of half a unit.
+/// The bunny at its own place and at map coordinates, where f32 has steps of half a unit.
 fn scenes(folder: &Folder) -> [(PathBuf, DVec3); 2] {
     let bunny = Path::new(DATA).join("bunny.obj");
     let far = DVec3::new(445_000.0, 5_411_000.0, 300.0);
@@ -64,7 +65,8 @@ fn both_formats_show_what_eye_and_target_show() {
     std::fs::create_dir(&colmap).unwrap();
     std::fs::write(colmap.join("cameras.txt"), "# lenses\n3 PINHOLE 64 48 70 75 30 26\n").unwrap();
     for (scene, origin) in scenes(&folder) {
-        // It looks along -z with y up, so OpenGL's axes are the world's; around x by half a turn they are COLMAP's.
+        // The camera looks along -z with y up: OpenGL's axes are the world's, and COLMAP's are
+        // turned by half a turn around x.
         let eye = origin + DVec3::new(0.5, 5.0, 16.0);
         let single = folder.path("single.png");
         let [eye_text, target] = [eye, eye - 16.0 * DVec3::Z].map(|v| format!("{},{},{}", v.x, v.y, v.z));
@@ -116,7 +118,8 @@ fn one_pose_is_the_same_in_both_formats() {
         assert_eq!((&a.name, a.camera.size, a.camera.lens), (&b.name, b.camera.size, b.camera.lens));
         let (Pose::Rigid(a, eye_a), Pose::Rigid(b, eye_b)) = (&a.camera.pose, &b.camera.pose) else { panic!() };
         let apart = (*a - *b).to_cols_array().into_iter().fold(0.0, |most: f64, e| most.max(e.abs()));
-        // An entry is 2 (ab + cd) of a unit quaternion: in all 16 roundings of numbers up to 1; the eye's are of 5e6.
+        // An entry is 2 (ab + cd) of a unit quaternion: 16 roundings in all, of numbers up to 1.
+        // The eye's roundings are of 5e6.
         assert!(apart < 8.0 * f64::EPSILON && eye_a.distance(*eye_b) < 1e-8, "{apart:e} {:e}", eye_a.distance(*eye_b));
     }
 }
@@ -218,7 +221,7 @@ fn sets_that_cannot_be_rendered_end_in_a_sentence() {
     render(&empty, &[], 1, &["text", "model_converter"]);
     assert!(!output.exists());
 
-    // Distortion may be left out, and that is said.
+    // `--ignore-distortion` leaves distortion out, and a note says so.
     let base = ["render", text(&cloud), "-o", text(&output), "--backend", "reference", "--cameras", text(&distorted)];
     let stderr = epsplat(&[&base[..], &["--ignore-distortion"]].concat()).stderr;
     assert!(String::from_utf8(stderr).unwrap().contains("distortion of 1 cameras is left out"));
@@ -244,7 +247,7 @@ fn a_picture_that_cannot_be_written_is_named_and_others_stay() {
     assert!(!folder.names().contains(&"out".to_owned()));
 }
 
-/// What is in the folder of the pictures, or was put there by others, leads nothing out of it.
+/// Symbolic links in the output folder cannot lead a picture out of it.
 #[cfg(unix)]
 #[test]
 fn links_in_the_folder_lead_nowhere_out_of_it() {
@@ -309,7 +312,7 @@ fn an_error_of_a_camera_names_the_option_or_the_file_that_gave_it() {
     succeeds(&[&line[..], &["--ortho", "3"]].concat());
 }
 
-/// Editors and shells on Windows begin a file with a mark, or write it in UTF-16.
+/// Camera files may begin with a byte order mark or be UTF-16, as on Windows.
 #[test]
 fn camera_files_may_begin_with_a_byte_order_mark() {
     let folder = Folder::new();

@@ -1,4 +1,5 @@
-//! Disks that end at lines in their planes: kernels and twins agree, and a mesh's surfels end where it does.
+//! Disks clipped by lines in their planes: kernels agree with their twins, and surfels of a mesh
+//! end at its edges.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +21,7 @@ use glam::{DVec3, Vec3};
 
 use crate::common;
 
-/// Disks of all shapes, thin ones too, with lines of all kinds.
+/// Disks of all shapes, some of them thin, each with two random clip lines.
 fn clipped() -> Scene {
     let mut random = Random(7);
     let mut scene = sphere(1200, 1.7);
@@ -40,7 +41,8 @@ fn options(low_pass: LowPass) -> RenderOptions {
     RenderOptions { low_pass, maps: Maps::ON_DEVICE, cull: Cull::None, ..RenderOptions::default() }
 }
 
-/// Pixels of `frame` that differ from those of the `reference` and are not excused, and how many are.
+/// The number of pixels whose weight differs from the `reference` without excuse, and of excused
+/// pixels, where the decision margin is under 1e-4.
 fn compared(frame: &Frame, reference: &Frame) -> (usize, usize) {
     let decision = reference.map(Map::Decision).unwrap();
     let (weights, expected) = (frame.map(Map::Weight).unwrap(), reference.map(Map::Weight).unwrap());
@@ -70,7 +72,7 @@ fn kernels_and_twins_end_disks_at_the_same_lines() {
                 let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
                 assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
             }
-            // The rasteriser draws the very same fragments.
+            // The rasteriser draws the same fragments.
             let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
             let by_raster = RenderOptions { raster, ..options.clone() };
             let (by_raster, _) = render(&scene, &camera, &by_raster, &backend, &()).unwrap();
@@ -79,7 +81,7 @@ fn kernels_and_twins_end_disks_at_the_same_lines() {
             let differ =
                 decided.zip(counted.iter().zip(expected)).filter(|(decided, (a, b))| *decided && a != b).count();
             assert_eq!(differ, 0, "{projection:?} {low_pass:?}");
-            // The control: whole disks are another picture.
+            // Control: whole disks give another picture.
             let whole = Scene { clips: Vec::new(), ..scene.clone() };
             let (whole, report) = render(&whole, &camera, &options, &backend, &()).unwrap();
             assert!(compared(&whole, &reference).0 > 1000 && !report.needs.contains(&"clips"));
@@ -114,7 +116,7 @@ fn polygons_are_drawn_by_all_alike() {
         let [counted, expected] = [&by_raster, &frame].map(|frame| frame.map(Map::Count).unwrap());
         let decided = reference.map(Map::Decision).unwrap().iter().map(|decision| *decision >= 1e-4);
         assert!(decided.zip(counted.iter().zip(expected)).all(|(decided, (a, b))| !decided || a == b));
-        // The controls: disks, and polygons of another number of sides, are other pictures.
+        // Controls: disks, and polygons with one more side, give other pictures.
         for outline in [None, Outline::of_sides(sides + 1).ok()] {
             let other = RenderOptions { outline, ..options.clone() };
             let (other, _) = render(scene, &camera, &other, &backend, &()).unwrap();
@@ -178,7 +180,7 @@ fn a_line_that_is_turned_the_wrong_way_is_noticed() {
 fn a_disk_is_cut_where_its_line_says() {
     let disk = Surfel::disk(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z, 1.0);
     let [s, t] = [disk.s, disk.t].map(Vec3::from_array);
-    // What is kept has x >= 0.25: the line in the disk's own coordinates.
+    // The line x = 0.25 in the disk's own coordinates; the side x >= 0.25 remains.
     let scene = Scene {
         clips: vec![Clip([[s.x, t.x, -0.25], [0.0, 0.0, 1.0]])],
         surfels: vec![disk],
@@ -201,7 +203,7 @@ fn a_disk_is_cut_where_its_line_says() {
     assert!(covers(0.26) && covers(0.9) && !covers(0.24) && !covers(-0.5));
 }
 
-/// The unit cube, with outward faces, or one without its lid.
+/// The unit cube as OBJ, with outward faces, with or without its lid.
 fn cube(lid: bool) -> String {
     let mut text = String::new();
     for k in 0..8 {
@@ -227,7 +229,7 @@ fn a_cube_of_surfels_is_a_cube() {
         let path = folder.path().join("cube.obj");
         std::fs::write(&path, cube(lid)).unwrap();
         let (scene, preparation) = build(vec![read(&cube(lid))], &()).unwrap();
-        // Two triangles a side, each of which goes on over the diagonal.
+        // Two triangles per side, one surfel each; the surfels overlap across the diagonal.
         assert_eq!([scene.surfels.len(), preparation.points as usize], [if lid { 12 } else { 10 }; 2]);
         assert_eq!((scene.closed, scene.oriented), (lid, true));
         let camera = Camera::framing((240, 240), Lens::Fov(40.0), &scene, 1e-3).unwrap();
@@ -238,9 +240,9 @@ fn a_cube_of_surfels_is_a_cube() {
         let truth = Truth::cast(&Surface::read(&path, &()).unwrap(), &camera, &options, 8, &()).unwrap();
         let error = reconstruction(&frame, &truth).unwrap();
         assert_eq!(error.hole_rate, Some(0.0));
-        // Disks end 2 % of their radius past edges, which are a few hundred pixels long.
+        // Disks reach 2 % of their radius past edges, which are a few hundred pixels long.
         assert!(error.silhouette_iou.unwrap() > 0.98 && error.psnr_db.unwrap() > 30.0, "{error:?}");
-        // The control: disks that do not end there.
+        // Control: the same disks without clip lines.
         let whole = Scene { clips: Vec::new(), ..scene.clone() };
         let (frame, _) = render(&whole, &camera, &options, &Backend::Reference, &()).unwrap();
         assert!(reconstruction(&frame, &truth).unwrap().psnr_db.unwrap() < 22.0);
@@ -265,7 +267,7 @@ fn lines_stay_in_ply() {
     assert!(again.closed);
     assert_eq!(again.clips.as_ref().unwrap(), &clips);
     assert_eq!(build(vec![again], &()).unwrap().0.clips, clips);
-    // Nobody who has none writes any.
+    // If no disk is clipped, no lines are written.
     let open = Points { clips: Some(vec![Clip::NONE; 2]), closed: false, ..points };
     io::ply::write_points(&path, &open, &()).unwrap();
     let again = io::read(&path, &()).unwrap();

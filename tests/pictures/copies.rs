@@ -1,4 +1,5 @@
-//! Surfels that are the same are drawn once: not a bit of the image tells, nor does any count.
+//! Equal surfels are drawn once: the image, counts included, is the same to the bit as when each is
+//! drawn.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -14,7 +15,8 @@ use epsplat::low_level::render::{Backend, Report, render};
 use epsplat::low_level::scene::{Colors, LowPass, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::Vec3;
 
-/// A sphere of disks in all colours, with many copies of two disks, one of them in two colours, before it.
+/// A sphere of disks in all colours, with many copies of a disk in front and of one through the
+/// centre. The disk in front also has one copy in another colour.
 fn scene() -> Scene {
     let mut scene = sphere(800, 1.7);
     let Colors::Srgb8(codes) = &mut scene.colors else { unreachable!() };
@@ -44,7 +46,7 @@ fn copies_do_not_show() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let scene = scene();
-    // Without a low-pass weights fill 32 bits, with EWA's 40.
+    // Weights fill 32 bits without a low-pass and 40 with EWA.
     for low_pass in [LowPass::None, LowPass::Ewa] {
         let (each, report) = frame(&scene, &options(low_pass, &[Optimisation::Copies]), &backend);
         assert!(!report.needs.contains(&"copies"));
@@ -65,7 +67,7 @@ fn the_reference_multiplies_too() {
         .map(|without| frame(&scene, &options(LowPass::None, &without), &Backend::Reference).0);
     assert_eq!(each.map(Map::Count), once.map(Map::Count));
     let comparison = compare(&once, &each).unwrap();
-    // A sum of 3,000 equal f64 terms errs by at most 3,000 roundings of 2^-53, and a frame is kept in f32.
+    // A sum of 3,000 equal f64 terms errs by at most 3,000 roundings of 2^-53, and a frame is f32.
     for map in &comparison.maps {
         assert!(map.max_of_range <= 1.2e-7, "{map:?}");
     }

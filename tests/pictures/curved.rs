@@ -1,4 +1,5 @@
-//! Surfels that curve out of their planes: kernels and twins agree, caps stay in PLY, and a curved surface looks like itself.
+//! Surfels that curve out of their planes: kernels agree with their twins, caps survive PLY, and
+//! caps reconstruct a curved surface.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,7 +18,7 @@ use glam::Vec3;
 
 use crate::common;
 
-/// Caps of all shapes on a sphere, thin ones, flat ones and cut ones among them.
+/// Caps of all shapes on a sphere, some of them thin, flat or clipped.
 fn curved() -> Scene {
     let mut random = Random(7);
     let mut scene = sphere(1200, 1.7);
@@ -40,7 +41,8 @@ fn options(low_pass: LowPass, cull: Cull) -> RenderOptions {
     RenderOptions { low_pass, maps: Maps::ON_DEVICE, cull, ..RenderOptions::default() }
 }
 
-/// Pixels of `frame` that differ from those of the `reference` and are not excused, and how many are.
+/// The number of pixels that differ from the `reference` without excuse, and of excused pixels,
+/// where the decision margin is under 1e-4.
 fn compared(frame: &Frame, reference: &Frame) -> (usize, usize) {
     let decision = reference.map(Map::Decision).unwrap();
     let excused = decision.iter().filter(|decision| **decision < 1e-4).count();
@@ -83,7 +85,7 @@ fn kernels_and_twins_meet_the_same_caps() {
             let shuffled = common::scenes::shuffled(&scene, 3);
             let (shuffled, _) = render(&shuffled, &camera, &options, &backend, &()).unwrap();
             assert!(common::bits(&shuffled) == common::bits(&frame), "another order");
-            // The control: flat disks are another picture.
+            // Control: flat disks give another picture.
             let flat = Scene { caps: Vec::new(), ..scene.clone() };
             let (flat, report) = render(&flat, &camera, &options, &backend, &()).unwrap();
             assert!(compared(&flat, &reference).0 > 1000 && !report.needs.contains(&"curved"));
@@ -114,7 +116,7 @@ fn broken_caps_are_noticed() {
 
 #[test]
 fn flat_caps_are_disks() {
-    // Where one cap of many curves, those that do not are drawn by the same kernel.
+    // If one cap is curved, the kernel for caps draws the flat ones too.
     let mut scene = sphere(1200, 1.7);
     let camera = sphere_camera(160, Projection::Pinhole);
     let options = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal]), ..RenderOptions::default() };
@@ -146,7 +148,8 @@ fn caps_stay_in_ply() {
     let again = io::read(&path, &()).unwrap();
     assert_eq!(again.caps.as_ref().unwrap(), &caps);
     assert_eq!(build(vec![again], &()).unwrap().0.caps, caps);
-    // Unusable ones are flat, and ones without half-axes mean nothing.
+    // A cap that is not finite becomes flat, a too high one is limited, and caps without half-axes
+    // are dropped.
     let odd = vec![Cap([f32::NAN, 0.0, 0.0]), Cap([0.0, 0.0, 4.0])];
     let scene = build(vec![Points { caps: Some(odd), ..points.clone() }], &()).unwrap().0;
     assert_eq!(scene.caps, [Cap::FLAT, Cap([0.0, 0.0, 1.0])]);
@@ -154,7 +157,7 @@ fn caps_stay_in_ply() {
     let normals = Some(vec![[0.0, 0.0, 1.0]; 2]);
     let round = Points { axes: None, radii, normals, ..points.clone() };
     assert!(build(vec![round], &()).unwrap().0.caps.is_empty());
-    // Nobody who has none writes any.
+    // If all caps are flat, none is written.
     io::ply::write_points(&path, &Points { caps: Some(vec![Cap::FLAT; 2]), ..points }, &()).unwrap();
     assert_eq!(io::read(&path, &()).unwrap().caps, None);
 }
@@ -178,7 +181,7 @@ fn ellipsoid(count: usize) -> Points {
 fn points_of_a_curved_surface_become_caps_of_it() {
     let points = ellipsoid(3000);
     let alone = Points { normals: None, ..points.clone() };
-    // How far the points of surfels' rims lie from the ellipsoid, to first order.
+    // RMS distance of points on the rims from the ellipsoid, to first order.
     let off = |scene: &Scene| {
         let rim = |index: usize, k: u32| {
             let (sin, cos) = (f64::from(k) * 0.8).sin_cos();
@@ -199,7 +202,7 @@ fn points_of_a_curved_surface_become_caps_of_it() {
         let (caps, disks) = (of(&Limits::default()), of(&flat));
         assert!(disks.caps.is_empty() && caps.caps.iter().filter(|cap| !cap.is_flat()).count() > 2990);
         assert!(better * off(&caps) < off(&disks), "{} {}", off(&caps), off(&disks));
-        // What `surfels` makes of them and keeps is as good.
+        // The caps of `from_points` (the `surfels` command) are as good.
         let made = from_points(vec![points.clone()], &FromPoints::default(), &()).unwrap();
         let made = build(vec![made.points], &()).unwrap().0;
         assert!(better * off(&made) < off(&disks), "{} {}", off(&made), off(&disks));
@@ -251,8 +254,8 @@ fn the_outline_of_a_few_caps_is_that_of_their_sphere() {
     assert!(5.0 * caps.0 < disks.0 && caps.1 > disks.1 + 6.0, "{caps:?} {disks:?}");
 }
 
-/// A cap is worth its shape and its normals. With either alone, on a sphere of so many surfels:
-/// `cargo test --release --test pictures curved::what_normals -- --nocapture` prints decibels.
+/// Shape and normals of a cap each improve the picture. For the decibels with either alone, run
+/// `cargo test --release --test pictures curved::what_normals -- --nocapture`.
 #[test]
 fn what_normals_across_a_splat_are_worth_alone() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,4 +1,5 @@
-//! Points that face the camera: kernels and twins agree, and shapes divide the image as Schuetz and Wimmer 2015 say.
+//! Points that face the camera: kernels agree with their twins, and shapes divide the image as in
+//! Schuetz and Wimmer 2015.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -19,7 +20,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::common;
 
-/// Points of all sizes on a sphere, thin surfels among them.
+/// Points of many sizes on a sphere, made from surfels of aspect 1:0.3.
 fn points() -> Scene {
     let mut random = Random(5);
     let mut scene = sphere(1500, 1.0);
@@ -40,12 +41,13 @@ fn options(shape: PointShape) -> RenderOptions {
     }
 }
 
-/// The first of equal ones wins, or their mean.
+/// With no epsilon and a constant kernel the nearest point wins, or the mean of equally near ones.
 fn nearest(shape: PointShape) -> RenderOptions {
     RenderOptions { epsilon: Epsilon::Absolute(0.0), kernel: Kernel::Constant, ..options(shape) }
 }
 
-/// Pixels that differ by more than `tolerance` of the larger of the value and a half, of those that are decided.
+/// The number of decided pixels where a colour or map differs by more than `tolerance` times the
+/// larger of its value and 0.5.
 fn differing(frame: &Frame, reference: &Frame, tolerance: f32) -> usize {
     let decision = reference.map(Map::Decision).unwrap();
     let maps = [Map::Weight, Map::Depth, Map::Count].map(|map| (frame.map(map).unwrap(), reference.map(map).unwrap()));
@@ -82,7 +84,7 @@ fn kernels_and_twins_draw_the_same_points() {
         }
         let (shuffled, _) = render(&common::scenes::shuffled(&scene, 3), &camera, &options, &backend, &()).unwrap();
         assert!(common::bits(&shuffled) == common::bits(&frame), "another order, {name}");
-        // The control: disks in planes of their own are another picture.
+        // Control: disks in their own planes give another picture.
         let (own, _) = render(&scene, &camera, &RenderOptions { facing: None, ..options }, &backend, &()).unwrap();
         assert!(differing(&own, &reference, 1e-5) > 1000);
     }
@@ -100,7 +102,8 @@ fn broken_points_are_noticed() {
         (PointShape::Circle, "axes_facing.wgsl", "MOST_RADIUS * row", "1.1 * MOST_RADIUS * row"),
     ] {
         let Some(gpu) = common::gpu() else { return };
-        // A point of less than a pixel is that pixel, however much smaller.
+        // Every point smaller than a pixel covers that pixel, so a wrong least radius would not
+        // show.
         let least = if from.starts_with("LEAST") { 3.0 } else { 1.0 };
         let facing = Some(Facing { shape, pixels: [least, 12.0] });
         let options = RenderOptions { facing, ..options(shape) };
@@ -113,7 +116,7 @@ fn broken_points_are_noticed() {
     }
 }
 
-/// Points of one radius and a colour each.
+/// Points of one radius, each with its own colour.
 fn sites(count: usize, radius: f32, depth: impl Fn(&mut Random) -> f64) -> Scene {
     let mut random = Random(11);
     let mut colors = Vec::new();
@@ -126,14 +129,17 @@ fn sites(count: usize, radius: f32, depth: impl Fn(&mut Random) -> f64) -> Scene
     Scene { surfels, colors: Colors::Linear(colors), ..Scene::default() }
 }
 
-/// From the side of z, which is up to the viewer.
+/// An orthographic camera that looks down the z axis.
 fn frontal(size: u32) -> Camera {
     let lens = Lens::OrthographicHeight(2.0);
     Camera::look_at((size, size), lens, DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, None, Up::Y, 1e-3).unwrap()
 }
 
-/// Pixels whose colour is not that of the site of least `cost`, a function of its squared distance and its height, of those that a
-/// footprint holds and where the second is dearer by 1e-5; and how many those are.
+/// Counts wrong pixels and decided pixels.
+///
+/// A pixel is decided if it is inside a footprint, off all rims by 1e-5, and its second site costs
+/// 1e-5 more than the first. It is wrong if its colour is not that of the site of least `cost`, a
+/// function of squared distance in the image and of height z.
 fn wrong_sites(frame: &Frame, scene: &Scene, size: u32, cost: impl Fn(f64, f64) -> f64) -> (usize, usize) {
     let Colors::Linear(colors) = &scene.colors else { panic!("colours") };
     let (mut wrong, mut decided) = (0, 0);
@@ -167,13 +173,13 @@ fn paraboloids_give_the_power_diagram_and_points_of_a_plane_the_voronoi_diagram(
         let facing = options.facing.map(|facing| Facing { pixels: [1.0, 500.0], ..facing });
         RenderOptions { facing, ..options }
     };
-    // z_i + d_i^2 / R: the paper's straight borders.
+    // Paraboloids have depth z_i + d_i^2 / R, hence the paper's straight borders (a power diagram).
     let scene = sites(300, radius, |random| random.between(-0.2, 0.2));
     for backend in [&backend, &Backend::Reference] {
         let (frame, _) = render(&scene, &frontal(size), &wide(nearest(PointShape::Paraboloid)), backend, &()).unwrap();
         let (wrong, decided) = wrong_sites(&frame, &scene, size, |squared, z| -z + squared / r);
         assert!(wrong == 0 && decided > 30_000, "{wrong} of {decided}");
-        // The control: no power diagram is that of the nearest axis.
+        // Control: the power diagram is not that of the nearest axis.
         assert!(wrong_sites(&frame, &scene, size, |squared, _| squared).0 > 5000);
         let plane = sites(300, radius, |_| 0.125);
         for shape in [PointShape::Sphere, PointShape::Cone, PointShape::Paraboloid] {
@@ -181,7 +187,7 @@ fn paraboloids_give_the_power_diagram_and_points_of_a_plane_the_voronoi_diagram(
             let (wrong, decided) = wrong_sites(&frame, &plane, size, |squared, _| squared);
             assert!(wrong == 0 && decided > 30_000, "{wrong} of {decided} {shape:?}");
         }
-        // The control: flat circles of a plane are one surface, which is blended.
+        // Control: flat circles in one plane are one surface, whose points are blended.
         let (frame, _) = render(&plane, &frontal(size), &wide(nearest(PointShape::Circle)), backend, &()).unwrap();
         assert!(wrong_sites(&frame, &plane, size, |squared, _| squared).0 > 5000);
     }
@@ -208,7 +214,8 @@ fn a_point_shows_at_its_own_pixel_and_is_no_larger_than_its_limit() {
                 let (frame, _) = render(&scene, &camera, &of(facing), &backend, &()).unwrap();
                 frame.map(Map::Count).unwrap().to_vec()
             };
-            // Of one pixel: each that does not lie between two.
+            // At one pixel wide, each point covers the pixel it lies in; points near a pixel edge
+            // are excused.
             let counts = count(facing(0.0, 1.0));
             let mut expected = vec![0f32; counts.len()];
             let mut near = vec![false; counts.len()];
@@ -223,7 +230,7 @@ fn a_point_shows_at_its_own_pixel_and_is_no_larger_than_its_limit() {
             }
             let wrong = (0..counts.len()).filter(|&k| !near[k] && counts[k] != expected[k]).count();
             assert!(wrong == 0 && near.iter().filter(|near| **near).count() < 200, "{wrong} {name} {projection:?}");
-            // Of fifty pixels all: an area each.
+            // At fifty pixels wide, a point covers the area of its footprint.
             let area = if shape == PointShape::Square { 50.0 * 50.0 } else { std::f32::consts::PI * 25.0 * 25.0 };
             let alone = sites(1, 1.0, |_| 0.0);
             let alone = Scene { surfels: vec![Surfel { center: [0.0; 3], ..alone.surfels[0] }], ..alone };
@@ -277,14 +284,15 @@ fn what_is_left_out_of_points_changes_no_bit() {
         [Projection::Pinhole, Projection::Orthographic].into_iter().flat_map(|p| POINT_SHAPES.map(|shape| (p, shape)))
     {
         let camera = sphere_camera(96, projection);
-        // Of a fifth of a pixel, and of twenty.
+        // Points of a fifth of a pixel, and of twenty pixels.
         for pixels in [[1.0, 50.0], [20.0, 50.0]] {
             let options = RenderOptions { facing: Some(Facing { shape, pixels }), ..options(shape) };
             let plain = RenderOptions { without: vec![Optimisation::Culling, Optimisation::Hiding], ..options.clone() };
             let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             let (whole, _) = render(&scene, &camera, &plain, &backend, &()).unwrap();
             assert!(common::bits(&frame) == common::bits(&whole), "{name} {pixels:?}");
-            // A ball that is twenty pixels larger reaches before the nearer half.
+            // Points enlarged to twenty pixels reach in front of the nearer half, so culling may
+            // find none.
             let some = report.splats_drawn < 110_000 || pixels[0] > 1.0;
             assert!(report.needs.contains(&"cull") && some, "{} {name} {pixels:?}", report.splats_drawn);
         }
@@ -322,7 +330,7 @@ fn clouds_without_radii_take_one_for_all_whatever_the_order() {
     assert_eq!(built(&reversed, PointSize::Radius(2.0)).1.common_radius, preparation.common_radius);
     let (scene, preparation) = built(&positions, PointSize::Absolute(0.25));
     assert!(scene.surfels[7].radius() == 0.25 && preparation.common_radius.is_none());
-    // Radii that are given stay.
+    // Given radii remain; only missing or unusable ones get the common radius.
     let given = Points { radii: Some(vec![0.5, f32::NAN, 0.0]), ..cloud(&positions[..3]) };
     let (scene, preparation) = build_facing(vec![given], PointSize::Radius(1.0), &Limits::default(), &()).unwrap();
     assert_eq!((scene.surfels[0].radius(), preparation.common_radius.unwrap().0), (0.5, 2));

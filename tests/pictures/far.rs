@@ -25,7 +25,7 @@ fn broken(file: &str, from: &str, to: &str) -> Backend {
     Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
 }
 
-/// Lit, so that normals show: here they are those of the triangles' planes.
+/// Lit, so that the normals of the triangles' planes show.
 fn lit() -> RenderOptions {
     RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() }
 }
@@ -34,7 +34,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// A closed surface with bumps, whose coordinates are multiples of 2^-16: exact 2^36 away.
+/// A closed surface with bumps, whose coordinates are multiples of 2^-16: f64 is exact 2^36 away.
 fn rough() -> Mesh {
     let mut mesh = meshes::sphere(4, false);
     let mut random = Random(7);
@@ -45,13 +45,13 @@ fn rough() -> Mesh {
     mesh
 }
 
-/// The mesh, moved.
+/// The mesh, moved by `place`.
 fn at(mesh: &Mesh, place: DVec3) -> Mesh {
     let positions = mesh.positions.iter().map(|p| (DVec3::from_array(*p) + place).to_array()).collect();
     Mesh { positions, ..mesh.clone() }
 }
 
-/// From near a place.
+/// A camera near `place` that looks at it.
 fn camera(place: DVec3, lens: Lens) -> Camera {
     let eye = place + DVec3::new(1.0, 1.5, 2.0);
     Camera::look_at((96, 72), lens, eye, place, None, Up::Y, 0.125).unwrap()
@@ -59,7 +59,7 @@ fn camera(place: DVec3, lens: Lens) -> Camera {
 
 const LENSES: [Lens; 2] = [Lens::Fov(50.0), Lens::OrthographicHeight(2.5)];
 
-/// Pixels of `decided` whose colour or depth differs, and covered ones.
+/// The number of decided pixels whose colour or depth differs, and of covered pixels.
 fn apart(shown: &Frame, truth: &Frame, decided: &[f32]) -> (usize, usize) {
     let depths = [shown, truth].map(|frame| frame.map(Map::Depth).unwrap());
     let differs = |pixel: &usize| {
@@ -72,7 +72,7 @@ fn apart(shown: &Frame, truth: &Frame, decided: &[f32]) -> (usize, usize) {
     ((0..decided.len()).filter(differs).count(), covered)
 }
 
-/// The mesh by itself, and where no rounding decides a pixel.
+/// The reference's picture of the mesh at the origin, and its decision margins.
 fn truth(mesh: &Mesh, lens: Lens) -> (Frame, Vec<f32>) {
     let scene = with_triangles(None, std::slice::from_ref(mesh)).unwrap().0;
     let with_decision = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Decision]), ..lit() };
@@ -81,7 +81,7 @@ fn truth(mesh: &Mesh, lens: Lens) -> (Frame, Vec<f32>) {
     (frame, decided)
 }
 
-/// The same with f32 corners.
+/// The same triangles with corners rounded to f32.
 fn single(triangles: &Triangles) -> Triangles {
     let corner = |vertex: &u32| triangles.vertices()[*vertex as usize].map(f64::from);
     let of = |corners: &[u32; 3]| Triangle {
@@ -93,11 +93,11 @@ fn single(triangles: &Triangles) -> Triangles {
     Triangles::new(&triangles.corners().iter().map(of).collect::<Vec<_>>())
 }
 
-/// Places far away, the nearest ones with directions of their own.
+/// Places from 1e6 to 9e9 away, along axes and askew.
 const FAR: [[f64; 3]; 5] = [[1e6, 0.0, 0.0], [-3e6, 2e6, 1e6], [0.0, 1e7, -1e7], [1e9, 0.0, 0.0], [-4e9, 5e9, 6e9]];
 
-/// Two meshes far from each other, each seen from near: by kernels, by the reference, and beside
-/// surfels. Without the trailing digits the picture is another one.
+/// Two meshes far from each other look alike, each seen from near: with kernels, with the
+/// reference, and beside surfels. Without the low parts of the coordinates they do not.
 #[test]
 fn a_mesh_far_away_looks_as_it_does_near() {
     let Some(backend) = gpu() else { return };
@@ -124,7 +124,7 @@ fn a_mesh_far_away_looks_as_it_does_near() {
         };
         assert!(of_high("relative[i] = sum(d, low);", "relative[i] = d;") > 200);
         assert!(of_high("edge[i] = sum(d, low);", "edge[i] = d;") > 200);
-        // And of f32 alone.
+        // Control: corners in f32 alone.
         let single = Scene { triangles: single(&scene.triangles), ..scene };
         let shown = frame(&single, &camera(place, lens), &lit(), &Backend::Reference);
         assert!(apart(&shown, &near, &decided).0 > 200);
@@ -150,17 +150,17 @@ fn a_mesh_far_away_is_rasterised_as_it_is_near() {
     assert!(off * 5 > covered, "{off} of {covered}");
 }
 
-/// Trailing parts are there where a scene needs them, and else nowhere.
+/// Only scenes that need low parts of corners have them.
 #[test]
 fn scenes_that_f32_serve_have_no_trailing_parts() {
     let mesh = rough();
     let doubled = |meshes: &[Mesh]| Facts::of(&with_triangles(None, meshes).unwrap().0).mesh.doubled;
     assert!(!doubled(std::slice::from_ref(&mesh)));
-    // Map coordinates have an origin near them.
+    // Map coordinates get an origin near them.
     assert!(!doubled(&[at(&mesh, DVec3::new(484_700.0, 6_632_550.0, 200.0))]));
     assert!(!doubled(&[mesh.clone(), at(&mesh, DVec3::new(1000.0, 0.0, 0.0))]));
     assert!(doubled(&[mesh.clone(), at(&mesh, DVec3::new(1e6, 0.0, 0.0))]));
-    // Decimals, which f32 round.
+    // Decimal coordinates, which f32 rounds.
     let tenths = |scale: f64| Mesh {
         positions: mesh.positions.iter().map(|p| p.map(|x| (x * 1e4).round() / 1e4 * scale)).collect(),
         ..mesh.clone()
@@ -168,7 +168,8 @@ fn scenes_that_f32_serve_have_no_trailing_parts() {
     assert!(!doubled(&[tenths(1.0)]) && !doubled(&[tenths(0.1)]));
 }
 
-/// Needles are triangles, and seen from near their ends they cover as many pixels as they should.
+/// Needles are not degenerate, and seen from near their ends they cover the pixels that they
+/// should.
 #[test]
 fn needles_are_triangles() {
     let Some(backend) = gpu() else { return };
@@ -185,7 +186,7 @@ fn needles_are_triangles() {
         let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() };
         let (scene, preparation) = with_triangles(None, &[mesh]).unwrap();
         assert_eq!((preparation.triangles, preparation.dropped_degenerate), (1, 0), "{long} {direction}");
-        // An eye has as many digits as corners have.
+        // An eye has no more digits than corners have, so it cannot come near the thinnest needle.
         if wide < 1e-12 * long {
             continue;
         }

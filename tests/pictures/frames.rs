@@ -1,8 +1,9 @@
-//! What frames are, to the bit: a list of renders of every kind, each with a hash.
+//! Hashes of frames, to the bit: renders of every kind against the hashes of earlier runs.
 //!
-//! The hashes of the f64 reference are kept in `tests/golden/frames.txt`: whatever is rearranged, they stay. Those of an adapter
-//! differ from driver to driver, so they are written to the file that `EPSPLAT_FRAMES` names, with those of the reference: run it
-//! before a change and after it, and compare. `EPSPLAT_TEST_ADAPTER` chooses the adapter.
+//! The hashes of the f64 reference are in `tests/golden/frames.txt` and must not change. An
+//! adapter's hashes differ from driver to driver, so the file that `EPSPLAT_FRAMES` names receives
+//! them: write one before a change and one after it, and compare. `EPSPLAT_TEST_ADAPTER` chooses
+//! the adapter.
 //!
 //! ```text
 //! EPSPLAT_FRAMES=before.txt cargo test --release --test pictures frames::
@@ -34,7 +35,7 @@ struct Row<'a> {
     name: String,
     view: &'a View,
     options: RenderOptions,
-    /// Bytes that a buffer may have: small ones make pages and bands.
+    /// The largest buffer, in bytes: a small limit makes pages and bands.
     buffer_limit: Option<u64>,
 }
 
@@ -74,7 +75,7 @@ fn scenes() -> Scenes {
     }
 }
 
-/// A sphere whose centres have digits past those of an f32.
+/// A sphere whose centres have more digits than f32 holds.
 fn doubled() -> View {
     let scene = sphere(2000, 1.7);
     let far = |surfel: &Surfel| Vec3::from_array(surfel.center).as_dvec3() + DVec3::new(3e6, -7e5, 1e6);
@@ -106,8 +107,8 @@ fn with_maps() -> RenderOptions {
     RenderOptions { maps: Maps::ON_DEVICE, ..RenderOptions::default() }
 }
 
-/// Every render of the list: kernels, epsilons, low-passes, shadings, maps, accumulators, organisations, what is left out, pages,
-/// bands, and the rasteriser.
+/// Lists all renders: kernels, epsilons, low-passes, shadings, maps, accumulators, organisations,
+/// omitted optimisations, pages, bands, and the rasteriser.
 fn list(scenes: &Scenes) -> Vec<Row<'_>> {
     let mut rows = Vec::new();
     let mut add = |name: String, view, options| rows.push(Row { name, view, options, buffer_limit: None });
@@ -192,7 +193,7 @@ fn hash(frame: &Frame) -> u64 {
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
-/// The hash of the second frame, which is the first one's too.
+/// Renders two frames, which must be equal, and returns their hash.
 fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
     let (scene, camera) = row.view;
     let mut renderer = Renderer::new(scene, &row.options, backend).unwrap();
@@ -201,7 +202,7 @@ fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
     first
 }
 
-/// Whether the reference draws it in another way than a row that is in the list anyway.
+/// False if the f64 reference ignores an option that the row sets: another row covers it then.
 fn differs_in_f64(row: &Row<'_>) -> bool {
     let options = &row.options;
     let own = RenderOptions {
@@ -224,7 +225,7 @@ fn frames_of_the_reference_are_what_they_were() {
     let pairs = made.lines().zip(kept.lines().filter(|line| !line.starts_with('#')));
     let other: Vec<_> = pairs.clone().filter(|(made, kept)| made != kept).collect();
     assert!(other.is_empty() && pairs.count() == made.lines().count(), "now:\n{made}\nother than before: {other:#?}");
-    // A single moved surfel shows.
+    // Control: one surfel moved by 1e-6 changes the hash.
     let mut moved = scenes.sphere.clone();
     moved.0.surfels[200].center[2] += 1e-6;
     let row = |view| Row { name: String::new(), view, options: with_maps(), buffer_limit: None };
@@ -237,7 +238,7 @@ fn frames_of_an_adapter_repeat() {
     let scenes = scenes();
     let all = list(&scenes);
     assert!(all.len() >= 90, "{}", all.len());
-    // Written line by line: not every driver comes to the end.
+    // Lines are written one by one, because some drivers crash before the end.
     let file = std::env::var("EPSPLAT_FRAMES").ok().map(|path| std::fs::File::create(path).unwrap());
     let write =
         |line: &str| file.iter().for_each(|mut file| std::io::Write::write_all(&mut file, line.as_bytes()).unwrap());
@@ -256,7 +257,8 @@ fn frames_of_an_adapter_repeat() {
     }
 }
 
-/// What a browser or a phone would run: no optional feature, eight storage buffers, bindings of 128 MiB.
+/// A core WebGPU device, as in a browser or on a phone, renders the same bits: no optional feature,
+/// eight storage buffers, bindings of 128 MiB.
 #[test]
 fn core_webgpu_makes_the_same_frames() {
     let (Some(all), Some(core)) = (common::gpu(), common::core_gpu()) else { return };
@@ -273,7 +275,7 @@ fn core_webgpu_makes_the_same_frames() {
     assert!(compared >= 75, "{compared}");
 }
 
-/// A renderer that owns what it renders can be kept by whoever has no lifetimes, and used on another thread.
+/// A renderer that owns its scene has no lifetimes, so it can move to another thread.
 #[test]
 fn a_renderer_can_own_its_scene() {
     let Some(gpu) = common::gpu() else { return };
@@ -285,7 +287,7 @@ fn a_renderer_can_own_its_scene() {
     assert_eq!(hash(&frame), hash(&expected));
 }
 
-/// Why an adapter does not render a row: what it lacks.
+/// The feature that an adapter lacks for a row, or `None` if it can render it.
 fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
     let (wants_u64, raster) = (row.options.accumulator.row().features == Features::AtomicsU64, row.options.raster);
     let lacks = [
@@ -299,15 +301,15 @@ fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
     lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, why)| why)
 }
 
-/// A disk in the first of many blocks of pixels, alone in the image: blocks without a splat may be
-/// left as the image was cleared.
+/// Pixels without a splat have each map's value for nothing. One small sphere is alone in the upper
+/// left of the image: blocks of pixels without a splat may be left as they were cleared.
 #[test]
 fn maps_are_right_where_nothing_is() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let painted = painted(1);
     let camera = sphere_camera(8, Projection::Pinhole);
-    // The sphere in the upper left of an image ten times as wide.
+    // The sphere is in the upper left of an image ten times as wide.
     let camera = Camera { width: 80, height: 48, ..camera };
     let plain = Scene { colors: Colors::Constant([0.5, 0.4, 0.3, 1.0]), ..painted.clone() };
     for row in MAPS.iter().filter(|row| row.image_word.is_some()) {
@@ -328,7 +330,7 @@ fn maps_are_right_where_nothing_is() {
                 0 => 0,
                 n => row.nothing[k % n].to_bits(),
             };
-            // All but the first two blocks of rows and columns.
+            // All pixels but those in the first two blocks of rows and columns.
             let width = row.map.width();
             let empty = (0..device.len()).filter(|k| k / width % 80 >= 16 || k / width / 80 >= 16);
             for k in empty {

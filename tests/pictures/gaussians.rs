@@ -1,5 +1,6 @@
-//! Files of Gaussian surfels: closed forms, an oracle that shares nothing with the program, order and memory that must not show, and files that
-//! are not what they say.
+//! Files of Gaussian surfels against closed forms and an independent oracle, and files with faults.
+//!
+//! Also tests that order and memory do not change a bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -27,7 +28,7 @@ fn gpu() -> Option<Backend> {
     common::gpu().map(Backend::gpu)
 }
 
-/// What the command line takes for Gaussians.
+/// The command line's defaults for Gaussians.
 fn options() -> RenderOptions {
     RenderOptions {
         kernel: gaussian::KERNEL,
@@ -38,14 +39,14 @@ fn options() -> RenderOptions {
     }
 }
 
-/// The scene of a file.
+/// The scene of a file with these Gaussians, and its preparation.
 fn scene(gaussians: &[Gaussian]) -> (Scene, Preparation) {
     let folder = Folder::new();
     let points = io::read(&folder.file("gaussians.ply", file(gaussians)), &()).unwrap();
     build(vec![points], &()).unwrap()
 }
 
-/// From the origin along z, with 100 pixels a radian at the axis.
+/// A camera at the origin that looks along z, with 100 pixels per radian at the axis.
 fn ahead(size: u32) -> Camera {
     let half = f64::from(size) / 2.0;
     let lens = Lens::Intrinsics([100.0, 100.0, half, half]);
@@ -61,7 +62,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// The codes of a pixel, premultiplied by alpha.
+/// A pixel's sRGB-encoded colour, premultiplied by alpha, and alpha.
 fn codes([r, g, b, alpha]: [f32; 4]) -> [f64; 4] {
     let code = |light: f32| f64::from(alpha) * linear_to_srgb(light.into());
     [code(r), code(g), code(b), alpha.into()]
@@ -71,7 +72,8 @@ fn backends() -> Vec<Backend> {
     gpu().into_iter().chain([Backend::Reference]).collect()
 }
 
-/// A Gaussian 10 units away whose standard deviation has 5 pixels, or a third of one: `o exp(-rho^2 / 2)` down to 1/255, and at most 0.99.
+/// A Gaussian 10 units away with a standard deviation of 5 pixels, or a third of one, has the alpha
+/// `o exp(-rho^2 / 2)`: none below 1/255, and at most 0.99.
 #[test]
 fn one_gaussian_is_its_closed_form() {
     let camera = ahead(64);
@@ -100,7 +102,8 @@ fn one_gaussian_is_its_closed_form() {
     }
 }
 
-/// The nearer is composited over the farther whatever the file's order, in codes: half of white over half of black is 0.5 and not linear light.
+/// The nearer Gaussian is composited over the farther in any order of the file, in encoded colours:
+/// half of white over half of black is 0.5, unlike in linear light.
 #[test]
 fn two_gaussians_are_composited_by_depth_as_codes() {
     let [white, black] = [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]];
@@ -141,7 +144,8 @@ fn two_gaussians_are_composited_by_depth_as_codes() {
     }
 }
 
-/// A file of 100,000 with harmonics of degree 3, on the device, by the twin and by the oracle; wrong kernels and wrong harmonics are noticed.
+/// A file of 100,000 Gaussians with harmonics of degree 3 matches the oracle, on the device and in
+/// the twin. Broken kernels and harmonics do not.
 #[test]
 fn a_large_file_is_what_the_published_formulas_say() {
     let gaussians = torus(100_000, 3, 5);
@@ -183,7 +187,8 @@ fn a_large_file_is_what_the_published_formulas_say() {
     }
 }
 
-/// Device and twin agree to 1e-6 where nothing depends on rounding, for every degree, and in the other ways to composite too.
+/// Device and twin agree to 1e-6 where rounding decides nothing, for every degree and in other
+/// composites.
 #[test]
 fn device_and_twin_agree_in_every_degree_and_composite() {
     let Some(backend) = gpu() else { return };
@@ -209,7 +214,8 @@ fn device_and_twin_agree_in_every_degree_and_composite() {
     }
 }
 
-/// Neither the order of the file, nor how many fragments a buffer holds, nor how many surfels a page has, nor the API show in a bit.
+/// The file's order, the fragments in a buffer, the surfels in a page and optional device features
+/// change no bit.
 #[test]
 fn order_and_memory_do_not_show() {
     let Some(backend) = gpu() else { return };
@@ -222,7 +228,8 @@ fn order_and_memory_do_not_show() {
         for seed in [1, 2] {
             assert!(bits(&frame(&shuffled(&scene, seed), &camera, &of, &backend)) == first, "order {seed}");
         }
-        // A row of this image has about 96 x 30 fragments of 32 bytes, and a surfel 196 bytes of attributes.
+        // A row of this image has about 96 x 30 fragments of 32 bytes; a surfel has 196 bytes of
+        // attributes.
         assert!(bits(&frame(&scene, &camera, &of, &small(500_000))) == first, "bands and pages");
         assert!(bits(&frame(&scene, &camera, &of, &core)) == first, "core features");
         let mut other = scene.clone();
@@ -231,8 +238,10 @@ fn order_and_memory_do_not_show() {
     }
 }
 
-/// Of a far cloud thousands of fragments lie at a pixel, more than a device sorts: lists that end where nothing more shows have the picture of
-/// whole ones, to the bit; those that end earlier have not.
+/// A pixel of a far cloud has thousands of fragments, more than a device sorts.
+///
+/// Lists that end where nothing more shows give the bits of whole lists; lists that end earlier do
+/// not.
 #[test]
 fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
     let Some(backend) = gpu() else { return };
@@ -259,8 +268,8 @@ fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
         let broken = Backend::Gpu { gpu: Box::new(small()), sources: early.clone() };
         assert!(needs(&of, &broken).0 != whole, "{composite:?}");
     }
-    // All of it at a few pixels, where of two fragments at one depth but for rounding either may come first: of two that are alike a colour
-    // changes by little.
+    // The whole cloud covers a few pixels. Fragments whose depths differ only by rounding may come
+    // in either order, which changes colours little, because they are alike.
     let camera = far(2000.0);
     let of = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options() };
     let twin = frame(&scene, &camera, &of, &Backend::Reference);
@@ -287,7 +296,8 @@ fn the_oracles_harmonics_are_the_programs() {
     }
 }
 
-/// Ellipsoids that are flat are surfels across their shortest axis; others are refused, unless they are to be flattened.
+/// Flat ellipsoids are surfels across their shortest axis; thicker ones are refused without
+/// `--flatten`.
 #[test]
 fn flat_ellipsoids_are_surfels_and_others_are_told() {
     let flat = torus(500, 1, 3);
@@ -306,7 +316,7 @@ fn flat_ellipsoids_are_surfels_and_others_are_told() {
     assert_eq!((thin.surfels, &thin.colors), (expected.surfels, &expected.colors));
     let flattened = preparation.flattened.unwrap();
     assert_eq!((flattened.count, flattened.thick), (500, 0));
-    // The rotation's other axes, of the same lengths.
+    // Here the shortest axis is another axis of the rotation.
     let (turned, _) = scene(&solid(0.01, 0));
     assert!(turned.surfels.iter().all(|surfel| surfel.normal().is_finite()));
     let path = folder.file("solid.ply", file(&solid(0.5, 2)));
@@ -320,7 +330,8 @@ fn flat_ellipsoids_are_surfels_and_others_are_told() {
     assert_eq!(io::read_with(&path, options, &()).unwrap().flattened.unwrap().thick, 500);
 }
 
-/// What a Gaussian cannot be drawn with leaves it out and is counted; what a file cannot have ends in a sentence.
+/// A Gaussian that cannot be drawn is left out and counted; a file that lacks properties ends in a
+/// sentence.
 #[test]
 fn odd_files_end_in_a_sentence_or_are_counted() {
     let mut odd = torus(40, 3, 11);
@@ -378,7 +389,7 @@ fn odd_files_end_in_a_sentence_or_are_counted() {
     assert!(told.contains("2 points had an alpha outside 0 to 1"), "{told}");
 }
 
-/// The command line draws a file as it was trained without being asked, and says what is not so.
+/// By default the command line draws a file as it was trained; other options change the picture.
 #[test]
 fn a_file_is_drawn_as_it_was_trained() {
     let Some(_) = gpu() else { return };
@@ -417,7 +428,7 @@ fn a_file_is_drawn_as_it_was_trained() {
     assert!(told.contains("Gaussian surfels") && told.contains("degree 2"), "{told}");
 }
 
-/// Other commands take Gaussians for surfels in linear light, and a scene may have others beside them.
+/// Other commands treat Gaussians as surfels in linear light, and a scene may hold both kinds.
 #[test]
 fn gaussians_are_surfels_to_others() {
     let folder = Folder::new();

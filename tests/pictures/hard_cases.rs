@@ -1,4 +1,4 @@
-//! Cases that renderers like to get wrong: the GPU against the f64 reference.
+//! Cases that renderers often draw wrong: the GPU against the f64 reference.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -12,7 +12,8 @@ use epsplat::low_level::render::Backend;
 use epsplat::low_level::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
-/// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.
+/// Judges a picture of `surfels` against the reference; `covered` is the expected share of covered
+/// pixels, within 0.02. Each disk has its own colour, so that every attribute is summed.
 fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
     let Some(gpu) = common::gpu() else { return };
     let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
@@ -32,7 +33,7 @@ fn orthographic(size: (u32, u32)) -> Camera {
 
 #[test]
 fn one_disk_of_a_million_pixels_is_drawn_to_its_last_row() {
-    // Over 65,535 pixels, where llvmpipe ends a loop.
+    // Each disk covers more than 65,535 pixels: llvmpipe ends a loop after that many iterations.
     let disks = vec![Surfel::disk(Vec3::new(0.1, 0.2, 3.0), Vec3::new(0.1, 0.2, -1.0), 30.0); 2];
     check("pinhole", disks.clone(), &pinhole((1100, 1000)), 1.0);
     check("orthographic", disks, &orthographic((1100, 1000)), 1.0);
@@ -47,12 +48,12 @@ fn a_disk_whose_centre_is_millions_of_pixels_away_still_covers_the_image() {
 
 #[test]
 fn disks_through_and_around_the_camera_show_their_part_in_front() {
-    // The floor under the camera fills the lower half; a wall beside it the left.
+    // The floor under the camera fills the lower half.
     let floor = Surfel::disk(Vec3::new(0.0, 1.0, 0.0), Vec3::NEG_Y, 1000.0);
     check("floor", vec![floor], &pinhole((160, 120)), 0.5);
     let behind = Surfel::disk(Vec3::new(0.0, 1.0, -5.0), Vec3::NEG_Y, 20.0);
     check("centre behind", vec![floor, behind], &pinhole((160, 120)), 0.5);
-    // The camera lies in the plane of this disk, inside it: exactly edge-on, and nothing to see.
+    // The camera lies in this disk's plane and inside its rim: exactly edge-on, so nothing shows.
     let around = Surfel::disk(Vec3::ZERO, Vec3::Y, 10.0);
     check("camera inside", vec![around, floor], &pinhole((160, 120)), 0.5);
     check("nothing", vec![Surfel::disk(Vec3::new(0.0, 0.0, -2.0), Vec3::Z, 1.0)], &pinhole((16, 16)), 0.0);
@@ -67,7 +68,7 @@ fn odd_image_sizes_work() {
     }
 }
 
-/// Every case with every accumulator that the adapter has.
+/// Draws every case with every accumulator that the adapter supports.
 #[test]
 fn every_hard_case_passes_or_fails_as_expected() {
     let Some(backend) = common::gpu().map(Backend::gpu) else { return };
@@ -80,7 +81,7 @@ fn every_hard_case_passes_or_fails_as_expected() {
         }
         assert!(row.over_float.is_none(), "{row:#?}");
     }
-    // An excuse that nobody needs is none.
+    // An expected failure that does not occur must be deleted from its case.
     for case in &cases {
         for excused in &case.expected {
             let row = rows.iter().find(|row| row.case == case.name && row.accumulator == excused.accumulator.name());
@@ -90,7 +91,7 @@ fn every_hard_case_passes_or_fails_as_expected() {
     }
 }
 
-/// The controls: each kernel broken in one place must fail a case that was made for that place.
+/// Controls: a kernel broken in one place must fail the case that was made for that place.
 #[test]
 fn a_broken_kernel_fails_a_hard_case() {
     let cases = hardcases::cases().unwrap();

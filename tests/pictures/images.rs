@@ -1,7 +1,7 @@
-//! Golden images: what the reference renders stays what it was, and the GPU renders the same.
+//! Golden images: the f64 reference still renders them, and the GPU renders the same.
 //!
-//! After a change that is meant to alter images, look at them and run with `EPSPLAT_BLESS=1`. A golden that is missing
-//! fails the test.
+//! After a change that is meant to alter images, run with `EPSPLAT_BLESS=1` and look at the new
+//! images. A missing golden image fails the test.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -54,7 +54,7 @@ fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
         RenderOptions { background: [1.0; 4], ..default.clone() },
     );
     case("bunny", file("bunny.obj"), (256, 256), Lens::Fov(45.0), default.clone());
-    // Of glass: the README's second picture.
+    // The README's second picture, of glass.
     let glass = RenderOptions {
         composite: "layers".parse().unwrap(),
         opacity: 0.5,
@@ -82,7 +82,7 @@ fn codes(frame: &Frame) -> Vec<[i32; 4]> {
     frame.color.iter().map(pixel).collect()
 }
 
-/// Share of pixels that differ by more than one code in any channel.
+/// The share of pixels that differ by more than one code in any channel.
 fn differing(a: &Frame, b: &Frame) -> f64 {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let differs = |(a, b): (&[i32; 4], &[i32; 4])| a.iter().zip(b).any(|(a, b)| (a - b).abs() > 1);
@@ -103,9 +103,9 @@ fn the_reference_renders_the_golden_images() {
             io::png::write(&golden(name), &frame).unwrap();
         }
         let expected = io::png::read(&golden(name)).unwrap_or_else(|e| panic!("the golden image is missing: {e}"));
-        // One code is left to the platform's exp and pow.
+        // The platform's `exp` and `pow` may change a code by one.
         assert_eq!(differing(&frame, &expected), 0.0, "{name}");
-        // The control: another kernel is another image.
+        // Control: another kernel gives another image.
         let other = RenderOptions { kernel: "ellipse:2,3".parse().unwrap(), ..options };
         let (frame, _) = render(&scene, &camera, &other, &Backend::Reference, &()).unwrap();
         assert!(differing(&frame, &expected) > 0.001, "{name}: a different kernel went unnoticed");
@@ -119,7 +119,7 @@ fn the_gpu_renders_the_golden_images() {
     for (name, scene, camera, options) in cases() {
         let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
         let expected = io::png::read(&golden(name)).unwrap_or_else(|e| panic!("the golden image is missing: {e}"));
-        // f32 may decide otherwise at a rim, on few pixels.
+        // At a few pixels on rims f32 may decide otherwise.
         let share = differing(&frame, &expected);
         assert!(share < 0.0005, "{name}: {:.3} % of the pixels differ", 100.0 * share);
     }

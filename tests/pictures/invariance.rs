@@ -1,4 +1,5 @@
-//! What must hold exactly or analytically, whatever the order, the pages and the schedule.
+//! Results known exactly or in closed form, for every accumulator: colours, sums, resolve and
+//! depths.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -30,7 +31,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// Disks on a grid in the plane z = `depth`, that cover `size` pixels and more.
+/// Disks on a grid in the plane z = `depth` that cover at least `size` x `size` pixels.
 fn plane(size: i32, depth: f32) -> Vec<Surfel> {
     let at = |k: i32| 1.7 * k as f32 + 0.123 - size as f32 / 2.0;
     let cells = (-2..size * 10 / 17 + 3).flat_map(|y| (-2..size * 10 / 17 + 3).map(move |x| (x, y)));
@@ -98,7 +99,8 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
     let camera = front(64);
     let mut surfels = plane(64, 5.0);
     let near = surfels.len();
-    // Behind the first by far more than epsilon: it sets the range and is never seen.
+    // A second plane far behind, by much more than epsilon: it sets the colour range and stays
+    // hidden.
     surfels.extend(plane(64, 50.0));
     let (seen, hidden) = ([0.25, 0.5, 0.625, 1.0], [4.0, -3.0, 0.0, 1.0]);
     let colors = (0..surfels.len()).map(|k| if k < near { seen } else { hidden }).collect();
@@ -129,9 +131,9 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
 #[test]
 fn sums_past_32_bits_are_exact() {
     let Some(gpu) = common::gpu() else { return };
-    // 5033.7 units are rounded to 5034 each.
+    // Each weight of 5033.7 units is rounded to 5034.
     let (scene, camera) = stack(1001, (5033.7 * UNIT) as f32);
-    // By the kernels that every adapter has.
+    // With the kernels that every adapter supports.
     let without = vec![Optimisation::Pairs];
     let options = RenderOptions { kernel: Kernel::Ellipse { a: 0.0, n: 3.0, smooth: false }, without, ..options() };
     let sums = |sources: &Sources| {
@@ -172,13 +174,14 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             let mut twin = Frame::new(&camera, Maps::ON_DEVICE);
             let surfaces = resolve::surfaces(&sums, &[], (&scene, &camera, &options), 0);
             resolve::reference(&surfaces, &Beside::default(), &options, &mut twin);
-            // Of the largest colour; of one; of the depth; of the weight.
+            // Errors relative to the largest colour, to 1, to the depth, and to the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);
             for (pixel, sum) in sums.iter().enumerate() {
                 let mean = DVec3::from_array(sum.normal).length() / sum.weight.max(1e-9);
                 let alpha = sum.color[3] / sum.weight.max(1e-9);
                 if sum.weight > 0.0 && (mean < 0.05 || alpha < 0.05) {
-                    // What nearly cancels, or is nearly transparent, magnifies rounding without bound.
+                    // A normal that nearly cancels, or a colour that is nearly transparent,
+                    // magnifies rounding without bound.
                     continue;
                 }
                 let apart = |a: &[f32], b: &[f32]| {
@@ -201,8 +204,8 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         worst
     };
     let limits = [40.0 * E, 16.0 * E, 8.0 * E, 4.0 * E];
-    // The cosine of a mirrored light errs by four times what the normal does and its own rounding, its power by the exponent
-    // times that, and two lights shine.
+    // The cosine of a mirrored light errs by four times the normal's error plus its own rounding;
+    // its power multiplies that by the exponent; and there are two lights.
     let of_cosine = 4.0 * limits[1] + 8.0 * E;
     let of_highlights = 2.0 * HIGHLIGHT * f64::from(RenderOptions::default().shininess) * of_cosine;
     let phong = [limits[0] + of_highlights, limits[1], limits[2], limits[3]];
@@ -232,11 +235,11 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
     }
 }
 
-/// The twin's sums, from the device's.
+/// Converts the device's sums into those of the twin.
 fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Vec<PixelSums> {
     let device = stages(scene, camera, options, gpu, &Sources::default()).unwrap();
     let (low, high) = scene.color_range();
-    // Of an opaque scene there is no sum of alpha.
+    // An opaque scene has no sum of alpha.
     let channels = if low[3] == high[3] { 3 } else { 4 };
     let of = |pixel: usize| {
         let sum = |channel: u32| device.sums.value(pixel, channel).unwrap();
@@ -253,7 +256,8 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
         PixelSums {
             weight,
             color: [0, 1, 2, 3].map(color),
-            // The last bit of a nearest depth, kept as what it lacks to +inf, whose own is 0.
+            // The last bit of the nearest depth, stored as its complement to +inf, whose own bit is
+            // 0.
             back: scene.oriented && device.sums.nearest[pixel] % 2 == 1,
             normal: [0, 1, 2].map(normal),
             place: [0.0; 5],
@@ -271,8 +275,9 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
 fn a_spheres_depth_is_the_analytic_one_at_disk_centres() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
-    // Disks that do not overlap: at each centre there is one, tangent to the sphere. The lens is long, since a pixel's
-    // centre may lie 0.7 pixels from the disk's, where the sphere falls away from its tangent plane by half the square.
+    // Disks that do not overlap, so that one disk, tangent to the sphere, covers each centre. The
+    // lens is long: a pixel centre may lie 0.7 pixels from the disk's centre, where the sphere is
+    // half the square of that below its tangent plane.
     let scene = sphere(6000, 0.4);
     for lens in [Lens::Fov(20.0), Lens::OrthographicHeight(0.9)] {
         let camera = sphere_camera_with(512, lens);
@@ -292,7 +297,7 @@ fn a_spheres_depth_is_the_analytic_one_at_disk_centres() {
             }
             let across = DVec3::new((x + 0.5 - camera.cx) / camera.fx, (y + 0.5 - camera.cy) / camera.fy, 0.0);
             let start = camera.eye + camera.rotation.transpose() * if pinhole { DVec3::ZERO } else { across };
-            // |start + z direction| = 1, the nearer solution.
+            // The nearer solution of |start + z direction| = 1.
             let (a, b, c) = (direction.length_squared(), start.dot(direction), start.length_squared() - 1.0);
             let analytic = (-b - (b * b - a * c).sqrt()) / a;
             let depth = f64::from(depths[y as usize * 512 + x as usize]);

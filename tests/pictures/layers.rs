@@ -1,4 +1,5 @@
-//! How many surfaces a pixel has, against how many the ray through its centre crosses.
+//! The number of layers per pixel, against the number of surfaces that the ray through its centre
+//! crosses.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -22,7 +23,8 @@ use rayon::prelude::*;
 
 const SIDE: u32 = 160;
 
-/// A scene, the surfaces that its surfels stand for, each with a scale, and its size.
+/// A scene, the surfaces that its surfels approximate (each with a scale about the origin), and the
+/// scene's centre and radius.
 struct Seen {
     name: &'static str,
     scene: Scene,
@@ -31,7 +33,7 @@ struct Seen {
     radius: f64,
 }
 
-/// `scene` and itself, scaled by `scale`.
+/// Returns `scene` plus a copy of its surfels scaled by `scale` about the origin.
 fn with_scaled(scene: &Scene, scale: f32) -> Scene {
     let by = |v: [f32; 3]| v.map(|x| x * scale);
     let scaled =
@@ -63,7 +65,7 @@ fn all() -> Vec<Seen> {
     ]
 }
 
-/// How often the ray through the centre of a pixel crosses the surfaces.
+/// Counts the surfaces that the ray through the centre of a pixel crosses.
 fn crossings(seen: &Seen, camera: &Camera, (x, y): (u32, u32)) -> u32 {
     let direction = camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5);
     let of = |(surface, scale): &(Surface, f64)| {
@@ -77,7 +79,7 @@ fn crossings(seen: &Seen, camera: &Camera, (x, y): (u32, u32)) -> u32 {
     seen.surfaces.iter().map(of).sum()
 }
 
-/// Pixels that lie two pixels or more from one that a ray crosses another number of surfaces at.
+/// Pixels whose neighbours, up to two pixels away, have the same number of crossings.
 fn inner(crossed: &[u32]) -> Vec<usize> {
     let side = SIDE as i64;
     let same = |pixel: i64| {
@@ -89,7 +91,7 @@ fn inner(crossed: &[u32]) -> Vec<usize> {
     (0..side * side).filter(|pixel| same(*pixel)).map(|pixel| pixel as usize).collect()
 }
 
-/// The numbers of layers of the f64 reference.
+/// The number of layers per pixel by the f64 reference.
 fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<u32> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
@@ -106,7 +108,7 @@ fn layers_are_the_surfaces_that_rays_cross() {
     let Some(backend) = common::gpu().map(Backend::gpu) else { return };
     let options = RenderOptions {
         composite: Composite::Layers(ALL_LAYERS),
-        // Through twenty surfaces something shows still.
+        // Translucent enough for the farthest of twenty surfaces to count.
         opacity: 0.2,
         shading: Shading::Unlit,
         maps: Maps::of(&[Map::Layers]),
@@ -141,6 +143,7 @@ fn layers_are_the_surfaces_that_rays_cross() {
             }
         }
     }
-    // Disks of vertices alone, which are coarse and whose normals are guessed, stand out of the surface.
+    // Only the cloud tells the two partings apart: its coarse disks, whose normals are estimated
+    // from bare vertices, stick out of the surface.
     assert!(wrong_by_runs < 0.8 * wrong_by_window, "a window would do as well: {wrong_by_runs} {wrong_by_window}");
 }

@@ -1,5 +1,6 @@
-//! Pictures: the pixels of every mode and option.
-//! One program: shared code and kernels are compiled once.
+//! Tests the pixels of every mode and option against the f64 reference, formulas and cast rays.
+//!
+//! One test program, so that shared test code and kernels compile once.
 
 mod adapters;
 mod cameras;

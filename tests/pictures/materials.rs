@@ -1,5 +1,5 @@
-//! Meshes whose colours are not on vertices: surfels look as triangles do, whichever way a file
-//! says what they look like.
+//! Meshes whose colours are not on vertices: surfels look like triangles, however a file gives the
+//! colours.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,7 +17,7 @@ use std::path::Path;
 
 const SIZE: u32 = 64;
 
-/// A square of four quarters, rows from the top: red, green, blue and yellow.
+/// A square image of four quarters: red and green above, blue and yellow below.
 fn quarters() -> Texture {
     let color = |k: u32| match (k % 32 < 16, k / 32 < 16) {
         (true, true) => [255, 0, 0, 255],
@@ -28,7 +28,7 @@ fn quarters() -> Texture {
     Texture::new(32, 32, (0..32 * 32).map(color).collect()).unwrap()
 }
 
-/// A square in the plane of x and y with the whole of an image, and what comes after.
+/// An OBJ of a square in the xy plane that shows a whole image, followed by `more`.
 fn square(library: &str, more: &str) -> String {
     format!(
         "mtllib {library}\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n\
@@ -51,8 +51,8 @@ fn seen(scene: &Scene, eye: DVec3) -> Frame {
     render(scene, &camera, &options, &Backend::Reference, &()).unwrap().0
 }
 
-/// The share of pixels that differ by more than a code or so in the picture of the surfels and in
-/// that of the triangles of a file.
+/// The share of pixels that differ by more than 0.02 between a file drawn as surfels and as
+/// triangles.
 fn apart(path: &Path, eye: DVec3) -> f64 {
     let [surfels, triangles] = [painted(path), as_triangles(path)].map(|scene| seen(&scene, eye));
     let covered = triangles.color.iter().filter(|color| color[3] > 0.5).count();
@@ -61,9 +61,9 @@ fn apart(path: &Path, eye: DVec3) -> f64 {
     surfels.color.iter().zip(&triangles.color).filter(differs).count() as f64 / f64::from(SIZE * SIZE)
 }
 
-/// The codes of the pixel at a place of the square, seen from the front.
+/// The sRGB codes at a point of the square, seen from the front.
 fn at(frame: &Frame, x: f64, y: f64) -> [u8; 4] {
-    // The square is 2 wide, seen from 4 away.
+    // The square is 2 wide and 4 away.
     let scale = 0.5 * f64::from(SIZE) / (20f64.to_radians().tan() * 4.0);
     let pixel = |c: f64| (0.5 * f64::from(SIZE) + scale * c) as usize;
     epsplat::low_level::scene::color::srgb8(frame.color[pixel(-y) * SIZE as usize + pixel(x)])
@@ -95,7 +95,7 @@ fn images_of_materials_show_as_their_options_say() {
     ] {
         assert_eq!(corners(&show(library)), [RED, GREEN, BLUE, YELLOW], "{library}");
     }
-    // Two by two tiles: each quarter of the square holds all four.
+    // Two by two tiles: each quarter of the square shows all four colours.
     let tiled = show("newmtl m\nmap_Kd -s 2 2 1 Quarters.png\n");
     for (x, y) in [(-0.5, 0.5), (0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)] {
         let parts = [(-0.25, 0.25), (0.25, 0.25), (-0.25, -0.25), (0.25, -0.25)];
@@ -103,11 +103,11 @@ fn images_of_materials_show_as_their_options_say() {
     }
     let moved = show("newmtl m\nmap_Kd -o 0.5 0 0 Quarters.png\n");
     assert_eq!(corners(&moved), [GREEN, RED, YELLOW, BLUE]);
-    // One copy, whose edges go on.
+    // A single copy, whose edge colours continue.
     let once = show("newmtl m\nmap_Kd -s 2 2 -o -0.5 -0.5 -clamp on Quarters.png\n");
     assert_eq!(corners(&once), [RED, GREEN, BLUE, YELLOW]);
     assert_eq!([(-0.9, 0.1), (0.9, -0.1), (0.1, 0.9)].map(|(x, y)| at(&once, x, y)), [RED, YELLOW, GREEN]);
-    // An image is multiplied with the material's colour.
+    // The material's colour multiplies its image.
     let dyed = show("newmtl m\nKd 1 0 0\nmap_Kd Quarters.png\n");
     assert_eq!(corners(&dyed), [RED, [0, 0, 0, 255], [0, 0, 0, 255], RED]);
 }
@@ -127,8 +127,8 @@ fn a_black_colour_with_an_image_is_black_and_told() {
     }
 }
 
-/// With seams, several images, colours without images, triangles without a material, and an image
-/// as BMP and TGA.
+/// Seams, several images, colours without images, triangles without a material, and images as BMP
+/// and TGA.
 #[test]
 fn surfels_look_as_triangles_do() {
     let folder = Folder::new();
@@ -159,11 +159,11 @@ fn surfels_look_as_triangles_do() {
         format!("mtllib m.mtl\n{corners}{places}usemtl a\n{}", (0..6).map(|k| face(k, true)).collect::<String>());
     let colours_alone =
         format!("mtllib m.mtl\n{corners}{}usemtl red\n{}", face(1, false), face(5, false) + &face(3, false));
-    // A flat square of four triangles, of which each corner of the middle has another place: a seam
+    // A flat square of four triangles; each has its own texture coordinates at the middle: a seam
     // on every side.
     let seams = "mtllib m.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .2 .9\nvt .5 .5\n\
                  usemtl a\nf 1/1 2/2 5/3\nf 2/2 3/3 5/4\nf 3/4 4/1 5/5\nf 4/6 1/2 5/6\n";
-    // Smooth: normals of its own at each corner.
+    // The same with a normal at each corner, for smooth shading.
     let smooth =
         seams.replace("usemtl a\n", "vn -.3 -.3 1\nvn .3 -.3 1\nvn .3 .3 1\nvn -.3 .3 1\nvn 0 0 1\nusemtl a\n");
     let smooth = (1..=5).fold(smooth, |text, vertex| {
@@ -184,7 +184,7 @@ fn surfels_look_as_triangles_do() {
             let off = apart(&path, eye);
             assert!(off < most, "{name}: {off}");
         }
-        // The same on the device, as its twin has it.
+        // Device and twin agree.
         let scene = painted(&path);
         if let Some(gpu) = common::gpu() {
             let lens = epsplat::low_level::scene::Lens::Fov(40.0);
@@ -199,8 +199,8 @@ fn surfels_look_as_triangles_do() {
     }
 }
 
-/// Where no image can be painted, surfels have its mean, which is told; a given image takes the
-/// place of all.
+/// Where an image cannot be painted, surfels have its mean colour, and a note says so. A given
+/// texture replaces all images.
 #[test]
 fn means_stand_for_images_and_given_ones_take_their_place() {
     let folder = Folder::new();
@@ -287,14 +287,14 @@ fn face_colours_of_a_ply_file_show() {
         shown.dedup();
         assert_eq!(shown.len(), 6, "{name}");
     }
-    // Colours of vertices that are several hide those of faces, and it is said.
+    // Vertex colours hide face colours if they vary, and a note says so.
     let mut text = file("uchar", 255.0, one, " 9 9 9");
     text = text.replacen(" 9 9 9", " 99 9 9", 1);
     let points = io::read(&folder.file("cube.ply", text), &()).unwrap();
     assert!(points.notes[0].contains("faces have colours too") && points.colors.is_some());
 }
 
-/// Images that a PLY file names paint its surfels too, by places of faces and of vertices.
+/// Images that a PLY file names paint its surfels, by texture coordinates of faces or of vertices.
 #[test]
 fn images_of_a_ply_file_show() {
     let folder = Folder::new();
@@ -316,7 +316,7 @@ fn images_of_a_ply_file_show() {
     }
 }
 
-/// Commands that take the vertices of a mesh alone give them the colours of their triangles.
+/// Commands that use only the vertices of a mesh give them the colours of their triangles.
 #[test]
 fn vertices_take_the_colours_of_their_triangles() {
     let folder = Folder::new();

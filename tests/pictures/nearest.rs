@@ -1,4 +1,5 @@
-//! The nearest fragment alone, as with a depth test: one pass and two make the same bits, and those that the twin says.
+//! The nearest fragment alone, as with a depth test: one pass and two give the same bits, which the
+//! f64 twin confirms.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,7 +16,7 @@ use glam::Vec3;
 
 use crate::common;
 
-/// A sphere of surfels of a colour each, and of alphas from a third on.
+/// A sphere of surfels, each with its own colour and an alpha of at least a third.
 fn colored(count: u64) -> Scene {
     let mut scene = sphere(count as usize, 1.0);
     let code = |k: u64| {
@@ -36,12 +37,12 @@ fn options(facing: Option<PointShape>) -> RenderOptions {
     }
 }
 
-/// Disks in their planes, and each shape that faces the camera.
+/// Disks in their own planes (`None`), and every shape that faces the camera.
 fn kinds() -> impl Iterator<Item = Option<PointShape>> {
     std::iter::once(None).chain(POINT_SHAPES.map(|(_, shape)| Some(shape)))
 }
 
-/// Decided pixels, and those of them whose colour or depth the reference does not say.
+/// The number of decided pixels, and of those whose colour or depth differs from the reference.
 fn wrong(frame: &Frame, reference: &Frame) -> (usize, usize) {
     let decision = reference.map(Map::Decision).unwrap();
     let [ours, theirs] = [frame, reference].map(|frame| frame.map(Map::Depth).unwrap());
@@ -73,7 +74,7 @@ fn one_pass_two_passes_and_the_twin_show_the_same_fragments() {
             assert!(report.needs.contains(&"nearest") && report.passes.contains_key("accumulate_ms") != once);
             let (decided, wrong) = wrong(&frame, &reference(&scene, projection, &options));
             assert!(wrong == 0 && decided > 20_000, "{wrong} of {decided}, {kind:?}");
-            // Without 64-bit atomics, whether left out or not there.
+            // Two passes, as without 64-bit atomics: switched off, or absent from the adapter.
             let second = RenderOptions { without: vec![Optimisation::Pairs], ..options.clone() };
             for (options, backend) in [(&second, &backend), (&options, &core)] {
                 let (frame_of_two, report) = render(&scene, &camera, options, backend, &()).unwrap();
@@ -89,7 +90,7 @@ fn neither_order_nor_what_is_left_out_shows() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let mut scene = colored(60_000);
-    // Many at one place and depth: the greatest colour shows.
+    // Many surfels at one place and depth: the greatest colour word shows.
     scene.surfels.iter_mut().take(6000).for_each(|surfel| *surfel = Surfel::disk(Vec3::Z * 1.5, Vec3::Z, 0.2));
     let mut reversed = scene.clone();
     reversed.surfels.reverse();

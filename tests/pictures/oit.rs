@@ -1,4 +1,6 @@
-//! Order-independent transparency: the formulas by hand, the twins, and that the order of fragments shows in sums of floats alone.
+//! Order-independent transparency against formulas and the f64 twins.
+//!
+//! Also tests that the order of fragments changes only sums of floats.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -27,10 +29,10 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// Planes over the whole image at these depths, of these straight colours and alphas.
+/// Planes over the whole image at the given depths, with the given straight colours and alphas.
 fn planes(of: &[(f32, [f32; 4])]) -> (Scene, Camera) {
     let (mut scene, camera) = stack(of.len(), 0.0);
-    // Those that stretch the colours' range are out of sight.
+    // `stack` adds surfels that stretch the range of colours: they move out of sight.
     scene.surfels.iter_mut().skip(of.len()).for_each(|surfel| surfel.center[0] = 1000.0);
     let Colors::Linear(colors) = &mut scene.colors else { unreachable!() };
     for ((surfel, color), (depth, of)) in scene.surfels.iter_mut().zip(colors).zip(of) {
@@ -39,7 +41,8 @@ fn planes(of: &[(f32, [f32; 4])]) -> (Scene, Camera) {
     (scene, camera)
 }
 
-/// Two planes by hand, and many whose transmittances multiply whatever weighs their colours.
+/// Two planes match the closed form, and the transmittances of many multiply, however their colours
+/// are weighted.
 #[test]
 fn planes_are_what_the_formulas_say() {
     let Some(backend) = gpu() else { return };
@@ -63,7 +66,8 @@ fn planes_are_what_the_formulas_say() {
     };
     for (composite, weights, margin) in [
         (Composite::Weighted, weights, 1e-6),
-        // Of few surfaces moments know what lies between them, and of one's own alpha a quarter is before it.
+        // With few surfaces the moments reconstruct the transmittance between them, and a quarter
+        // of a surface's own absorbance counts as in front of it.
         (Composite::Moments, [0.4f64.powf(0.25), 0.4 * 0.5f64.powf(0.25)], 5e-3),
     ] {
         let shown = frame(&scene, &camera, &plain(composite), &backend);
@@ -87,7 +91,7 @@ fn planes_are_what_the_formulas_say() {
     }
 }
 
-/// Device and twin alike at pixels that no rounding decides; kernels that are wrong do not.
+/// Device and twin agree at pixels that no rounding decides; broken kernels do not.
 #[test]
 fn kernels_and_twins_sum_alike() {
     let Some(backend) = gpu() else { return };
@@ -138,7 +142,8 @@ fn kernels_and_twins_sum_alike() {
     assert!(noticed.iter().all(|noticed| *noticed > 0), "{noticed:?}");
 }
 
-/// By integers the order of surfels, bands and features do not show; by floats, as others sum, the order does.
+/// Integer sums do not depend on the order of surfels, bands or device features. Float sums, as
+/// other renderers use, do depend on the order.
 #[test]
 fn the_order_shows_in_sums_of_floats_alone() {
     let Some(backend) = gpu() else { return };
@@ -169,7 +174,7 @@ fn the_order_shows_in_sums_of_floats_alone() {
     assert_eq!(shows, 3 * 2 * 2 * 2);
 }
 
-/// However much fragments hold back, and wherever strays are, what is opaque is opaque and its front shows.
+/// An opaque stack is opaque and shows its front, however dense it is and wherever strays lie.
 #[test]
 fn what_is_dense_and_what_strays_leave_no_holes() {
     let Some(backend) = gpu() else { return };
@@ -181,7 +186,8 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
             maps: Maps::of(&[Map::Transmittance]),
             ..options(composite)
         };
-        // Two stacks of forty opaque planes, red in front of blue, at as many places, as of few places none strays.
+        // Two stacks of forty opaque planes, red in front of blue. Each plane has its own depth,
+        // because few distinct places have no strays.
         let of = |k: usize| {
             let (depth, color) = if k < 40 { (8.0, [1.0, 0.0, 0.0, 1.0]) } else { (30.0, [0.0, 0.0, 1.0, 1.0]) };
             (depth + 0.01 * (k % 40) as f32, color)
@@ -195,7 +201,7 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
             for backend in [&backend, &Backend::Reference] {
                 let shown = frame(&scene, &camera, &own, backend);
                 assert!(shown.map(Map::Transmittance).unwrap().iter().all(|left| *left < 1e-6), "{composite:?}");
-                // Of a weight by depth alone red is what nearer planes weigh.
+                // A weight by depth alone gives red only the share that nearer planes weigh.
                 let least = if composite == Composite::Moments { 0.99 } else { 0.6 };
                 let red = |color: &[f32; 4]| color[3] > 1.0 - 1e-6 && color[0] > least;
                 assert!(shown.color.iter().all(red), "{composite:?} {stray}: {:?}", shown.color[0]);
@@ -204,7 +210,8 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
     }
 }
 
-/// What each errs by against what is sorted: moments less than a weight by depth, and that less than none.
+/// Errors against sorted compositing: moments have less than half the error of weights by depth,
+/// and those less than two thirds of the error of equal weights.
 #[test]
 fn moments_are_nearer_to_what_is_sorted() {
     let Some(backend) = gpu() else { return };

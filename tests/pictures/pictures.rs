@@ -1,4 +1,4 @@
-//! What a default picture shows, and what a user is told where it shows little.
+//! Default views, and the notes for pictures that show little.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -12,7 +12,7 @@ fn said(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// Renders the arguments and says what was said.
+/// Renders with the reference at 64x48 pixels and returns the standard error.
 fn render(folder: &Folder, arguments: &[&str]) -> String {
     let out = folder.path("x.png");
     said(&succeeds(
@@ -33,7 +33,7 @@ fn an_empty_picture_says_why() {
     let small = at("0,0,100000", "0.01,0.01,0");
     assert!(small.contains("between the centres of its pixels"), "{small}");
     assert!(!at("0,0,5", "0,0,0").contains("nothing shows"));
-    // One line for all of many pictures.
+    // Many pictures get one line for all empty ones.
     let away = "[[1,0,0,0],[0,1,0,0],[0,0,1,-5],[0,0,0,1]]";
     let seen = "[[1,0,0,0],[0,1,0,0],[0,0,1,5],[0,0,0,1]]";
     let frame = |name: &str, pose: &str| format!(r#"{{"file_path": "{name}", "transform_matrix": {pose}}}"#);
@@ -47,7 +47,7 @@ fn an_empty_picture_says_why() {
     assert!(many.contains("b.png, the first of 2 empty pictures"), "{many}");
 }
 
-/// Pixels at the border that are not background.
+/// The number of border pixels that are not background.
 fn cut(path: &std::path::Path) -> usize {
     let image = image::open(path).unwrap().to_rgba8();
     let (w, h) = image.dimensions();
@@ -65,7 +65,7 @@ fn the_border_cuts_no_disk_of_a_default_picture() {
         render(&folder, &[input]);
         assert_eq!(cut(&folder.path("x.png")), 0, "{input}");
     }
-    // The control: a view that does cut.
+    // Control: a view that cuts disks.
     render(&folder, &[text(&big), "--eye", "0,0,1.6", "--target", "0,0,0"]);
     assert!(cut(&folder.path("x.png")) > 0);
 }

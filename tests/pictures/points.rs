@@ -1,4 +1,4 @@
-//! Surfels from points: how far normals are off, on which side they are, how large surfels are, and clouds that are hard.
+//! Surfels from points: errors and sides of normals, sizes of surfels, and degenerate clouds.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -15,7 +15,7 @@ use epsplat::low_level::surfels::{
 };
 use glam::DVec3;
 
-/// Numbers in [0, 1) that look random.
+/// Pseudo-random numbers in [0, 1).
 fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
@@ -36,11 +36,11 @@ fn surfels(points: Points, options: &FromPoints) -> Surfels {
     from_points(vec![points], options, &()).unwrap()
 }
 
-/// The angles between true normals and those of `surfels`, radians.
+/// The angles between true normals and those of `surfels`, in radians.
 fn angles(surfels: &Surfels, truth: &[[f32; 3]]) -> Vec<f64> {
     let vector = |n: &[f32; 3]| DVec3::from_array(n.map(f64::from)).normalize();
     let normals = surfels.points.normals.as_ref().unwrap();
-    // By both products, as the cosine alone is blind to small angles.
+    // From both products, because the cosine alone loses small angles.
     let angle = |(a, b): (DVec3, DVec3)| a.cross(b).length().atan2(a.dot(b));
     truth.iter().map(vector).zip(normals.iter().map(vector)).map(angle).collect()
 }
@@ -61,15 +61,18 @@ fn up() -> FromPoints {
     FromPoints { orientation: Orientation::Up, ..FromPoints::default() }
 }
 
-/// A surface of curvature at most k is within k h²/2 of the tangent plane where 16 neighbours reach as far as h. A plane's
-/// slope is cov(x, z)/var(x), so at most sd(z)/sd(x), of which the first is at most half the range, k h²/4, and the second
-/// half of h for points that fill a disk. The fitted normal is thus off by at most k h/2.
+/// A fitted normal is off by at most k h/2, for a surface of curvature at most k.
+///
+/// The surface is within k h²/2 of the tangent plane where 16 neighbours reach as far as h. A
+/// fitted plane's slope is cov(x, z)/var(x), so at most sd(z)/sd(x). Here sd(z) is at most half the
+/// range, k h²/4, and sd(x) is h/2 for points that fill a disk.
 #[test]
 fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
     for (shape, curvature) in [(Shape::Sphere, 1.0), (Shape::Torus, 2.5)] {
         let count = 20_000;
         let (positions, truth) = samples(shape, count);
-        // 17 points stand for the disk of radius h; where the lattice is uneven it reaches half as far again.
+        // 17 points fill the disk of radius h; where the lattice is uneven they reach half as far
+        // again.
         let reach = 1.5 * (17.0 * shape.area() / count as f64 / std::f64::consts::PI).sqrt();
         let bound = curvature * reach / 2.0;
         let found = angles(&surfels(cloud(positions.clone()), &FromPoints::default()), &truth);
@@ -82,7 +85,7 @@ fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
         );
         assert_eq!(flipped(&found), 0);
         assert!(worst < bound, "{shape:?}: {worst} {bound}");
-        // A neighbourhood that noise has roughened is past the bound, and normals without a side are on either.
+        // Controls: noise breaks the bound, and normals oriented by `Up` face either side.
         let mut next = noise(1);
         let rough = positions.iter().map(|p| p.map(|c| c + 0.5 * reach * (next() - 0.5))).collect();
         let control = angles(&surfels(cloud(rough), &FromPoints::default()), &truth);
@@ -92,16 +95,19 @@ fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
     }
 }
 
-/// Noise of standard deviation s in z gives the slopes of a plane through n points the deviation s / sqrt(n var(x)) along
-/// each axis. 17 points at one a unit area fill a disk of radius h² = 17/pi, in which var(x) = h²/4. The angle is the
-/// length of two such slopes, Rayleigh distributed with a mean of sqrt(pi/2) of that: 0.262 s.
+/// Noise of standard deviation s in z tilts fitted normals by 0.262 s on average.
+///
+/// The slopes of a plane through n points have the deviation s / sqrt(n var(x)) along each axis. 17
+/// points at one per unit area fill a disk of radius h² = 17/pi, in which var(x) = h²/4. The angle
+/// is the length of two such slopes, Rayleigh distributed with a mean of sqrt(pi/2) times that
+/// deviation.
 #[test]
 fn noise_tilts_normals_as_least_squares_says() {
     let mut next = noise(2);
     let side = 250;
     for deviation in [0.05, 0.1, 0.2] {
-        // One in each unit square, anywhere: on a grid many neighbours are equally far, and the choice falls on those that
-        // noise has moved least.
+        // One point anywhere in each unit square: on a grid many neighbours are equally far, and
+        // noise would decide which of them are chosen.
         let positions = (0..side * side).map(|i| {
             let normal = (0..12).map(|_| next()).sum::<f64>() - 6.0;
             [f64::from(i % side) + next(), f64::from(i / side) + next(), deviation * normal]
@@ -109,7 +115,7 @@ fn noise_tilts_normals_as_least_squares_says() {
         let surfels = surfels(cloud(positions.collect()), &FromPoints::default());
         let mut found = angles(&surfels, &vec![[0.0, 0.0, 1.0]; (side * side) as usize]);
         assert_eq!(flipped(&found), 0, "a sheet that lies faces up");
-        // Only points that are surrounded: at the edge of the plane the spread is smaller.
+        // Only surrounded points: at the edge of the plane neighbours spread less.
         let inside = |i: usize| (3..side as usize - 3).contains(&(i % 250)) && (3..247).contains(&(i / 250));
         let mut index = 0..;
         found.retain(|_| index.next().is_some_and(inside));
@@ -134,8 +140,9 @@ fn coarse_models_with_thin_parts_face_outward() {
         "bunny: mean {mean:.2} degrees, 99th percentile {percentile_99:.1}, worst {:.1}",
         sorted[1838].to_degrees()
     );
-    // The ears are thinner at their tips than points are apart: planes through all neighbours there stand across, 3 of them past
-    // 90 degrees, with a mean of 7.1 and a 99th percentile of 47 degrees.
+    // The ears' tips are thinner than points are apart, so planes through all neighbours there
+    // stand across the ears: 3 normals past 90 degrees, with a mean of 7.1 and a 99th percentile of
+    // 47 degrees.
     assert_eq!(flipped(&found), 0);
     assert!(mean < 6.5 && percentile_99 < 35.0, "{mean} {percentile_99}");
     assert!(flipped(&angles(&surfels(points, &up()), &truth)) > 500);
@@ -174,7 +181,8 @@ fn normals_turn_toward_the_nearest_scanner() {
         ]),
         0
     );
-    // From one side only, the far one faces the scanner too, and so inward: its horizon is at x = 1/20.
+    // A scanner on one side only: the far side faces it too, and so inward. The horizon is at x =
+    // 1/20.
     let one = flips(&[[20.0, 0.0, 0.0]]);
     assert!((one as f64 - 5000.0 * (1.0 + 0.05) / 2.0).abs() < 50.0, "{one}");
 }
@@ -184,7 +192,7 @@ fn given_normals_stay_and_say_which_side_is_which() {
     let (positions, truth) = samples(Shape::Sphere, 4000);
     let inward: Vec<[f32; 3]> = truth.iter().map(|n| n.map(|c| -c)).collect();
     let mut points = cloud(positions);
-    // A few normals, all inward, one of an odd length and one of no direction.
+    // Twenty given normals, all inward, one of length 8; the others are zero and will be estimated.
     let mut few = vec![[0.0; 3]; 4000];
     few[..20].copy_from_slice(&inward[..20]);
     few[7] = few[7].map(|c| c * 8.0);
@@ -195,7 +203,7 @@ fn given_normals_stay_and_say_which_side_is_which() {
     assert_eq!(flipped(&angles(&made, &inward)), 0);
     let again = surfels(points, &FromPoints { estimate_normals: true, ..FromPoints::default() });
     assert_eq!((again.preparation.estimated_normals, flipped(&angles(&again, &truth))), (4000, 0));
-    // Two normals at one position, as at an edge of a mesh, stay two.
+    // Two normals at one position, as at an edge of a mesh, both stay.
     let mut edge = cloud(samples(Shape::Plane, 400).0);
     edge.positions.push(edge.positions[0]);
     let mut normals = vec![[0.0, 0.0, 1.0]; 401];
@@ -228,7 +236,8 @@ fn normals_whose_sides_are_random_have_none() {
         assert!(!oriented && (1800..2200).contains(&opposed), "{opposed}");
         assert!(of(samples(shape, 4000), 0.05).0);
     }
-    // Two sheets nearer to each other than their points are apart: opposed, but not beside each other.
+    // Two sheets closer to each other than their points are apart: opposed, but neighbours in a
+    // sheet agree.
     let (mut positions, mut normals) = samples(Shape::Plane, 2000);
     positions.extend(positions.clone().iter().map(|[x, y, z]| [*x, *y, z - 0.01]));
     normals.extend(normals.clone().iter().map(|n| n.map(|c| -c)));
@@ -244,7 +253,7 @@ const SIZES: [Size; 6] = [
     Size::BspGlobal(Triangle::Circumsphere),
 ];
 
-/// Checks that all is finite, and gives the surfels.
+/// Makes surfels and checks that their normals, radii and half-axes are finite and consistent.
 fn sound(positions: Vec<[f64; 3]>, size: Size) -> Surfels {
     let made = surfels(cloud(positions), &FromPoints { size, ..FromPoints::default() });
     let Points { positions, normals, radii, axes, .. } = &made.points;
@@ -283,7 +292,7 @@ fn degenerate_clouds_have_surfels() {
         many.extend([[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0, 0.0, 1e300]]);
         let made = sound(many, size);
         assert_eq!((made.preparation.dropped_non_finite, made.preparation.surfels), (3, 3500));
-        // The circle around a blunt triangle may be as large as the sphere.
+        // The circumcircle of an obtuse triangle may be as large as the sphere.
         let largest = if size == Size::Bsp(Triangle::Circumsphere) { 2.0 } else { 0.5 };
         assert!(made.points.radii.unwrap().iter().all(|r| *r < largest), "{size:?}");
         for scale in [1e-150, 1e-17, 1e17] {
@@ -331,7 +340,7 @@ fn outliers_are_dropped_and_counted_with_their_attributes() {
 fn a_scene_of_points_has_the_same_limits() {
     let (mut positions, _) = samples(Shape::Plane, 10_000);
     let count = positions.len();
-    // A sparse strip beside the dense square, nine points of which would see one another across it.
+    // A sparse strip beside the dense square, and one point far above it.
     positions.extend((0..40).map(|k| [1.15 + 0.1 * f64::from(k % 2), -0.9 + 0.045 * f64::from(k), 0.0]));
     positions.push([0.0, 0.0, 0.6]);
     let scene = |points: Points, limits: Limits| build_within(vec![points], vec![], &limits, &()).unwrap();
@@ -340,23 +349,24 @@ fn a_scene_of_points_has_the_same_limits() {
     let limited = scene(cloud(positions.clone()), Limits::default());
     let changed = radii(&free).iter().zip(radii(&limited)).filter(|(free, limited)| *free > limited).count() as u64;
     assert!(changed > 0 && changed < 100, "{changed}");
-    // That of the median of all holds in any case, and may hold for some of them too.
+    // The limit by the median of all points always applies, and may also limit some of these
+    // points.
     let counted = changed.max(free.1.limited_by_neighbours)..=changed + free.1.limited_by_neighbours;
     assert!(counted.contains(&limited.1.limited_by_neighbours), "{counted:?}");
     assert!(limited.1.notes().iter().any(|note| note.contains("neighbours allow")), "{:?}", limited.1.notes());
     assert!(radii(&limited).iter().zip(radii(&free)).all(|(limited, free)| *limited <= free));
-    // A point that is far off has no larger disk than those it sees.
+    // A distant point has no disk much larger than a typical one.
     let typical = radii(&limited)[count / 2];
     assert!(radii(&limited)[count + 40] <= 3.1 * typical, "{} {typical}", radii(&limited)[count + 40]);
-    // Given radii are no matter of it, however large; those of the others are limited as before.
+    // Given radii are not limited, however large; missing ones are.
     let mut given = vec![0.0; positions.len()];
     given[count + 40] = 7.5;
     let made = scene(Points { radii: Some(given), ..cloud(positions.clone()) }, Limits::default());
     assert_eq!(radii(&made)[count + 40], 7.5);
-    // The same for any order.
+    // The order of points does not matter.
     let reversed = scene(cloud(positions.iter().rev().copied().collect()), Limits::default());
     assert_eq!(radii(&reversed).into_iter().rev().collect::<Vec<_>>(), radii(&limited));
-    // Outliers are those of `surfels`, and the others keep their numbers.
+    // The same outliers as for `surfels`, and the other surfels keep the numbers of their points.
     let limits = Limits { outliers: Some(5.0), ..Limits::default() };
     positions.insert(7, [0.0, 0.3, -0.9]);
     let (dropped, preparation) = scene(cloud(positions.clone()), limits);
@@ -374,7 +384,8 @@ fn no_disk_flies_past_its_neighbours() {
         let (mut positions, _) = samples(Shape::Plane, 10_000);
         let usual = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, f64::INFINITY) });
         let typical = usual.points.radii.unwrap()[5000];
-        // Farther than any neighbour, nearer than what the limit by the median of all would catch.
+        // Farther than any neighbour, but nearer than the limit by the median of all points
+        // catches.
         positions.push([0.0, 0.0, 0.12]);
         let last = |largest_ratio: f64| {
             let made = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, largest_ratio) });
@@ -384,7 +395,8 @@ fn no_disk_flies_past_its_neighbours() {
         if let Size::Bsp(_) = size {
             assert!(free > 2.5 * typical && some > 0 && none == 0, "{size:?} {free} {typical} {some} {none}");
         }
-        // A mean distance has a limit of its own, and an ellipse in the plane does not see how far above it the point is.
+        // A mean distance has its own limit, and an ellipse in the plane ignores the point's height
+        // above it.
         assert!(limited <= free);
         assert!(limited < 2.5 * typical && limited > 0.2 * typical, "{size:?} {limited} {typical}");
     }
@@ -392,24 +404,26 @@ fn no_disk_flies_past_its_neighbours() {
 
 #[test]
 fn ellipses_follow_scan_lines() {
-    // Points 1 apart on lines 2.5 apart: their 8 nearest neighbours are on three lines.
+    // Points 1 apart on lines 2.5 apart: a point's 8 nearest neighbours are on three lines.
     let positions: Vec<_> = (0..10_000).map(|i| [f64::from(i % 100), 2.5 * f64::from(i / 100), 0.0]).collect();
     let made = surfels(cloud(positions.clone()), &FromPoints { size: Size::Ellipse, ..FromPoints::default() });
     let middle = 50 * 100 + 50;
     let [s, t] = made.points.axes.as_ref().unwrap()[middle].map(|axis| DVec3::from_array(axis.map(f64::from)));
-    // 4 on the line, at 1 and 2; 2 on each line beside, at (0, 2.5) and, of the ties at (1, 2.5), one each.
+    // 4 neighbours on the line, at 1 and 2; 2 on each line beside it, at (0, 2.5) and at one of the
+    // ties (±1, 2.5).
     assert!((s.normalize().dot(DVec3::Y)).abs() > 0.9 && s.length() / t.length() > 1.2, "{s} {t}");
     let reach = |o: DVec3| (o.dot(s) / s.length_squared()).hypot(o.dot(t) / t.length_squared());
     for offset in [DVec3::X * 2.0, DVec3::Y * 2.5, DVec3::X, DVec3::NEG_Y * 2.5] {
         assert!(reach(offset) <= 1.0 + 1e-6, "{offset}");
     }
-    // A disk that reaches the next line is larger in area.
+    // A disk that reaches the next line has a larger area.
     assert!(s.length() * t.length() < 2.5 * 2.5 * 1.2, "{s} {t}");
 }
 
 #[test]
 fn clusters_of_three_give_the_sizes_of_their_triangles() {
-    // Triangles with edges 3, 4, 5, far from each other: every cluster is one, its circumcircle on the longest edge.
+    // Triangles with edges 3, 4, 5, far apart: each is a cluster, and its longest edge is a
+    // diameter of its circumcircle.
     let triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let positions: Vec<_> = (0..300).map(|i| triangle[i % 3].map(|c| c + 100.0 * (i / 3) as f64)).collect();
     let of = |size: fn(Triangle) -> Size| [(size(Triangle::MeanEdge), 4.0), (size(Triangle::Circumsphere), 5.0)];
@@ -471,7 +485,7 @@ fn georeferenced_coordinates_stay_to_the_last_digit() {
     io::ply::write_points(&path, &made.points, &()).unwrap();
     let read = io::read(&path, &()).unwrap();
     assert_eq!(read, made.points);
-    // An f32 there is half a unit coarse.
+    // There f32 has steps of half a unit.
     assert!((f64::from(6_123_456.789f32) - 6_123_456.789).abs() > 0.01);
 }
 
@@ -498,7 +512,7 @@ fn surfels_of_given_normals_end_at_sharp_edges() {
         assert!(rims(&scene).mean < 0.2 * rims(&whole).mean, "{:?} {:?}", rims(&scene), rims(&whole));
         let holes = |scene: &Scene| coverage(&tree, scene, 64, 128, &()).unwrap().seen.holes;
         assert!(holes(&scene) <= holes(&whole) + 5, "{} {}", holes(&scene), holes(&whole));
-        // Estimated normals turn over several points, and a smooth cloud has no edge.
+        // Neither estimated normals, which turn over several points, nor a smooth cloud have edges.
         assert!(of(None).clips.is_none());
         let (positions, normals) = samples(Shape::Sphere, 3000);
         let smooth = surfels(Points { normals: Some(normals), ..cloud(positions) }, &options);

@@ -1,5 +1,5 @@
-//! What holds for every scene: invariants of the maps, agreement with the reference, and bits that depend on nothing but
-//! the set of surfels.
+//! Properties of random scenes: invariants of the maps, agreement with the reference, and bits that
+//! depend on the set of surfels alone.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -24,7 +24,8 @@ fn vector(reach: f32) -> impl Strategy<Value = Vec3> {
 }
 
 fn surfel() -> impl Strategy<Value = Surfel> {
-    // From a hundredth of a pixel to the whole image, round to 1:100, some reaching behind the camera.
+    // Sizes from a hundredth of a pixel to the whole image, aspects from 1:1 to 1:100; some reach
+    // behind the camera.
     (vector(1.5), vector(1.0), -3.0f32..0.3, -2.0f32..0.0, 0.0f32..6.3).prop_map(
         |(center, normal, size, shape, turn)| {
             let normal = if normal.length() > 1e-3 { normal } else { Vec3::Z };
@@ -89,7 +90,8 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     })
 }
 
-/// Depth, weight, count and normal exist exactly where a fragment was accepted, and nothing is NaN.
+/// Depth, weight and count exist exactly where a fragment was accepted, a normal nowhere else, and
+/// nothing is NaN.
 fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
     let (depth, weight) = (frame.map(Map::Depth).unwrap(), frame.map(Map::Weight).unwrap());
     let (count, normal) = (frame.map(Map::Count).unwrap(), frame.normals().unwrap());
@@ -107,7 +109,7 @@ fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// The same scene with its surfels turned round and dealt into three hands.
+/// The same scene with its surfels in another order: reversed, then every third, three times.
 fn dealt(scene: &Scene) -> Scene {
     let count = scene.surfels.len();
     let order: Vec<usize> = (0..3).flat_map(|hand| (0..count).rev().filter(move |i| i % 3 == hand)).collect();
@@ -120,8 +122,10 @@ fn dealt(scene: &Scene) -> Scene {
     Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), low, colors, ..scene.clone() }
 }
 
-/// What the light makes of an unlit frame, in f64; and the bound on what f32 makes of it. The ray is normalised from
-/// nine products and sums, the cosine has three more, and each light one.
+/// The Lambert colour of a pixel of an unlit frame in f64, and the error bound of f32.
+///
+/// The ray is normalised with nine products and sums, the cosine has three more, and each light
+/// one.
 fn lit(unlit: &Frame, camera: &Camera, lights: &[Light], pixel: usize) -> ([f64; 3], [f64; 3]) {
     let (x, y) = (pixel % unlit.width as usize, pixel / unlit.width as usize);
     let normal = Vec3::from_array(unlit.normals().unwrap()[pixel]).as_dvec3();
@@ -140,7 +144,8 @@ fn lit(unlit: &Frame, camera: &Camera, lights: &[Light], pixel: usize) -> ([f64;
     (std::array::from_fn(|k| color[k] * irradiance), std::array::from_fn(|k| color[k].abs() * bound))
 }
 
-/// Runs the property on `cases` random scenes. They are the same every time; `EPSPLAT_PROPERTY_SEED` draws others.
+/// Runs the property on `cases` random scenes, the same in every run; `EPSPLAT_PROPERTY_SEED` (a
+/// number) draws others.
 fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
     let config = Config { cases, failure_persistence: None, max_shrink_iters: 0, ..Config::default() };
     let strategy = (scene(), options(), any::<bool>());
@@ -148,7 +153,8 @@ fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
     let mut seed = [0; 32];
     seed[..8].copy_from_slice(&number.to_le_bytes());
     let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
-    // Large disks seen nearly edge-on leave much of a small image undecided, so not all can be few; 30 seeds gave 0.02 to 0.09.
+    // The share of excused pixels. Large disks seen nearly edge-on leave much of a small image
+    // undecided: 30 seeds gave 0.02 to 0.09.
     let excused = Cell::new(0.0);
     let outcome = TestRunner::new_with_rng(config, random).run(&strategy, |(scene, options, orthographic)| {
         let case = HardCase {
@@ -202,7 +208,7 @@ fn maps_are_consistent_and_the_gpu_agrees_with_the_reference() {
     agree(gpu.as_ref(), 48).unwrap();
 }
 
-/// The control: with a kernel that is a little wrong, the property must fail.
+/// Control: a kernel that is slightly wrong must break the property.
 #[test]
 fn a_wrong_kernel_is_noticed() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,4 +1,5 @@
-//! The rasteriser's path: the same picture as compute's, up to what its blending and its depth test lose.
+//! The rasteriser's path: the same picture as with compute, up to the error of its blending and
+//! depth test.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -39,7 +40,7 @@ fn frame(case: &HardCase, options: &RenderOptions, backend: &Backend) -> (Frame,
     render(&case.scene, &case.camera, options, backend, &()).unwrap()
 }
 
-/// The bound of src/passes/raster.rs for a floating format of unit roundoff `2^-bits`.
+/// A row with the given error bound of a floating-point format, as in src/passes/raster.rs.
 fn floating(error_bound: fn(f64, f64, u32) -> f64) -> AccumulatorRow {
     AccumulatorRow {
         of: Accumulator::Float,
@@ -84,7 +85,7 @@ fn exact_depths_lose_no_more_than_the_formats_bound() {
     }
 }
 
-/// What an adapter cannot draw it refuses, in a sentence that says what to take instead.
+/// Refuses a format or depth test that the adapter lacks, and the error names an alternative.
 #[test]
 fn what_an_adapter_cannot_draw_is_refused() {
     let (case, _) = all_cases().into_iter().find(|(case, _)| case.name == "intersecting sheets").unwrap();
@@ -123,7 +124,7 @@ fn a_broken_raster_kernel_is_noticed() {
     }
 }
 
-/// Interpolated depths decide otherwise in few pixels, and blend as the exact ones do elsewhere.
+/// Interpolated depths change the accepted fragments in few pixels, and cover the same pixels.
 #[test]
 fn the_classic_depth_test_accepts_nearly_the_same_fragments() {
     let Some(gpu) = common::gpu() else { return };
@@ -164,9 +165,11 @@ fn eight_bits_lose_what_they_must_and_refuse_to_count() {
     assert!(error.contains("8-bit"), "{error}");
 }
 
-/// Lit pictures take another way through resolve. A mean of n fragments in formats of 11 bits errs by `2 n 2^-11` of the attribute's
-/// range (src/passes/raster.rs), in the colour and in each component of the normal, whose length is at least a half where planes
-/// intersect, so that the cosine errs by four times as much.
+/// Lit pictures match those of compute within the blending error.
+///
+/// A mean of n fragments in a format of 11 bits errs by `2 n 2^-11` of the attribute's range
+/// (src/passes/raster.rs), in the colour and in each component of the normal. The mean normal's
+/// length is at least a half where planes intersect, so the cosine errs by four times as much.
 #[test]
 fn lit_pictures_are_computes() {
     let Some(gpu) = common::gpu() else { return };
@@ -192,8 +195,8 @@ fn lit_pictures_are_computes() {
     }
 }
 
-/// Triangles and parallelograms about the disks leave out no fragment that the boxes about them have; shapes that are too
-/// small are noticed.
+/// Triangles and parallelograms around the disks lose no fragment that boxes around them have;
+/// shapes that are too small do.
 #[test]
 fn tight_shapes_leave_out_nothing() {
     let tight = Sources::default();
@@ -208,13 +211,13 @@ fn tight_shapes_leave_out_nothing() {
     };
     let mut noticed = [0; 2];
     for (case, _) in all_cases() {
-        // As many pixels as make the splats quads, and so few that they are triangles.
+        // Image sizes at which the splats are quads, and triangles.
         let most = 10 * case.scene.surfels.len() as u32;
         let few = (f64::from(most).sqrt() as u32 - 1).min(case.camera.width);
         for (shape, size) in [(0, few), (1, (f64::from(most).sqrt() as u32 + 1).max(case.camera.width))] {
             for depth in [RasterDepth::Exact, RasterDepth::Offset] {
                 let expected = draw(&boxes, &case, size, depth);
-                // Interpolated depths follow the corners, so of these only what is covered is compared.
+                // Interpolated depths depend on the corners, so only coverage is compared.
                 let same = |bits: Vec<u32>| match depth {
                     RasterDepth::Exact => bits == expected,
                     _ => bits.iter().zip(&expected).all(|(a, b)| (*a == 0) == (*b == 0)),

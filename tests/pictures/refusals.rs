@@ -1,4 +1,4 @@
-//! Combinations that need not be refused are drawn as they should be, and refusals say the way.
+//! Combinations of options that work are drawn right, and refusals name a way out.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -25,7 +25,7 @@ fn backends() -> Option<[Backend; 2]> {
     Some([Backend::gpu(common::gpu()?), Backend::Reference])
 }
 
-/// A ball of triangles of `size` at a place.
+/// A ball of triangles of radius `size` around `center`.
 fn ball(center: [f64; 3], size: f64) -> Mesh {
     let mut mesh = meshes::sphere(2, true);
     for place in &mut mesh.positions {
@@ -35,8 +35,7 @@ fn ball(center: [f64; 3], size: f64) -> Mesh {
     mesh
 }
 
-/// Triangles beside Gaussians show the light that they show alone, and Gaussians what they show
-/// alone.
+/// Where nothing is translucent, Gaussians and triangles in one picture look as they do alone.
 #[test]
 fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
     let Some(backends) = backends() else { return };
@@ -47,7 +46,7 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
     );
     (gaussians.encoded, gaussians.oriented) = (true, false);
     let camera = sphere_camera(64, Projection::Pinhole);
-    // To the left of them, and in front.
+    // To the left of the Gaussians, and in front of them.
     let both = with_triangles(Some(gaussians.clone()), &[ball([0.0, 0.9, 0.9], 0.5)]).unwrap().0;
     let alone = Scene { triangles: both.triangles.clone(), ..Scene::default() };
     let options = RenderOptions {
@@ -63,8 +62,8 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
         let [of_splats, of_triangles] = [&splats, &triangles].map(|frame| frame.map(Map::Depth).unwrap());
         let mut seen = [0; 2];
         for (pixel, (near, far)) in of_splats.iter().zip(of_triangles).enumerate() {
-            // Not where a blended depth may lie behind a triangle that is behind the nearest
-            // fragment.
+            // Skips pixels where a blended depth may lie behind a triangle that is behind the
+            // nearest fragment.
             if (near - far).abs() < 0.1 {
                 continue;
             }
@@ -120,13 +119,12 @@ fn tiles_are_taken_wherever_nobody_says_how_splats_are_drawn() {
             bits(&frame(&scene, &camera, &tiled, &gpu)) == bits(&frame(&scene, &camera, &options, &gpu)),
             "{options:?}"
         );
-        // A study would measure something else than it names.
+        // Studies still refuse tiles: they would not measure what they name.
         assert!(check::by_tiles(&tiled).is_err() && check::by_tiles(&options).is_ok());
     }
 }
 
-/// Beside triangles that a view does not show depths are those without them, and triangles come
-/// when a view shows them.
+/// Triangles out of view change nothing, and they show in a view that includes them.
 #[test]
 fn triangles_out_of_view_change_nothing() {
     let Some(backends) = backends() else { return };
@@ -140,7 +138,7 @@ fn triangles_out_of_view_change_nothing() {
             for backend in &backends {
                 let [own, other] = [&scene, &beside].map(|scene| frame(scene, &camera, &options, backend));
                 assert!(own == other, "{projection:?} {place:?}");
-                // The same renderer from where they are seen.
+                // The same renderer then draws a view that includes the triangles.
                 let mut renderer = Renderer::new(&beside, &options, backend).unwrap();
                 let first = renderer.frame(&camera, &()).unwrap().0;
                 let away = Camera { eye: camera.eye + glam::DVec3::from_array(place) - scene.origin, ..camera.clone() };
@@ -152,7 +150,7 @@ fn triangles_out_of_view_change_nothing() {
     }
 }
 
-/// Files of the tests below: a painted grid, a plain one beside it, and an image.
+/// Writes the files of the tests below: a textured grid, a plain one beside it, and an image.
 fn files(folder: &Folder) -> [std::path::PathBuf; 3] {
     let grid = |x: f64, more: &dyn Fn(f64, f64) -> String| -> String {
         (0..400)
@@ -254,7 +252,7 @@ fn defaults_that_are_given_and_choices_of_one_file_are_no_fault() {
     assert!(levels == apart && told.contains("changes nothing"), "{told}");
     let two = ["render", plain, text(&painted), "-o", "x.png", "--lod", "2px", "--separate"];
     fails(&two, 2, &["of all inputs together", "depth map"]);
-    // A texture and layers: blue halves let what is behind show.
+    // A texture with layers: its blue half is translucent.
     let texture = [text(&painted), "--texture", text(&image), "--composite", "layers:2"];
     let (_, told) = draw("e.png", &texture);
     assert!(told.contains("the mean colour of its texture"), "{told}");

@@ -1,4 +1,5 @@
-//! Several samples a pixel: the bits of a larger picture, averaged, whoever draws it and how.
+//! Several samples per pixel: the picture is a larger one averaged, for every backend and
+//! organisation.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -17,7 +18,7 @@ fn samples(count: &str) -> Samples {
     count.parse().unwrap()
 }
 
-/// A lit sphere of translucent colours, every third disk of which ends at a line, over a background.
+/// A sphere of translucent colours, where a line clips every third disk.
 fn scene() -> Scene {
     let mut scene = sphere(3000, 1.7);
     let Colors::Srgb8(codes) = &mut scene.colors else { unreachable!() };
@@ -35,7 +36,7 @@ fn views() -> [Camera; 2] {
     [Projection::Pinhole, Projection::Orthographic].map(|projection| sphere_camera(90, projection))
 }
 
-/// The picture of a camera whose pixels are the samples, averaged on the host.
+/// Renders one pixel per sample and averages on the host.
 fn averaged(scene: &Scene, camera: &Camera, count: &str, backend: &Backend) -> Frame {
     let fine = camera.sampled(samples(count)).unwrap();
     let (frame, _) = render(scene, &fine, &options(Samples::ONE), backend, &()).unwrap();
@@ -57,9 +58,9 @@ fn a_picture_of_many_samples_is_a_large_one_averaged() {
             let expected = averaged(&scene, &camera, count, &backend);
             let (frame, report) = render(&scene, &camera, &options(samples(count)), &backend, &()).unwrap();
             assert_eq!((report.width, report.height), (90, 90));
-            // Sixteen additions and two divisions of numbers up to one, in f32.
+            // The error of sixteen additions and two divisions of f32 numbers up to 1.
             assert!(largest_difference(&frame, &expected) < 24.0 * f32::EPSILON, "{count}");
-            // The control: fewer samples are another picture, and at outlines alpha is in between.
+            // Control: one sample per pixel gives another picture.
             let (other, _) = render(&scene, &camera, &options(Samples::ONE), &backend, &()).unwrap();
             assert!(largest_difference(&frame, &other) > 0.1);
         }
@@ -82,9 +83,9 @@ fn the_reference_and_every_organisation_agree() {
         let reference = of(Organisation::Auto, Accumulator::Fixed, &Backend::Reference);
         let differing = frame.color.iter().zip(&reference.color);
         let differing = differing.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 1e-5)).count();
-        // Of 64,800 samples a few lie at a rim, a line or the tolerance.
+        // A few of the 64,800 samples lie at a rim, a clip line or the tolerance.
         assert!(differing < 20, "{differing}");
-        // Bands of few rows, pages of few surfels.
+        // A small buffer limit makes bands of few rows and pages of few surfels.
         let Some(small) = common::gpu().map(|gpu| Backend::gpu(Gpu::with_buffer_limit(gpu, 60_000))) else { return };
         assert!(same(&of(Organisation::Auto, Accumulator::Fixed, &small)));
     }
@@ -119,7 +120,8 @@ fn maps_are_of_the_centre_however_many_samples_there_are() {
     }
 }
 
-/// Maps may ask for more of a surfel than the colour does, as a map of normals of their own beside an unlit one.
+/// Maps may need attributes that the colour does not, such as a map of given normals in an unlit
+/// picture.
 #[test]
 fn maps_do_not_change_the_colours_of_several_samples() {
     let Some(gpu) = common::gpu() else { return };

@@ -1,4 +1,5 @@
-//! Inputs that are kept apart: kernels and twins alike, no blending between them, the same bits however they are drawn.
+//! `--separate` inputs: they do not blend with each other, kernels agree with twins, and drawing
+//! order changes no bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +21,7 @@ use epsplat::low_level::scene::{
 use epsplat::low_level::surfels::{build, with_triangles};
 use glam::DVec3;
 
-/// A sphere of `count` disks around `center`, each a little off it, in shades of `color`.
+/// A sphere of `count` disks around `center`, each slightly off it, in shades of `color`.
 fn ball(center: DVec3, radius: f64, count: usize, color: [u8; 3]) -> Points {
     let mut random = Random(count as u64);
     let mut points = Points { normals: Some(Vec::new()), radii: Some(Vec::new()), ..Points::default() };
@@ -40,7 +41,7 @@ fn ball(center: DVec3, radius: f64, count: usize, color: [u8; 3]) -> Points {
     points
 }
 
-/// A skin, a shirt half an epsilon over it, and a ball that meets both.
+/// A skin, a shirt half an epsilon above it, and a ball that intersects both.
 fn inputs() -> Vec<Points> {
     vec![
         ball(DVec3::ZERO, 1.0, 1500, [255, 0, 0]),
@@ -57,7 +58,7 @@ fn camera() -> Camera {
     sphere_camera(96, Projection::Pinhole)
 }
 
-/// A mesh that meets all inputs.
+/// A mesh that intersects all inputs.
 fn body() -> Mesh {
     let mut mesh = meshes::sphere(2, false);
     for [x, y, z] in &mut mesh.positions {
@@ -85,12 +86,12 @@ fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
     render(scene, &camera(), options, backend, &()).unwrap().0
 }
 
-/// Pixels whose colour is of more than one input.
+/// The number of pixels whose colour mixes more than one input.
 fn mixed(frame: &Frame) -> usize {
     frame.color.iter().filter(|[r, g, b, _]| [r, g, b].iter().filter(|c| ***c > 1e-4).count() > 1).count()
 }
 
-/// Pixels that no rounding decides, and that differ in their colour or in some map.
+/// The number of pixels that no rounding decides and whose colour or maps differ.
 fn differ(shown: &Frame, truth: &Frame) -> usize {
     let decided = truth.map(Map::Decision).unwrap();
     let near = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| a == b || (a - b).abs() <= 2e-5 * (1.0 + b.abs()));
@@ -124,17 +125,17 @@ fn inputs_do_not_blend_and_kernels_agree_with_twins() {
             assert_eq!(differ(&shown, &all), 0, "{organisation:?}, {samples:?}");
             if samples == Samples::ONE {
                 assert_eq!(mixed(&shown), 0);
-                // The skin is hidden by its shirt, but for what shows between edges.
+                // The shirt hides the skin, but for gaps between edges.
                 let of_skin = shown.color.iter().filter(|[r, ..]| *r > 0.0).count();
                 let covered = shown.color.iter().filter(|color| color[3] > 0.0).count();
                 assert!(of_skin * 50 < covered && covered > 3000, "{of_skin} of {covered}");
-                // Without, they do.
+                // Control: without `separate` the inputs blend.
                 let blended = frame(&scene, &of(together.clone()), &backend);
                 assert!(mixed(&blended) * 2 > covered && differ(&blended, &all) * 2 > covered);
             }
         }
     }
-    // Lit, by other sums, tolerances and filters, and over something.
+    // Lit, with other accumulators, epsilons and low-passes, and over a background.
     for options in [
         RenderOptions { shading: Shading::Phong, ..apart() },
         RenderOptions { accumulator: Accumulator::Fixed32, ..apart() },
@@ -198,7 +199,7 @@ fn the_same_bits_however_they_are_drawn() {
             let without = RenderOptions { without: vec![left_out], ..apart() };
             same(name, &scene, &without, &backend);
         }
-        // In any order of the inputs, and of the surfels of each.
+        // In another order of the inputs, and of the surfels in each.
         let mut turned = inputs();
         turned.rotate_left(1);
         for points in &mut turned {
@@ -215,7 +216,7 @@ fn the_same_bits_however_they_are_drawn() {
     }
 }
 
-/// Squares of two colours in one plane: at every pixel both are equally near.
+/// Squares of two colours in one plane: both inputs are equally near at every pixel.
 #[test]
 fn of_equal_depths_the_order_of_inputs_does_not_show() {
     let Some(backend) = gpu() else { return };
@@ -239,12 +240,12 @@ fn of_equal_depths_the_order_of_inputs_does_not_show() {
         render(&scene, &camera, &apart(), &backend, &()).unwrap().0
     });
     assert!(bits(&frames[0]) == bits(&frames[1]));
-    // One of them shows everywhere, whole.
+    // One input shows everywhere, unmixed.
     let shown: Vec<_> = frames[0].color.iter().filter(|color| color[3] > 0.0).collect();
     assert!(shown.len() > 500 && shown.iter().all(|color| color[0] > color[1]));
 }
 
-/// Triangles are joined to what shows of all inputs.
+/// Triangles join the nearest of all inputs.
 #[test]
 fn triangles_are_joined_to_the_nearest_input() {
     let Some(backend) = gpu() else { return };

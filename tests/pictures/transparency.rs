@@ -1,4 +1,4 @@
-//! Surfaces that show through each other: closed forms, the twins, and what must not change a bit.
+//! Translucent surfaces: closed forms, the f64 twins, and changes that must not alter a bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,7 +21,7 @@ use epsplat::low_level::scene::{
 use epsplat::low_level::surfels::build;
 use glam::Vec3;
 
-/// What every way to composite has.
+/// The maps that every composite supports.
 const BOTH_MAPS: Maps = Maps::of(&[Map::Transmittance, Map::Layers]);
 
 const ALL: Composite = Composite::Layers(ALL_LAYERS);
@@ -42,20 +42,20 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// All bits, those of maps of all surfaces too.
+/// All bits of a frame, with those of the maps of all surfaces.
 fn all_bits(frame: &Frame) -> Vec<u32> {
     let of = |map| frame.map(map).into_iter().flatten().map(|value| value.to_bits());
     bits(frame).into_iter().chain(of(Map::Transmittance)).chain(of(Map::Layers)).collect()
 }
 
-/// Pixels that no fragment leaves undecided, by the reference.
+/// Which pixels are decided: in the reference, no fragment lies within rounding of a decision.
 fn decided(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<bool> {
     let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options.clone() };
     let reference = frame(scene, camera, &options, &Backend::Reference);
     reference.map(Map::Decision).unwrap().iter().map(|margin| *margin > DECISION_MARGIN).collect()
 }
 
-/// `count` spheres of `surfels` each around one another, of radii from 1 down.
+/// Concentric spheres of `surfels` surfels each, with radii from 1 down in steps of 0.06.
 fn shells(count: usize, surfels: usize) -> Scene {
     let one = sphere(surfels, 1.5);
     let scaled = |shell: usize| {
@@ -67,7 +67,7 @@ fn shells(count: usize, surfels: usize) -> Scene {
     Scene { surfels, colors: Colors::Constant([0.2, 0.5, 0.8, 1.0]), ..one }
 }
 
-/// Through k shells the background shows as (1 - a)^2k, whatever they are sampled by.
+/// The background shows through k shells of opacity a as (1 - a)^2k, however they are sampled.
 #[test]
 fn shells_let_through_what_their_alphas_say() {
     let Some(backend) = gpu() else { return };
@@ -84,17 +84,17 @@ fn shells_let_through_what_their_alphas_say() {
             if decided[pixel] && layers[pixel] as usize == crossings {
                 whole += 1;
                 assert!((f64::from(*transmittance) - expected).abs() < 1e-5, "{crossings}: {transmittance}");
-                // Of one colour, what is not background is it.
+                // The shells have one colour, which fills the rest of the pixel.
                 let shown = f64::from(through.color[pixel][0]);
                 assert!((shown - (0.2 + 0.8 * expected)).abs() < 1e-5, "{crossings}: {shown}");
             }
         }
-        // The innermost sphere covers so much.
+        // All shells are crossed where the innermost sphere covers the pixel.
         assert!(whole > 200, "{crossings}: {whole}");
     }
 }
 
-/// The same of planes of one surfel each, fragment by fragment.
+/// The same for planes of one surfel each, composited fragment by fragment.
 #[test]
 fn sorted_planes_let_through_what_their_alphas_say() {
     let Some(backend) = gpu() else { return };
@@ -103,7 +103,7 @@ fn sorted_planes_let_through_what_their_alphas_say() {
         for (number, surfel) in scene.surfels.iter_mut().take(crossings).enumerate() {
             surfel.center[2] += 0.25 * number as f32;
         }
-        // The two that stretch the colours' range.
+        // The surfels that stretch the range of colours move out of sight.
         scene.surfels.iter_mut().skip(crossings).for_each(|surfel| surfel.center[0] = 1000.0);
         let of = RenderOptions { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.1) };
         let shown = frame(&scene, &camera, &of, &backend);
@@ -115,7 +115,7 @@ fn sorted_planes_let_through_what_their_alphas_say() {
     }
 }
 
-/// Device and twin composite alike at pixels that no rounding decides; kernels that are wrong do not.
+/// Device and twin agree at pixels that no rounding decides; broken kernels do not.
 #[test]
 fn kernels_and_twins_composite_alike() {
     let Some(backend) = gpu() else { return };
@@ -143,7 +143,7 @@ fn kernels_and_twins_composite_alike() {
             let own = RenderOptions { shading, ..own };
             let decided = decided(scene, camera, &own);
             let truth = frame(scene, camera, &own, &Backend::Reference);
-            // Pixels that differ by more than f32 explains.
+            // The number of pixels that differ by more than f32 rounding.
             let differ = |other: &Frame| {
                 let far = |pixel: usize| {
                     let [a, b] = [&truth, other].map(|frame| frame.color[pixel]);
@@ -173,15 +173,16 @@ fn kernels_and_twins_composite_alike() {
     assert!(noticed.iter().all(|noticed| *noticed > 0), "{noticed:?}");
 }
 
-/// The order of surfels, how large buffers are, and 64-bit integers do not show.
+/// The order of surfels, buffer limits and 64-bit integers do not show.
 #[test]
 fn lists_do_not_show_how_they_came_to_be() {
     let Some(backend) = gpu() else { return };
     let small = |bytes| Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), bytes));
-    // What a band holds of the first scene, and of those with many fragments a pixel.
+    // Buffer limits that split the first scene, and scenes with many fragments per pixel, into
+    // bands.
     let (narrow, wide) = (small(1_200_000), small(6_000_000));
     let core = common::core_gpu().map(Backend::gpu).unwrap();
-    // Many at one place, whose order content decides.
+    // Many surfels at one place, whose order their content decides.
     let (mut dense, camera) = stack(40, 0.5);
     if let Colors::Linear(colors) = &mut dense.colors {
         for (number, color) in colors.iter_mut().enumerate() {
@@ -213,7 +214,8 @@ fn lists_do_not_show_how_they_came_to_be() {
     }
 }
 
-/// What is opaque costs nothing and looks as it did; a nearest layer of alpha 1 has the opaque picture's bits beside others that have not.
+/// Opaque surfaces cost nothing in layers and keep the bits of the opaque picture. Beside a
+/// translucent surfel, so does a nearest layer of alpha 1.
 #[test]
 fn opaque_layers_have_the_bits_of_the_opaque_picture() {
     let Some(backend) = gpu() else { return };
@@ -222,7 +224,7 @@ fn opaque_layers_have_the_bits_of_the_opaque_picture() {
     let (layered, report): (Frame, Report) = render(&scene, &camera, &options(ALL), &backend, &()).unwrap();
     assert!(!report.needs.contains(&"lists-layers"));
     assert_eq!(bits(&layered), bits(&plain));
-    // One surfel lets through, somewhere.
+    // One surfel in sight is translucent.
     let mut one = scene.clone();
     let Colors::Srgb8(codes) = &mut one.colors else { unreachable!() };
     let seen =
@@ -244,7 +246,8 @@ fn opaque_layers_have_the_bits_of_the_opaque_picture() {
     assert!(same > 2000 && others > 10, "{same} {others}");
 }
 
-/// A solid of alpha 0.5 has that opacity however densely it is sampled, in layers; sorted it has not, as its fragments add up.
+/// In layers, a solid of alpha 0.5 has that opacity at any sampling density. Sorted it does not,
+/// because its fragments add up.
 #[test]
 fn the_density_of_a_cloud_does_not_show_in_layers() {
     let Some(backend) = gpu() else { return };
@@ -252,7 +255,7 @@ fn the_density_of_a_cloud_does_not_show_in_layers() {
     let mean = |count: usize, composite: Composite| {
         let of = RenderOptions { epsilon: Epsilon::Absolute(0.05), ..unlit(composite, 0.5) };
         let shown = frame(&sphere(count, 1.5 * (count as f64 / 2000.0).sqrt()), &camera, &of, &backend);
-        // Away from the outline.
+        // The middle of the image, away from the outline.
         let middle = (24..40).flat_map(|y| (24..40).map(move |x| y * 64 + x));
         middle.map(|pixel| f64::from(shown.color[pixel][3])).sum::<f64>() / 256.0
     };
@@ -262,7 +265,7 @@ fn the_density_of_a_cloud_does_not_show_in_layers() {
     assert!(sorted[2] - sorted[0] > 0.05, "{sorted:?}");
 }
 
-/// Behind the last layer is one more of all that is left, or nothing.
+/// A tail makes one more layer of all remaining fragments; without one they are dropped.
 #[test]
 fn a_tail_is_one_more_layer() {
     let Some(backend) = gpu() else { return };
@@ -286,7 +289,8 @@ fn a_tail_is_one_more_layer() {
     close(shown(Composite::Layers(1), Tail::Sum), 0.25 * 0.5, 0.75, 2.0);
 }
 
-/// What stays on the device from frame to frame shows in none: lists that grow and shrink, and bands that one view was cut into.
+/// Buffers that stay on the device from frame to frame do not show: lists that grow and shrink, and
+/// the bands of an earlier view.
 #[test]
 fn a_kept_renderer_draws_what_a_fresh_one_does() {
     let Some(all) = gpu() else { return };
@@ -309,7 +313,7 @@ fn a_kept_renderer_draws_what_a_fresh_one_does() {
     }
 }
 
-/// Many copies of one surfel are as many fragments, for the twin too.
+/// Each copy of a surfel is a fragment, on the device and in the twin.
 #[test]
 fn copies_are_fragments_each() {
     let Some(backend) = gpu() else { return };
@@ -324,7 +328,8 @@ fn copies_are_fragments_each() {
     }
 }
 
-/// Depth, normal and the like are those of the opaque picture, beside maps of all surfaces, whatever the samples.
+/// Depth, normal and similar maps equal those of the opaque picture, beside maps of all surfaces
+/// and with any samples.
 #[test]
 fn maps_of_the_nearest_surface_stay() {
     let Some(backend) = gpu() else { return };
@@ -350,7 +355,7 @@ fn maps_of_the_nearest_surface_stay() {
     }
 }
 
-/// How many layers the fragments of each pixel are parted into.
+/// The number of layers of each pixel's fragments.
 fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<usize> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
@@ -362,8 +367,8 @@ fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Part
     fragments::reference(&strip).iter().enumerate().map(count).collect()
 }
 
-/// Depth peeling by the rasteriser shows the layers that lists do, but where a run of fragments is longer than a window; a rasteriser that peels
-/// Where epsilon is of surfels of many sizes, each fragment's own says what a layer that is peeled has: layers have a twin there too.
+/// Where epsilon depends on the sizes of surfels, each fragment's own epsilon decides which layer
+/// is peeled: the rasteriser agrees with its twin.
 #[test]
 fn layers_of_surfels_of_many_sizes_are_peeled_as_their_twin_has_them() {
     let Some(gpu) = common::gpu().filter(|gpu| gpu.adapter.vertex_storage) else { return };
@@ -394,7 +399,8 @@ fn layers_of_surfels_of_many_sizes_are_peeled_as_their_twin_has_them() {
     }
 }
 
-/// nothing, or too much, does not.
+/// Depth peeling by the rasteriser shows the layers of the lists, except where a run of fragments
+/// is longer than a window. A rasteriser that peels nothing, or too much, differs.
 #[test]
 fn the_rasteriser_peels_what_lists_part() {
     let Some(gpu) = common::gpu() else { return };
@@ -446,7 +452,8 @@ fn the_rasteriser_peels_what_lists_part() {
     assert!(refused(options(Composite::Sorted)).contains("sorts no fragments"));
 }
 
-/// Depth and alpha of each surface, and how much of a pixel a tail is: by hand, and as the twins have them.
+/// Maps of each surface's depth and alpha, and of the tail's share of a pixel: by hand, and as in
+/// the twins.
 #[test]
 fn maps_tell_of_each_surface_and_of_the_tail() {
     let Some(backend) = gpu() else { return };
@@ -485,7 +492,7 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
             }
         }
     }
-    // What is opaque has surfaces too, if one asks for them, and where nothing is there is none.
+    // Opaque surfaces are in the map too, and pixels without a surface have none.
     let (scene, camera) = (sphere(4000, 2.0), sphere_camera(96, Projection::Pinhole));
     let own = RenderOptions { opacity: 1.0, ..of(ALL, &[Map::Surfaces]) };
     let [device, twin] = [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &own, backend));
@@ -498,7 +505,7 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
         none_seen += usize::from(device[..2] == none);
     }
     assert!(seen > 3000 && none_seen > 1000, "{seen} {none_seen}");
-    // A kernel that numbers surfaces wrongly is noticed.
+    // Control: a kernel that writes wrong depths is noticed.
     let wrong = Sources::default().replace("surfaces_map.wgsl", "2u * number] = depth", "2u * number] = 1.001 * depth");
     let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: wrong.unwrap() };
     assert!(pixels(&frame(&scene, &camera, &own, &wrong)) != pixels(&device));

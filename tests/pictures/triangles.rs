@@ -1,4 +1,7 @@
-//! Triangles beside splats: coverage without cracks, rays and twins as judges, hard triangles, and the same bits however they are drawn.
+//! Triangles beside splats: no cracks, hard triangles, joins and textures, judged by rays and f64
+//! twins.
+//!
+//! Also tests that order, organisation and adapter do not change a bit.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -38,7 +41,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// A closed surface with bumps and dents, whose coordinates f32 has.
+/// A closed surface with bumps and dents, whose coordinates are exact in f32.
 fn rough() -> Mesh {
     let mut mesh = meshes::sphere(4, false);
     let mut random = Random(7);
@@ -53,7 +56,7 @@ fn scene_of(mesh: &Mesh) -> Scene {
     with_triangles(None, std::slice::from_ref(mesh)).unwrap().0
 }
 
-/// A pose around `rough`, or within it.
+/// A random camera around `rough`, or inside it.
 fn pose(random: &mut Random, size: u32) -> Camera {
     let direction = |random: &mut Random| {
         DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0)).normalize()
@@ -64,14 +67,16 @@ fn pose(random: &mut Random, size: u32) -> Camera {
     Camera::look_at((size, size), lens, eye, target, Some(direction(random)), Up::Y, 1e-4).unwrap()
 }
 
-/// Pixels whose depth is not that at which the ray through their centre meets the surface, though rays a thousandth of a pixel beside it
-/// meet the same one.
+/// Counts the pixels whose depth is not that of the ray through their centre.
+///
+/// A pixel is excused if a ray a thousandth of a pixel beside its centre meets the surface
+/// elsewhere.
 fn cracks(shown: &Frame, camera: &Camera, surface: &Surface) -> usize {
     let depths = shown.map(Map::Depth).unwrap();
     let ray = |pixel: usize, dx: f64, dy: f64| {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
         let (x, y) = (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy);
-        // Its direction has a depth of 1.
+        // The ray's direction has depth 1, so distances along it are depths.
         let hit = surface.first_hit(camera.ray_start(x, y), camera.ray(x, y), camera.near);
         hit.map_or(f64::INFINITY, |hit| hit.distance)
     };
@@ -84,8 +89,8 @@ fn cracks(shown: &Frame, camera: &Camera, surface: &Surface) -> usize {
     (0..depths.len()).filter(is_wrong).count()
 }
 
-/// A closed mesh at a thousand poses: no ray sees anything else than the picture does; where an edge belongs to nobody, or lies elsewhere
-/// for one of its triangles, some do.
+/// A closed mesh shows what rays see at a thousand poses. In the controls edges belong to no
+/// triangle, or lie elsewhere for one of their triangles, and cracks show.
 #[test]
 fn no_crack_shows_at_any_pose() {
     let Some(backend) = gpu() else { return };
@@ -107,11 +112,11 @@ fn no_crack_shows_at_any_pose() {
     }
 }
 
-/// Pixel centres on edges and corners, in numbers that f32 has: each belongs to one triangle.
+/// Pixel centres exactly on edges and corners (in f32) belong to one triangle each.
 #[test]
 fn what_lies_on_an_edge_belongs_to_one_triangle() {
     let Some(backend) = gpu() else { return };
-    // A plane of squares, halved either way, whose corners are centres of pixels.
+    // A plane of squares, split along either diagonal, whose corners are pixel centres.
     let mut all = Vec::new();
     let corner = |i: i32, j: i32| [f64::from(i) * 4.0 - 15.5, f64::from(j) * 4.0 - 15.5, 8.0];
     for (i, j) in (0..7).flat_map(|i| (0..7).map(move |j| (i, j))) {
@@ -126,10 +131,11 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
     let camera = front(32);
     let shown = frame(&scene, &camera, &unlit(), &backend);
     assert_eq!(bits(&shown), bits(&frame(&scene, &camera, &unlit(), &Backend::Reference)));
-    // The left and upper ends are the plane's, and the right and lower ones are not.
+    // The plane includes its left and upper edges, but not its right and lower ones.
     let covered = shown.color.iter().filter(|color| color[3] > 0.0).count();
     assert_eq!(covered, 28 * 28);
-    // Each triangle has as many as its area; of half a square's sixteen the diagonal is one's or the other's.
+    // A triangle covers its area in pixels, but either half may own the diagonal of their square of
+    // 16.
     for triangle in &all {
         let of = shown.color.iter().filter(|color| color[3] > 0.0 && color[0] == triangle.colors[0][0]).count();
         assert!((6..=10).contains(&of), "{of}");
@@ -139,7 +145,8 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
     assert!(left < 28 * 28 / 2, "{left}");
 }
 
-/// A triangle whose corners are red, green and blue: a pixel's colour is what parts of them it has.
+/// A triangle with a red, a green and a blue corner: a pixel's colour is its barycentric
+/// coordinates.
 fn painted(corners: [[f64; 3]; 3]) -> Triangle {
     let colors = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
     Triangle {
@@ -150,7 +157,7 @@ fn painted(corners: [[f64; 3]; 3]) -> Triangle {
     }
 }
 
-/// What is hard to draw, by name; the camera looks along +z from the origin, down y.
+/// Named triangles that are hard to draw; the camera is at the origin, x right, y down, z forward.
 fn hard() -> Vec<(&'static str, Vec<Triangle>)> {
     let mut random = Random(11);
     let mut at = |z: [f64; 2]| [random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(z[0], z[1])];
@@ -175,7 +182,7 @@ fn hard() -> Vec<(&'static str, Vec<Triangle>)> {
     };
     all.push(("slivers", slivers(0.01)));
     all.push(("slivers of 1e-7 pixels", slivers(2e-9)));
-    // Of one depth, and no wider than their corners' roundings.
+    // All at one depth, and no wider than the rounding of their corners.
     let flat = |k: usize| {
         let (s, c) = (0.3 + 0.1 * k as f64).sin_cos();
         painted([[-c, -s, 2.0], [c, s, 2.0], [0.3 * c + 4e-8, 0.3 * s, 2.0]])
@@ -197,8 +204,10 @@ fn hard() -> Vec<(&'static str, Vec<Triangle>)> {
     all
 }
 
-/// Device and twin alike at pixels that no rounding decides: colours, which are the corners' parts, to 1e-6, depths to 1e-6 of themselves.
-/// What has none, or lies behind, is left out.
+/// Device and twin agree at pixels that no rounding decides: barycentric coordinates (as colours)
+/// to 1e-6, depths to 1e-6 of their value.
+///
+/// Triangles without an area or behind the camera do not show.
 #[test]
 fn kernels_and_twins_see_hard_triangles_alike() {
     let Some(backend) = gpu() else { return };
@@ -232,7 +241,7 @@ fn kernels_and_twins_see_hard_triangles_alike() {
                 "behind" | "a corner each" | "a plane through the eye" | "slivers of 1e-7 pixels" => 0,
                 "slivers at one depth" => 0,
                 "a part of a pixel" => 5,
-                // Beside the camera's plane little is seen in parallel.
+                // In parallel projection few triangles near the camera's plane are in sight.
                 _ if projection == Projection::Orthographic => 0,
                 _ => 100,
             };
@@ -242,7 +251,7 @@ fn kernels_and_twins_see_hard_triangles_alike() {
     }
 }
 
-/// A sphere of splats that a plane and a rough body of triangles cut.
+/// A sphere of splats, cut by a plane and by a rough closed body of triangles.
 fn joined() -> (Scene, Camera) {
     let mut all: Vec<Triangle> = Vec::new();
     let plane = [[-1.3, 0.2, -1.3], [1.3, 0.3, -1.3], [1.3, -0.2, 1.3], [-1.3, -0.3, 1.3]];
@@ -254,7 +263,7 @@ fn joined() -> (Scene, Camera) {
     (scene, sphere_camera(96, Projection::Pinhole))
 }
 
-/// Each join alike by kernels and twins; joins and kernels that are others do not.
+/// Kernels agree with twins for each join; another join or a broken kernel differs.
 #[test]
 fn kernels_and_twins_join_alike() {
     let Some(backend) = gpu() else { return };
@@ -280,7 +289,7 @@ fn kernels_and_twins_join_alike() {
     for join in joins {
         let shown = frame(&scene, &camera, &of(join), &backend);
         assert_eq!(differ(join, &shown), 0, "{join:?}");
-        // Both show.
+        // Both triangles (weight 1) and splats show.
         let weights = shown.map(Map::Weight).unwrap();
         let ones = weights.iter().filter(|weight| **weight == 1.0).count();
         assert!(ones > 500 && weights.iter().filter(|weight| **weight > 0.0).count() > ones + 500);
@@ -288,7 +297,8 @@ fn kernels_and_twins_join_alike() {
             assert!(differ(other, &shown) > 10, "{join:?} {other:?}");
         }
     }
-    // Along the ray it is less than along the axis, by which they blend; and none is beyond the scene.
+    // An epsilon along the ray, which is shorter along the axis that the blend uses, and one that
+    // reaches beyond the scene.
     for epsilon in [Epsilon::Ray(0.2), Epsilon::Absolute(1e3), Epsilon::Relative(0.1)] {
         let own = RenderOptions { epsilon, ..of(Join::Blended) };
         let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..own.clone() };
@@ -314,7 +324,7 @@ fn kernels_and_twins_join_alike() {
     }
 }
 
-/// The rasteriser snaps corners to parts of pixels, so it differs at edges, and nowhere else.
+/// The rasteriser snaps corners to fractions of a pixel, so it differs at edges and nowhere else.
 #[test]
 fn the_rasteriser_draws_the_same_but_for_edges() {
     let Some(backend) = gpu() else { return };
@@ -335,7 +345,7 @@ fn the_rasteriser_draws_the_same_but_for_edges() {
         let apart = a.iter().zip(&b).filter(|pair| off(*pair)).count();
         let covered = a.iter().filter(|depth| depth.is_finite()).count();
         assert!(apart * 50 < covered && covered > 2000, "{apart} of {covered}");
-        // Another mesh is told apart.
+        // Control: another mesh differs.
         let other = frame(&scene_of(&rough()), camera, &options, &backend);
         let others = depths(&other);
         assert!(a.iter().zip(&others).filter(|pair| off(*pair)).count() * 5 > covered);
@@ -345,7 +355,7 @@ fn the_rasteriser_draws_the_same_but_for_edges() {
     assert!(error.to_string().contains("--raster-depth"), "{error}");
 }
 
-/// The order of triangles and surfels, bands, organisations and features do not show, nor how many numbers an atomic has.
+/// The order of triangles and surfels, bands, organisations and device features change no bit.
 #[test]
 fn the_same_bits_however_it_is_drawn() {
     let Some(backend) = gpu() else { return };
@@ -363,7 +373,7 @@ fn the_same_bits_however_it_is_drawn() {
         .collect();
     Random(3).shuffle(&mut all);
     shuffled.triangles = Triangles::new(&all);
-    // Two at one place that differ in colour alone.
+    // Two triangles at each place, which differ in colour alone.
     all.extend(all.clone().iter().map(|given| Triangle { colors: [[0.5, 0.5, 0.5, 1.0]; 3], ..*given }));
     let doubled = Scene { triangles: Triangles::new(&all), ..scene.clone() };
     all.reverse();
@@ -383,7 +393,7 @@ fn the_same_bits_however_it_is_drawn() {
             assert!(bits(&frame(&doubled, &camera, &own, &backend)) == bits(&frame(&other, &camera, &own, &core)));
         }
     }
-    // OpenGL's own compiler rounds elsewhere.
+    // OpenGL's own compiler rounds differently.
     if let Some(gl) = gl {
         let plain = RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
         let shown = frame(&scene, &camera, &plain, &gl);
@@ -393,7 +403,8 @@ fn the_same_bits_however_it_is_drawn() {
     }
 }
 
-/// Painted triangles alike by kernels and twins, near and far; wrong lookups do not, and from afar a checkerboard is grey and not a pattern.
+/// Kernels paint textures as their twins do, near and far; broken lookups differ. Far away a
+/// checkerboard is grey, without a pattern.
 #[test]
 fn kernels_and_twins_paint_alike() {
     let Some(backend) = gpu() else { return };
@@ -408,7 +419,7 @@ fn kernels_and_twins_paint_alike() {
         painted(corners, Some((0, places))),
         painted([[-1.0, -0.8, 2.0], [0.1, -0.9, 2.5], [-0.2, 0.0, 2.2]], Some((1, places))),
         painted([[0.0, -0.8, 2.0], [1.1, -0.9, 2.5], [0.8, 0.0, 2.2]], None),
-        // Cut at the near depth.
+        // The near depth cuts this one.
         painted([[0.9, -0.9, -1.0], [1.0, 0.2, 3.0], [1.4, -0.5, 3.0]], Some((0, places))),
     ];
     let scene = Scene { triangles: Triangles::textured(&all, &[texture, other]), ..Scene::default() };
@@ -437,7 +448,8 @@ fn kernels_and_twins_paint_alike() {
             for (which, wrong) in wrong.iter().enumerate() {
                 assert!(differ(&camera, wrong).0 > 50, "{which}");
             }
-            // Beside the horizon neighbours differ by less than the checkerboard's colours.
+            // At the horizon neighbouring pixels differ far less than the checkerboard's two
+            // colours.
             let shown = differ(&camera, &backend).1;
             let row =
                 |y: usize| shown.color[y * 160 + 70..y * 160 + 90].iter().map(|color| color[0]).collect::<Vec<_>>();
@@ -449,7 +461,7 @@ fn kernels_and_twins_paint_alike() {
     }
 }
 
-/// Few corners may be far from many surfels; their triangles are part of what the default view shows.
+/// The default view includes triangles whose few corners lie far outside many surfels.
 #[test]
 fn a_floor_of_four_corners_is_framed() {
     let corner = |x: f64, z: f64| [x, -1.0, z];

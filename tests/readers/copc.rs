@@ -1,4 +1,4 @@
-//! COPC files, of which nodes are read.
+//! COPC files that are read by octree nodes, compared with a read of the whole file.
 
 use super::{Folder, Random, data, sentence};
 use epsplat::io::las::Copc;
@@ -7,7 +7,7 @@ use epsplat::low_level::scene::Colors;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Where the file says how its octree lies, and where its root page is.
+/// Offset of the COPC info record and, in it, of the root page's position.
 const INFO: usize = 375 + 54;
 const ROOT: usize = INFO + 40;
 
@@ -19,12 +19,12 @@ fn open(path: &Path) -> Result<Option<Copc>, epsplat::Error> {
     Copc::open(Input::open(path, None).unwrap())
 }
 
-/// Where the octree's first page begins.
+/// Offset of the octree's first page.
 fn page(bytes: &[u8]) -> usize {
     u64::from_le_bytes(*bytes[ROOT..].first_chunk().unwrap()) as usize
 }
 
-/// What opening these bytes, or reading all nodes of them, says.
+/// The error on opening these bytes or on reading all their nodes.
 fn refusal(folder: &Folder, bytes: &[u8]) -> String {
     let path = folder.path("a.copc.laz");
     std::fs::write(&path, bytes).unwrap();
@@ -45,7 +45,7 @@ fn all_nodes_are_the_file() {
         let options = ReadOptions { classes, ..ReadOptions::default() };
         let whole = io::read_with(&data("simple.copc.laz"), options, &()).unwrap();
         let mut read = copc.read(&all, &options, &()).unwrap();
-        // Numbers take the place of those that are left out.
+        // Point numbers replace the list of points that were left out.
         let left_out: BTreeSet<u64> = whole.left_out.iter().copied().collect();
         let kept = (0..1065).filter(|number| !left_out.contains(number)).map(|number| number as u32);
         assert_eq!(read.numbers.take().unwrap(), kept.collect::<Vec<_>>());
@@ -53,7 +53,7 @@ fn all_nodes_are_the_file() {
         assert_eq!(read, io::Points { left_out: Vec::new(), ..whole });
     }
     assert_eq!((copc.count(), copc.octree.levels(), copc.octree.nodes.len()), (1065, 4, 65));
-    // Numbers of some nodes, with points left out, are those of the file too.
+    // Point numbers are those of the file, even with some nodes only and some points left out.
     let whole = io::read(&data("simple.copc.laz"), &()).unwrap();
     let options = ReadOptions { classes: "2:0".parse().unwrap(), ..ReadOptions::default() };
     let some = copc.read(&[3, 10, 40, 64], &options, &()).unwrap();
@@ -77,7 +77,7 @@ fn some_nodes_are_their_points() {
         for ((number, position), color) in read.numbers.unwrap().into_iter().zip(read.positions).zip(own) {
             assert_eq!((position, color), (whole.positions[number as usize], colors[number as usize]));
             assert!(numbers.insert(number));
-            // Each lies in the node's cube.
+            // Each point lies in its node's cube.
             let low = octree.center - octree.half + edge * glam::DVec3::from_array(node.place.map(f64::from));
             let within = glam::DVec3::from_array(position) - low;
             assert!(
@@ -91,7 +91,7 @@ fn some_nodes_are_their_points() {
 
 #[test]
 fn other_files_are_none() {
-    // Too short to say it, whatever their size.
+    // Files too short to contain the COPC record, with any length.
     let folder = Folder::new();
     for length in [0, 4, 374, 375, 380, 393, 395, 429] {
         let path = folder.path("a.laz");
@@ -129,12 +129,12 @@ fn octrees_that_are_none_are_told() {
         (with(entry(3) + 16, &(1u64 << 60).to_le_bytes()), "do not fit in the file"),
         (with(entry(3) + 24, &word(10)), "do not fit in the file"),
         (with(entry(3) + 16, &28853u64.to_le_bytes()), "overlap in the file"),
-        // A page that is its own.
+        // A page that refers to itself.
         (
             with(entry(0) + 16, &[&(page as u64).to_le_bytes()[..], &word(2080), &word(-1)].concat()),
             "node 1-0-0-0 is twice",
         ),
-        // A point more here, and one less there.
+        // One point more in a node; in the next test another node has one less.
         (with(entry(3) + 28, &[&word(18)[..]].concat()), "its octree has 1066 points"),
     ] {
         assert!(message.contains(said), "{message}");
@@ -144,7 +144,7 @@ fn octrees_that_are_none_are_told() {
     swapped[entry(4) + 28..entry(4) + 32].copy_from_slice(&word(13));
     let message = refusal(&folder, &swapped);
     assert_eq!(message, "a node of its octree has 17 points, not the 18 that it promises");
-    // What is no longer there.
+    // A truncated file whose octree page is missing.
     assert!(refusal(&folder, &whole[..30_000]).contains("2080 bytes at byte 31604, does not fit in the file"));
 }
 
@@ -161,7 +161,8 @@ fn damaged_nodes_are_survived() {
             sentence(&error, &path);
         }
     };
-    // Each 32-bit word would be gigabytes of points, layers or records.
+    // Each 32-bit word in turn becomes a value that would mean gigabytes of points, layers or
+    // records.
     for at in (90..whole.len() - 4).step_by(151) {
         let mut bytes = whole.clone();
         bytes[at..at + 4].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
@@ -177,7 +178,7 @@ fn damaged_nodes_are_survived() {
     }
 }
 
-/// The file, some nodes of which have layers that do not fit in them.
+/// The file with layer sizes in some nodes that exceed their chunks.
 fn with_broken(nodes: &[usize]) -> Vec<u8> {
     let mut bytes = bytes();
     let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
@@ -201,8 +202,8 @@ fn with_broken(nodes: &[usize]) -> Vec<u8> {
     bytes
 }
 
-/// Broken nodes are left out and told, by nodes and as chunks of the whole file; the others are
-/// what they were.
+/// Broken nodes are left out and reported, whether the file is read by nodes or as a whole; the
+/// other nodes are unchanged.
 #[test]
 fn broken_nodes_are_left_out_and_the_rest_is_read() {
     let folder = Folder::new();
@@ -231,7 +232,7 @@ fn broken_nodes_are_left_out_and_the_rest_is_read() {
         }
         let strict = ReadOptions { strict: true, ..ReadOptions::default() };
         assert!(copc.read(&all, &strict, &()).is_err() && io::read_with(&path, strict, &()).is_err());
-        // Nothing is left where all nodes that are asked for are broken.
+        // If all requested nodes are broken, that is an error.
         sentence(&copc.read(&broken, &ReadOptions::default(), &()).unwrap_err(), &path);
     }
 }

@@ -11,7 +11,7 @@ use epsplat::low_level::scene::Colors;
 use epsplat::low_level::scene::color::srgb_to_linear;
 use std::io::Cursor;
 
-/// A scan: its attributes, its pose, its points.
+/// A scan: its attributes, pose and points.
 struct Scan {
     prototype: Vec<Record>,
     pose: Option<Transform>,
@@ -44,7 +44,7 @@ fn record(name: RecordName, data_type: RecordDataType) -> Record {
 
 const INVALID: RecordDataType = RecordDataType::Integer { min: 0, max: 2 };
 
-/// Points on a line, every third of them invalid, with 8-bit colours.
+/// Points on a line with 8-bit colours; every third point is invalid.
 fn cartesian(count: i64) -> Scan {
     let millimetres = RecordDataType::ScaledInteger { min: -1_000_000, max: 1_000_000, scale: 0.001, offset: 5e6 };
     let points = (0..count).map(|i| {
@@ -74,7 +74,7 @@ fn cartesian(count: i64) -> Scan {
     }
 }
 
-/// One point two metres ahead, on the axis that is azimuth 90 degrees, seen from a pose far away.
+/// A point two metres ahead on the axis at azimuth 90 degrees, with a distant pose.
 fn spherical() -> Scan {
     let intensity = RecordDataType::Single { min: None, max: None };
     Scan {
@@ -84,7 +84,7 @@ fn spherical() -> Scan {
             record(RecordName::SphericalElevation, RecordDataType::F64),
             record(RecordName::Intensity, intensity),
         ],
-        // A quarter turn around z.
+        // A quarter turn about z.
         pose: Some(Transform {
             rotation: Quaternion { w: 0.5f64.sqrt(), x: 0.0, y: 0.0, z: 0.5f64.sqrt() },
             translation: Translation { x: 4e5, y: 5e6, z: 100.0 },
@@ -109,7 +109,7 @@ fn every_kind_of_number_and_colours() {
     assert_eq!((points.up, points.normals), (Some(Up::Z), None));
     let codes = kept.iter().map(|&i| [i as u8, 20, 255, 255]).collect();
     assert_eq!(points.colors, Some(Colors::Srgb8(codes)));
-    // By its first bytes.
+    // Recognised by its first bytes.
     assert_eq!(folder.read("scan", &file(vec![cartesian(9)])).unwrap().positions.len(), 6);
 }
 
@@ -117,15 +117,15 @@ fn every_kind_of_number_and_colours() {
 fn scans_are_put_where_their_poses_say() {
     let folder = Folder::new();
     let points = folder.read("a.e57", &file(vec![spherical()])).unwrap();
-    // The scan's y is the file's -x.
+    // The scan's y axis becomes the file's -x axis.
     let (level, up) = (2.0 * 0.25f64.cos(), 2.0 * 0.25f64.sin());
     for (position, expected) in points.positions.iter().zip([[4e5 - 2.0, 5e6, 100.0], [4e5 - level, 5e6, 100.0 + up]]) {
         assert!((0..3).all(|axis| (position[axis] - expected[axis]).abs() < 1e-9), "{position:?}");
     }
     assert_eq!(points.colors, Some(Colors::Srgb8(vec![[128, 128, 128, 255], [255; 4]])));
 
-    // Without its pose the scan lies elsewhere; with another one the two are one file, and its
-    // intensities are beside the other's colours.
+    // Without its pose the scan is elsewhere. Two scans with different poses are read as one file,
+    // with colours of one and intensities of the other.
     let control = folder.read("a.e57", &file(vec![Scan { pose: None, ..spherical() }])).unwrap();
     assert!(control.positions[0][0].abs() < 1e-9 && control.positions[0][1] == 2.0);
     let both = folder.read("a.e57", &file(vec![spherical(), cartesian(2)])).unwrap();
@@ -134,7 +134,7 @@ fn scans_are_put_where_their_poses_say() {
     assert_eq!(codes, [[128, 128, 128, 255], [255; 4], [0, 20, 255, 255], [1, 20, 255, 255]]);
 }
 
-/// The scan, each of whose points has the normal.
+/// The scan with a normal at each point.
 fn with_normals(mut scan: Scan, normal: [f64; 3]) -> Scan {
     let of = |axis: &str| RecordName::Unknown { namespace: "nor".into(), name: format!("normal{axis}") };
     let share = RecordDataType::ScaledInteger { min: -1000, max: 1000, scale: 0.001, offset: 0.0 };
@@ -152,7 +152,8 @@ fn normals_are_turned_with_their_scan() {
     let tilted = |scan| with_normals(scan, [0.75, 0.5, -0.25]);
     let unturned = folder.read("a.e57", &file(vec![tilted(Scan { pose: None, ..spherical() })])).unwrap();
     assert_eq!(unturned.normals, Some(vec![[0.75, 0.5, -0.25]; 2]));
-    // By a quarter turn around z, not by the translation; of points without normals they are missing.
+    // Normals are rotated by a quarter turn about z, but not translated; points of the other scan
+    // have none.
     let both = folder.read("a.e57", &file(vec![tilted(spherical()), cartesian(3)])).unwrap();
     let normals = both.normals.unwrap();
     for turned in &normals[..2] {
@@ -160,7 +161,7 @@ fn normals_are_turned_with_their_scan() {
     }
     assert_eq!((&normals[2..], both.positions.len()), (&[[0.0; 3]; 2][..], 4));
     assert!(both.colors.is_some());
-    // Two of three are none.
+    // Two of the three components are not a normal.
     let mut scan = tilted(spherical());
     scan.prototype.pop();
     scan.points.iter_mut().for_each(|point| point.truncate(6));
@@ -172,7 +173,7 @@ fn scans_together_promise_no_more_than_the_file_holds() {
     let folder = Folder::new();
     let mut whole = file(vec![cartesian(2000), cartesian(2000)]);
     assert_eq!(folder.read("a.e57", &whole).unwrap().positions.len(), 2 * 1334);
-    // Each alone would find room.
+    // Each scan alone would fit in the file.
     let promise = b"recordCount=\"2000\"";
     for _ in 0..2 {
         let at = whole.windows(promise.len()).position(|window| window == promise).unwrap();
@@ -205,7 +206,7 @@ fn colours_of_other_ranges_become_linear() {
     let points = folder.read("a.e57", &file(vec![scan])).unwrap();
     let expected = [7.0, 5125.0, 65_535.0].map(|code| light(code / 65535.0));
     assert_eq!(colors(points)[..3], expected);
-    // Limits of the scan come before those of the type.
+    // Limits of the scan take precedence over those of the type.
     let mut scan = cartesian(2);
     let limit = |value| Some(RecordValue::Integer(value));
     scan.limits = Some(ColorLimits {
@@ -220,7 +221,7 @@ fn colours_of_other_ranges_become_linear() {
     assert_eq!(colors(points)[..3], [light(0.5), light(0.5), 1.0]);
 }
 
-/// The checksums of all pages, as they should be, so that what is inside is read.
+/// Rewrites the checksums of all pages, so that damaged content is read.
 fn seal(bytes: &mut [u8]) {
     for page in bytes.chunks_exact_mut(PAGE) {
         let (content, sum) = page.split_at_mut(CONTENT);
@@ -247,7 +248,7 @@ fn promises_are_held_against_the_file() {
     assert!(message.contains("9999 points") || message.contains("ends early"), "{message}");
     let message = replaced("<cartesianX ", "<cartesianW ");
     assert!(message.contains("cartesianW") || message.contains("no coordinates"), "{message}");
-    // Without the checksums being made right again.
+    // Here the checksums are not corrected.
     let mut torn = whole.clone();
     torn[2000] ^= 1;
     assert!(folder.refusal("a.e57", &torn).contains("checksum"));
@@ -279,7 +280,8 @@ fn cut_and_flipped_files_are_refused_or_read() {
     assert!((1..300).contains(&read), "{read} of 300 were read");
 }
 
-/// The points and the sentence of a file that is left out in parts; strictly read it is refused.
+/// Reads a file of which scans are left out; returns the points and the note. In strict mode it
+/// must be refused.
 fn left_out(folder: &Folder, bytes: &[u8]) -> (Points, String) {
     let points = folder.read("a.e57", bytes).unwrap();
     let [told] = &points.unread[..] else { panic!("{:?}", points.unread) };
@@ -290,7 +292,7 @@ fn left_out(folder: &Folder, bytes: &[u8]) -> (Points, String) {
     (points, told)
 }
 
-/// Points on a line, all of them valid.
+/// Valid points on a line.
 fn line(count: i64) -> Scan {
     let mut scan = cartesian(count);
     scan.points.iter_mut().for_each(|point| point[3] = RecordValue::Integer(0));
@@ -317,16 +319,16 @@ fn scans_without_points_are_left_out_and_told() {
         assert_eq!(points.positions.len(), 5, "{counts:?}");
         assert_eq!(told, format!("{named} (--strict refuses the file)"));
     }
-    // One that lies nowhere in the file, as some programs write it.
+    // A scan with an invalid file offset, as some programs write empty scans.
     let mut nowhere = file(vec![line(0), line(9)]);
     replaced(&mut nowhere, "fileOffset=\"48\"", "fileOffset=\"00\"");
     assert_eq!(left_out(&folder, &nowhere).0.positions.len(), 9);
-    // A file of such scans alone is a file without points, however many it has.
+    // A file that has only empty scans is a file without points.
     for count in [1, 2] {
         let empty = folder.read("a.e57", &file((0..count).map(|_| line(0)).collect())).unwrap();
         assert!(empty.positions.is_empty() && empty.unread.is_empty(), "{count} scans");
     }
-    // Control: nothing is told of scans that are whole.
+    // Control: no note for complete scans.
     assert!(folder.read("a.e57", &file(vec![line(3), line(4)])).unwrap().unread.is_empty());
 }
 
@@ -340,25 +342,25 @@ fn a_scan_that_cannot_be_read_is_left_out_whole_and_told() {
     let bent = || Scan { pose: pose(2.0), ..line(7) };
     let (points, told) = left_out(&folder, &file(vec![bent(), line(3)]));
     assert!(told.starts_with("1 of 2 scans left out, with 7 points: scan 1: the quaternion"), "{told}");
-    // The numbers of those that are read are those of the file.
+    // Point numbers are those of the whole file.
     assert_eq!((points.positions.len(), &points.left_out[..]), (3, &[0, 1, 2, 3, 4, 5, 6][..]));
     assert!(
         points
             .colors
             .is_some_and(|colors| colors == folder.read("b.e57", &file(vec![line(3)])).unwrap().colors.unwrap())
     );
-    // A page of the first scan is torn: what was read of it goes too.
+    // The first scan has a damaged page: its points that were already read are dropped too.
     let mut torn = file(vec![line(9000), line(50), line(2)]);
     torn[60_000] ^= 1;
     let (points, told) = left_out(&folder, &torn);
     assert_eq!((points.positions.len(), points.left_out.len()), (52, 9000), "{told}");
     assert!(told.contains("with 9000 points") && told.contains("checksum"), "{told}");
-    // More than the file holds.
+    // A scan that promises more points than the file holds.
     let mut promising = file(vec![line(2000), line(1000)]);
     replaced(&mut promising, "recordCount=\"1000\"", "recordCount=\"9999\"");
     let (points, told) = left_out(&folder, &promising);
     assert_eq!(points.positions.len(), 2000);
     assert!(told.contains("scan 2 'a room' promises 9999 points, the file holds "), "{told}");
-    // Where none can be read the first one's fault is that of the file.
+    // If no scan can be read, the error is that of the first.
     assert!(folder.refusal("a.e57", &file(vec![bent(), bent()])).contains("quaternion"));
 }

@@ -1,4 +1,5 @@
-//! Gaussians as programs write them: filters, rows of zeros, colours, packed and other formats.
+//! Gaussians as programs write them: with filters, rows of zeros, colours, compressed, and in other
+//! formats.
 
 use super::Folder;
 use super::ply::{ENCODINGS, file};
@@ -7,19 +8,19 @@ use epsplat::low_level::scene::Colors;
 use epsplat::low_level::scene::gaussian::EXTENT;
 use epsplat::low_level::surfels::build;
 
-/// The properties of a Gaussian of three axes, in the order of its values.
+/// The properties of a Gaussian with three axes, in the order of its values.
 const NAMES: [&str; 14] = [
     "x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2",
     "rot_3",
 ];
 
-/// A flat one of these standard deviations, of opacity 0.9.
+/// A Gaussian with these standard deviations and opacity 0.9.
 fn flat(x: f64, deviations: [f64; 3]) -> Vec<f64> {
     let [a, b, c] = deviations.map(f64::ln);
     vec![x, 0.5, -1.0, 0.3, -0.2, 1.1, 9f64.ln(), a, b, c, 1.0, 0.0, 0.0, 0.0]
 }
 
-/// A file of rows with these properties.
+/// A PLY file with these properties and rows.
 fn of(encoding: &str, properties: &[(&str, &str)], rows: &[Vec<f64>]) -> Vec<u8> {
     let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
     file(encoding, &[("vertex", properties, &rows)])
@@ -51,7 +52,7 @@ fn near(a: f64, b: f64) {
     assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
 }
 
-/// Mip-Splatting's filter widens each standard deviation and lowers the opacity by as much.
+/// Mip-Splatting's `filter_3D` widens each standard deviation and lowers the opacity accordingly.
 #[test]
 fn the_filter_of_mip_splatting_is_applied() {
     let folder = Folder::new();
@@ -68,7 +69,7 @@ fn the_filter_of_mip_splatting_is_applied() {
             let left: f64 = (0..3).map(|k| own[k] / wide[k]).product();
             near(colors(&points)[0][3].into(), 0.9 * left);
             near(colors(&points)[1][3].into(), 0.9);
-            // Two axes.
+            // Gaussians with two axes.
             let names: Vec<&str> = NAMES.into_iter().filter(|name| *name != "scale_2").collect();
             let properties: Vec<_> = floats(&names).into_iter().chain([(kind, "filter_3D")]).collect();
             let mut row = flat(1.0, own);
@@ -79,17 +80,18 @@ fn the_filter_of_mip_splatting_is_applied() {
             near(colors(&points)[0][3].into(), 0.9 * own[0] * own[1] / wide[0] / wide[1]);
         }
     }
-    // How thick they are is judged as they are drawn.
+    // Thickness is judged after the filter.
     let properties: Vec<_> = floats(&NAMES).into_iter().chain([("float", "filter_3D")]).collect();
     let said = folder.refusal("a.ply", &of("ascii", &properties, &[[flat(0.0, own), vec![0.05]].concat()]));
     assert!(said.contains("1 of its 1 Gaussians are ellipsoids"), "{said}");
-    // One without a filter that is a number is left out.
+    // A Gaussian whose filter is NaN is left out.
     let rows = [[flat(0.0, own), vec![f64::NAN]].concat(), [flat(0.0, own), vec![0.0]].concat()];
     let (_, preparation) = build(vec![folder.read("a.ply", &of("ascii", &properties, &rows)).unwrap()], &()).unwrap();
     assert_eq!((preparation.shapeless, preparation.surfels), (1, 1));
 }
 
-/// Postshot leaves rows of zeros: nothing is judged by them, wherever and however many they are.
+/// Postshot writes rows of zeros: wherever and however many they are, they do not affect any
+/// decision.
 #[test]
 fn rows_of_zeros_are_left_out_before_anything_is_judged() {
     let folder = Folder::new();
@@ -117,13 +119,13 @@ fn rows_of_zeros_are_left_out_before_anything_is_judged() {
     let nothing = folder.read("a.ply", &of("ascii", &floats(&NAMES), &zeros(4))).unwrap();
     assert_eq!(nothing.flattened, None);
     assert!(build(vec![nothing], &()).unwrap_err().to_string().contains("none of the 4 Gaussians"));
-    // Thick ones are counted among them.
+    // Thick Gaussians are counted among the others only.
     let rows = [zeros(100), good, vec![flat(0.0, [0.1, 0.1, 0.1])]].concat();
     let said = folder.refusal("a.ply", &of("ascii", &floats(&NAMES), &rows));
     assert!(said.contains("1 of its 31 Gaussians"), "{said}");
 }
 
-/// nerfstudio's `rgb` has codes of sRGB instead of harmonics; beside these they are not looked at.
+/// nerfstudio's `rgb` holds sRGB codes instead of harmonics; if there are harmonics, it is ignored.
 #[test]
 fn colours_beside_gaussians_are_codes_where_there_are_no_harmonics() {
     let folder = Folder::new();
@@ -146,14 +148,15 @@ fn colours_beside_gaussians_are_codes_where_there_are_no_harmonics() {
     let row = [flat(0.0, [0.1, 0.1, 0.001]), vec![9.0, 9.0, 9.0]].concat();
     let points = folder.read("a.ply", &of("ascii", &both, &[row])).unwrap();
     near(colors(&points)[0][0].into(), 0.5 + 0.282_094_79 * 0.3);
-    // Two of three are none.
+    // Two of three channels are not a colour.
     let two: Vec<_> = floats(&names).into_iter().chain(["red", "blue"].map(|name| ("uchar", name))).collect();
     let row = flat(0.0, [0.1, 0.1, 0.001]);
     let said = folder.refusal("a.ply", &of("ascii", &two, &[[&row[..3], &row[6..], &[1.0, 1.0]].concat()]));
     assert!(said.contains("no property f_dc_0"), "{said}");
 }
 
-/// The words of a Gaussian as SuperSplat packs it, of parts of its chunk's ranges.
+/// A Gaussian packed as by SuperSplat; position, scale and colour are fractions of its chunk's
+/// ranges.
 fn packed(place: [f64; 3], turn: [f64; 4], scale: [f64; 3], color: [f64; 4]) -> Vec<f64> {
     let length = turn.iter().map(|c| c * c).sum::<f64>().sqrt();
     let turn = turn.map(|c| c / length);
@@ -191,15 +194,15 @@ const RANGES: [&str; 18] = [
     "max_b",
 ];
 
-/// A chunk's ranges: positions `x` to `x + 2`, scales -4 to -3 (the last -9 to -8), colours -0.5 to
-/// 1.5.
+/// The ranges of a chunk: positions from `x` to `x + 2`, scales -4 to -3 (the last -9 to -8),
+/// colours -0.5 to 1.5.
 fn chunk(x: f64) -> Vec<f64> {
     let places = [x, -1.0, 10.0, x + 2.0, 1.0, 10.0];
     let scales = [-4.0, -4.0, -9.0, -3.0, -3.0, -8.0];
     [&places[..], &scales, &[-0.5; 3], &[1.5; 3]].concat()
 }
 
-/// A compressed file, with as many harmonics a Gaussian.
+/// A compressed file with `rest` as the higher harmonics.
 fn compressed(encoding: &str, chunks: &[Vec<f64>], rows: &[Vec<f64>], rest: &[Vec<f64>]) -> Vec<u8> {
     fn each(rows: &[Vec<f64>]) -> Vec<&[f64]> {
         rows.iter().map(Vec::as_slice).collect()
@@ -215,7 +218,7 @@ fn compressed(encoding: &str, chunks: &[Vec<f64>], rows: &[Vec<f64>], rest: &[Ve
     file(encoding, &elements)
 }
 
-/// Packed values are unpacked to what they were, up to the steps of their bits.
+/// Packed values are unpacked to the originals, within their quantisation steps.
 #[test]
 fn packed_gaussians_are_read() {
     let folder = Folder::new();
@@ -251,7 +254,7 @@ fn packed_gaussians_are_read() {
             let [s, t] = axes[k].map(length);
             assert!((s / (EXTENT * (part - 4.0).exp()) - 1.0).abs() < 6e-4, "{k}: {s}");
             near(t, EXTENT * (-3f64).exp());
-            // The axes that the quaternion turns x and y to.
+            // The directions to which the quaternion turns x and y.
             let [w, i, j, l] = turns[k % 4].map(|c| c / turns[k % 4].iter().map(|c| c * c).sum::<f64>().sqrt());
             let along = [1.0 - 2.0 * (j * j + l * l), 2.0 * (i * j + l * w), 2.0 * (i * l - j * w)];
             for (c, axis) in along.into_iter().zip(axes[k][0]) {
@@ -261,7 +264,7 @@ fn packed_gaussians_are_read() {
         if let Some(Colors::Harmonics(harmonics)) = &points.colors {
             assert_eq!((harmonics.degree(), rest.is_empty()), (1, false));
             for k in [0usize, 1, 130, 299] {
-                // Channel by channel there, term by term here.
+                // The file stores harmonics channel by channel, the scene term by term.
                 for (n, term) in harmonics.terms(k).iter().enumerate() {
                     let byte = rest[k][n % 3 * 3 + n / 3];
                     let part = if byte == 255.0 {
@@ -282,7 +285,7 @@ fn packed_gaussians_are_read() {
     assert!(empty.positions.is_empty());
 }
 
-/// Packed files that lack something are refused by a sentence.
+/// Compressed files that lack an element are refused in one sentence.
 #[test]
 fn damaged_packed_files_are_refused() {
     let folder = Folder::new();
@@ -311,7 +314,7 @@ fn damaged_packed_files_are_refused() {
     }
 }
 
-/// Other formats of Gaussians are named for what they are.
+/// Other formats of Gaussians are refused with their name.
 #[test]
 fn other_formats_of_gaussians_are_named() {
     let folder = Folder::new();
@@ -327,7 +330,7 @@ fn other_formats_of_gaussians_are_named() {
         let said = folder.refusal(name, bytes);
         assert!(said.starts_with(&format!("it is {what}, which is not read")) && said.contains("PLY"), "{said}");
     }
-    // A PLY file is read by whatever name.
+    // A PLY file is read whatever its file name.
     let row = flat(0.0, [0.1, 0.1, 0.001]);
     assert_eq!(folder.read("ply.splat", &of("ascii", &floats(&NAMES), &[row])).unwrap().positions.len(), 1);
 }

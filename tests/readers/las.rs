@@ -1,4 +1,4 @@
-//! LAS and LAZ files that must be read.
+//! Valid LAS and LAZ files.
 
 use super::las_forms::{laszip_record, of_las_1_5, pointwise};
 use super::{Folder, data};
@@ -53,7 +53,7 @@ fn assert_positions(positions: &[[f64; 3]], numbers: impl ExactSizeIterator<Item
     }
 }
 
-/// Every version and point format, compressed or not, that the tests write.
+/// The tested versions and point formats, compressed or not: (minor, format, compressed).
 pub const KINDS: [(u8, u8, bool); 16] = [
     (2, 0, false),
     (2, 1, false),
@@ -149,7 +149,7 @@ fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
             is_withheld: i % 2 == 1,
             is_synthetic: i % 3 == 0,
             is_key_point: i % 5 == 0,
-            // In the formats before 6 this is class 12.
+            // In point formats below 6, overlap is class 12.
             is_overlap: i % 7 == 0,
             ..point(i, Some([i as u16, 0, 255]))
         });
@@ -173,7 +173,8 @@ fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
     assert!(preparation.notes()[0].starts_with("895 points were left out: they are marked as withheld"));
 }
 
-/// Every format keeps classes in its own place; those of opacity 0 are left out, beside what is deleted.
+/// Each point format stores classes differently. Points of classes with opacity 0 are left out,
+/// besides withheld points.
 #[test]
 fn classes_have_opacities() {
     let folder = Folder::new();
@@ -187,7 +188,7 @@ fn classes_have_opacities() {
         });
         folder.read("a.las", &file(minor, format, compressed, points)).unwrap();
         let points = io::read_with(&folder.path("a.las"), rules, &()).unwrap();
-        // Of twenty points of class 5 ten are deleted.
+        // Ten of twenty points of class 5 are withheld.
         assert_eq!((points.positions.len(), points.withheld, points.unseen), (80, 10, 10), "{format}");
         let counts = [(1, 20), (2, 20), (3, 20), (5, 10), (30, 20)];
         assert_eq!(points.classes.iter().map(|(class, count)| (*class, *count)).collect::<Vec<_>>(), counts);
@@ -216,7 +217,7 @@ fn classes_have_opacities() {
     );
 }
 
-/// Ten points, and 895 that are deleted.
+/// Ten points, and 895 withheld ones.
 fn whole_and_deleted() -> Vec<u8> {
     file(2, 1, false, (0..905).map(|i| Point { is_withheld: i >= 10, ..point(i, None) }))
 }
@@ -230,7 +231,7 @@ fn points_without_chunks_are_read_whatever_the_size_of_chunks() {
         for chunk_size in [0, u32::MAX, 50_000, 10] {
             assert_eq!(folder.read("a.laz", &pointwise(&bytes, chunk_size)).unwrap(), chunked, "{format} {chunk_size}");
         }
-        // Without one whole point there is nothing that could be read.
+        // If not even the first point is complete, nothing is read.
         let pointwise = pointwise(&bytes, 0);
         let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
         let message = folder.refusal("a.laz", &pointwise[..start + 5]);

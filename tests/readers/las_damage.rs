@@ -1,11 +1,11 @@
-//! LAS and LAZ files that cannot be read.
+//! Damaged LAS and LAZ files.
 
 use super::las::{KINDS, file, point};
 use super::las_forms::{pointwise, with_another_record};
 use super::{Folder, Random, data, sentence};
 use epsplat::io::{self, ReadOptions};
 
-/// Where a header has the number of its points: the legacy field, and that of LAS 1.4.
+/// Offsets of the legacy point count and of that of LAS 1.4 in the header.
 const COUNT: usize = 107;
 const LARGE_COUNT: usize = 247;
 
@@ -19,7 +19,7 @@ fn promises_of_the_header_are_held_against_the_file() {
     for kind in KINDS {
         for count in [61u32, 100_000, u32::MAX] {
             let mut bytes = sample(kind);
-            // For the formats of LAS 1.4 the count of older versions is none.
+            // Point formats of LAS 1.4 have no legacy count.
             if kind.1 < 6 {
                 bytes[COUNT..COUNT + 4].copy_from_slice(&count.to_le_bytes());
             } else {
@@ -65,8 +65,8 @@ fn a_survey_cut_short_is_refused() {
     assert_eq!(message, "the header promises 110000 points, but the file ends at byte 300000, before its chunk table");
 }
 
-/// A count of 2^60 in a file of a kilobyte, and one that might be true: points are taken as long as there are bytes, and no room is
-/// made for what is promised.
+/// A count of 2^60 in a file of a kilobyte, and a plausible one: no memory is allocated for
+/// promised points, and reading stops at the end of the data.
 #[test]
 fn promises_of_files_without_chunks_are_not_allocated() {
     let folder = Folder::new();
@@ -81,7 +81,7 @@ fn promises_of_files_without_chunks_are_not_allocated() {
     assert!(message.starts_with("the header promises 100000 points, but decoding fails after 0"), "{message}");
 }
 
-/// A cut file holds fewer points, unless it ends in bytes that tell nothing.
+/// A truncated file is refused, unless only trailing bytes that decode to nothing are missing.
 #[test]
 fn a_file_without_chunks_that_is_cut_is_refused() {
     let folder = Folder::new();
@@ -125,7 +125,8 @@ fn flipped_bytes_never_panic() {
 #[test]
 fn lengths_in_damaged_files_are_not_allocated() {
     let folder = Folder::new();
-    // Each 32-bit word of a compressed file in turn, set to what would be gigabytes of points, layers, chunks or records.
+    // Each 32-bit word of a compressed file in turn becomes a value that would mean gigabytes of
+    // points, layers, chunks or records.
     let copc = std::fs::read(data("simple.copc.laz")).unwrap();
     for sample in [sample((2, 3, true)), sample((4, 7, true)), pointwise(&sample((4, 3, true)), 0), copc] {
         for at in (90..sample.len() - 4).step_by(if sample.len() > 10_000 { 97 } else { 2 }) {
@@ -145,32 +146,36 @@ fn lengths_in_damaged_files_are_not_allocated() {
     }
 }
 
-/// Eighteen bytes of GPS times in which the decoder calls itself some hundred thousand times (found by fuzzing): it once
-/// ran out of stack, which no error handling survives.
+/// Eighteen bytes of GPS times make the decoder recurse some hundred thousand times (found by
+/// fuzzing).
+///
+/// It once overflowed the stack, which no error handling survives.
 #[test]
 fn a_deep_recursion_of_the_decoder_is_survived() {
     let message = Folder::new().refusal("deep.laz", include_bytes!("deep_gps_time.laz"));
     assert!(message.contains("decoding fails after 0"), "{message}");
 }
 
-/// Items in layers, in a file that says it has no chunks of layers (found by fuzzing): the decoder took a layer of 3 GB
-/// for true.
+/// Layered items in a file whose header denies layered chunks (found by fuzzing): the decoder once
+/// trusted a layer size of 3 GB.
 #[test]
 fn layers_outside_chunks_of_layers_are_refused() {
     let message = Folder::new().refusal("layers.laz", include_bytes!("layers_outside_chunks.laz"));
     assert_eq!(message, "its LASzip record does not describe its points");
 }
 
-/// The record that is checked is the one that the decoder takes: it once took another, which has no items, and panicked.
+/// The LASzip record that is checked must be the one that the decoder uses. It once used another
+/// one without items, and panicked.
 #[test]
 fn a_record_after_one_of_nearly_its_name_is_checked() {
     let message = Folder::new().refusal("a.laz", &with_another_record(&sample((2, 3, true))));
     assert_eq!(message, "its LASzip record does not describe its points");
 }
 
-/// In a file whose points are compressed one after the other, three chunks of 50,000 and fewer,
-/// damage to one chunk costs at most that one: it may be decoded to other points, too, as such
-/// chunks have no checksum.
+/// In a file of three chunks of at most 50,000 points compressed one by one, damage to a chunk
+/// loses at most that chunk.
+///
+/// Such chunks have no checksum, so a damaged one may also be decoded to other points.
 #[test]
 fn a_chunk_that_cannot_be_decoded_is_left_out_and_told() {
     let folder = Folder::new();
@@ -193,7 +198,7 @@ fn a_chunk_that_cannot_be_decoded_is_left_out_and_told() {
         if let [told] = &read.unread[..] {
             assert!(told.contains(" of 3 chunks left out") && told.contains(&format!("with {lost} points")), "{told}");
             told_of += 1;
-            // The first chunk, where it was spared, is what it was.
+            // The first chunk is unchanged if it was not damaged.
             let numbers = read.numbers.as_ref().unwrap();
             let same = |(number, at): (&u32, &[f64; 3])| points.positions[*number as usize] == *at;
             let first = numbers.iter().zip(&read.positions).take_while(|(number, _)| **number < 50_000);

@@ -1,18 +1,18 @@
-//! What the headers of LAS files say of them, and where their fields disagree.
+//! Statements in the headers of LAS files, and fields that contradict each other.
 
 use super::las::{file, point};
 use super::{Folder, data};
 use epsplat::io::{self, Points};
 use las::Point;
 
-/// Where a header has these fields.
+/// Offsets of fields in the header.
 const VERSION: usize = 25;
 const LEGACY_COUNT: usize = 107;
 const SCALE: usize = 131;
 const MAX: usize = 179;
 const COUNT: usize = 247;
 
-/// Points whose heights differ from their other coordinates.
+/// Points whose z differs from x and y.
 fn points(count: u32) -> impl Iterator<Item = Point> {
     (0..count).map(|i| point(i, Some([i as u16 % 256, 2, 3])))
 }
@@ -44,7 +44,7 @@ fn the_count_of_64_bits_is_that_of_extended_formats() {
             }
         }
     }
-    // Formats that older programs know have both.
+    // Point formats of older versions have both counts.
     let whole = file(4, 3, false, points(3000));
     let read = folder.read("a.las", &patched(whole.clone(), COUNT, &7u64.to_le_bytes())).unwrap();
     assert_eq!(read.positions.len(), 3000);
@@ -71,20 +71,20 @@ fn fields_that_disagree_are_told() {
     let whole = || file(2, 3, false, points(500));
     let told = |bytes: Vec<u8>| notes(&folder.read("a.las", &bytes).unwrap());
     assert_eq!(told(whole()), "");
-    // A version without the point format.
+    // A version older than the point format.
     assert!(told(patched(whole(), VERSION, &[1])).contains("LAS 1.1, and point format 3, which LAS 1.2 introduced"));
-    // Fewer points than there are, and fewer than of all returns.
+    // Fewer points than the file has, or than all returns together.
     let fewer = patched(whole(), LEGACY_COUNT, &400u32.to_le_bytes());
     assert!(told(fewer.clone()).contains("its header says 400 points, and 500 points over all returns"));
     let no_returns = patched(fewer, LEGACY_COUNT + 4, &[0; 20]);
     assert!(told(no_returns).contains("its header says 400 points, and the file has bytes for 500"));
-    // A box that the points leave, and one that is none.
+    // A bounding box that does not contain all points, and an inverted one.
     let narrow = patched(whole(), MAX, &500_001.0f64.to_le_bytes());
     let said = told(narrow);
     assert!(said.contains("of 500 points lie outside of the box in its header"), "{said}");
     let reversed = patched(whole(), MAX, &499_999.0f64.to_le_bytes());
     assert!(told(reversed).contains("the box in its header is upside down"));
-    // Records that do not fit before the points.
+    // Records that overlap the points.
     let mut records = whole();
     records[100..104].copy_from_slice(&1u32.to_le_bytes());
     let said = folder.read("a.las", &records).map(|points| notes(&points)).unwrap_or_else(|error| error.to_string());
@@ -123,7 +123,7 @@ fn degrees_with_heights_in_metres_are_told() {
         "{}",
         notes(&read)
     );
-    // The same in metres is no matter.
+    // Control: coordinates in metres give no note.
     let metres = text.lines().enumerate().map(|(line, text)| {
         let numbers: Vec<f64> = text.split(' ').filter_map(|word| word.parse().ok()).collect();
         match numbers[..] {
@@ -146,11 +146,11 @@ fn degrees_with_heights_in_metres_are_told() {
     assert!(said.contains("degrees of longitude and latitude"), "{said}");
 }
 
-/// Normals are among the bytes that PDAL and CloudCompare add to points, of any type.
+/// Normals are read from the extra bytes that PDAL and CloudCompare write, of any type.
 #[test]
 fn normals_are_read_from_extra_bytes() {
     let folder = Folder::new();
-    // Type 9 is f32, type 4 is i16 with a scale.
+    // Type 9 is f32; type 4 is i16 with a scale.
     for (format, compressed, kind) in [(2, false, 9u8), (7, true, 9), (7, true, 4), (3, true, 4)] {
         let mut data = Vec::new();
         for name in ["Amplitude", "NormalX", "NormalY", "NormalZ"] {

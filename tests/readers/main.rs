@@ -1,4 +1,4 @@
-//! The readers on files of every kind they promise to read, and on damaged ones.
+//! The readers on valid files of every supported kind, and on damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod copc;
@@ -30,35 +30,35 @@ use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use tempfile::TempDir;
 
-/// A folder with one file to read.
+/// A temporary folder for files to be read.
 pub(crate) struct Folder(TempDir);
 
 impl Folder {
-    /// An empty one.
+    /// Creates an empty folder.
     pub fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// Where a file in it is.
+    /// Path of a file in the folder.
     pub fn path(&self, name: &str) -> std::path::PathBuf {
         self.0.path().join(name)
     }
 
-    /// Reads `bytes` as a file called `name`.
+    /// Writes `bytes` to a file called `name` and reads it.
     pub fn read(&self, name: &str, bytes: &[u8]) -> Result<Points, Error> {
         let path = self.path(name);
         std::fs::write(&path, bytes).unwrap();
         io::read(&path, &())
     }
 
-    /// The message about `bytes`, which must be one sentence about this file.
+    /// Returns the error for `bytes`, which must be one sentence that names the file.
     pub fn refusal(&self, name: &str, bytes: &[u8]) -> String {
         let Err(error) = self.read(name, bytes) else { panic!("{name} was read") };
         sentence(&error, &self.path(name))
     }
 }
 
-/// Checks that an error is one line about `path`, and returns what it says after the path.
+/// Checks that an error is one line about `path`, and returns the text after the path.
 pub fn sentence(error: &Error, path: &Path) -> String {
     let message = error.to_string();
     let prefix = format!("{}: ", path.display());
@@ -67,7 +67,7 @@ pub fn sentence(error: &Error, path: &Path) -> String {
     message.strip_prefix(&prefix).unwrap_or_else(|| panic!("{message}")).to_owned()
 }
 
-/// Counts what it is told.
+/// Counts the progress messages.
 #[derive(Default)]
 struct Count {
     announced: AtomicU64,
@@ -89,7 +89,7 @@ impl Progress for Count {
     }
 }
 
-/// A file that lies in `data/`.
+/// Path of a file in `data/`.
 pub fn data(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)
 }
@@ -137,7 +137,7 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
     }
     let obj = ReadOptions { format: Some(Format::Obj), ..ReadOptions::default() };
     assert_eq!(io::read_with(&folder.path("a.xyz"), obj, &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
-    // What is said goes before the name.
+    // An explicit format takes precedence over the file name.
     folder.read("a.laz", &laz).unwrap();
     assert!(io::read_with(&folder.path("a.laz"), ReadOptions { format: Some(Format::Ply), ..obj }, &()).is_err());
     for start in [&b"# .PCD v.7"[..], b"#.pcd v0.7", b"VERSION .7", b"fields x y z", b"\xef\xbb\xbf# .PCD"] {
@@ -160,7 +160,7 @@ fn missing_files_and_directories_cannot_be_read() {
     }
 }
 
-/// The formats whose readers are left out of a build say which feature holds them.
+/// A format that was not compiled in is refused with the name of its feature.
 #[cfg(not(all(feature = "e57", feature = "pcd")))]
 #[test]
 fn readers_that_were_left_out_are_named() {

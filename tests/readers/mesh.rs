@@ -1,4 +1,4 @@
-//! Meshes: faces of PLY files, materials and textures of OBJ files.
+//! Meshes: faces of PLY files, and materials and textures of OBJ files.
 
 use super::ply::{ENCODINGS, file};
 use super::{Folder, sentence};
@@ -7,7 +7,7 @@ use epsplat::low_level::scene::Colors;
 
 const XYZ: [(&str, &str); 3] = [("float", "x"), ("float", "y"), ("float", "z")];
 
-/// The unit square, and a point above it.
+/// The corners of the unit square, and a point above it.
 const CORNERS: [&[f64]; 5] = [&[0.0, 0.0, 0.0], &[1.0, 0.0, 0.0], &[1.0, 1.0, 0.0], &[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0]];
 
 fn read(folder: &Folder, name: &str, bytes: &[u8]) -> Mesh {
@@ -26,7 +26,8 @@ fn polygons_and_strips_are_triangles_in_every_encoding() {
                 &[0.5, 3.0, 0.0, 1.0, 4.0, 0.0],
                 &[0.5, 2.0, 0.0, 1.0, 0.0],
             ];
-            // A strip of a square, one vertex twice as strips turn corners, and another after a restart.
+            // A strip of a square that repeats a vertex, as strips do at corners, and a second
+            // strip after a restart.
             let strips: [&[f64]; 1] = [&[9.0, 0.0, 1.0, 3.0, 2.0, 2.0, -1.0, 0.0, 1.0, 4.0]];
             let strip = [("list int int", "vertex_indices")];
             let elements =
@@ -35,11 +36,11 @@ fn polygons_and_strips_are_triangles_in_every_encoding() {
             let expected = [[0, 1, 2], [0, 2, 3], [0, 1, 4], [0, 1, 3], [3, 1, 2], [0, 1, 4]];
             assert_eq!(mesh.triangles, expected, "{encoding}");
             assert_eq!((mesh.positions.len(), &mesh.normals, &mesh.texture), (5, &None, &None));
-            // Faces may come first too.
+            // Faces may also precede vertices.
             let turned = [elements[1], elements[0]];
             assert_eq!(read(&folder, "a.ply", &file(encoding, &turned)).triangles, expected[..3]);
 
-            // As points the vertices have what an OBJ file's would have.
+            // Read as points, the file equals an OBJ file with the same faces.
             let points = io::read(&folder.path("a.ply"), &()).unwrap();
             let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\nf 1 2 5\n";
             let same = folder.read("a.obj", text.as_bytes()).unwrap();
@@ -119,8 +120,8 @@ fn materials_textures_and_what_of_them_is_missing() {
         mesh.notes
     );
 
-    // A face without coordinates has none, and all others have theirs. The points of the file are
-    // what they were.
+    // A face without texture coordinates does not affect those of the others. The number of points
+    // is unchanged.
     let partly = read(&folder, "a.obj", format!("{text}f 1 2/1 3/2\n").as_bytes());
     assert_eq!(partly.texture.as_ref().unwrap()[..7], mesh.texture.as_ref().unwrap()[..]);
     assert!(partly.texture.as_ref().unwrap()[7].as_flattened().iter().all(|turns| turns.is_nan()));
@@ -136,7 +137,7 @@ fn materials_textures_and_what_of_them_is_missing() {
     assert!(colored.material.is_none() && colored.notes.is_empty());
 }
 
-/// An arrow, concave at its fourth corner, which a fan from its first leaves.
+/// A concave arrow: a fan from its first corner would leave the polygon.
 #[test]
 fn concave_polygons_hold_their_triangles() {
     let folder = Folder::new();
@@ -154,7 +155,7 @@ fn concave_polygons_hold_their_triangles() {
         let double_area = |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let areas: Vec<f64> =
             mesh.triangles.iter().map(|t| double_area(t.map(|vertex| mesh.positions[vertex as usize]))).collect();
-        // Of a fan one triangle is turned round.
+        // A fan would have one triangle of the opposite orientation.
         assert!(areas.len() == 3 && areas.iter().all(|&area| area > 0.0), "{areas:?}");
         assert!((areas.iter().sum::<f64>() - 4.6).abs() < 1e-6);
         for (triangle, corners) in mesh.triangles.iter().zip(mesh.texture.as_ref().unwrap()) {
@@ -185,12 +186,12 @@ fn libraries_of_other_writers() {
         let [r, g, b, _] = material(painted).texture.as_ref().unwrap().at(0.1, 0.5);
         assert!(r > 0.9 && g + b == 0.0, "{painted}: {r} {g} {b}");
     }
-    // A name with a space that no file has is one name.
+    // A name with spaces that no file has is reported as a single name.
     let mesh = read(&folder, "a.obj", text("first of all.mtl").as_bytes());
     assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("first of all.mtl"), "{:?}", mesh.notes);
 }
 
-/// A picture of two columns, red and blue.
+/// An image of two columns, red and blue.
 fn picture(format: image::ImageFormat) -> Vec<u8> {
     let column = |x: u32| if x < 8 { image::Rgb([250u8, 0, 0]) } else { image::Rgb([0, 0, 250]) };
     let mut bytes = std::io::Cursor::new(Vec::new());
@@ -204,7 +205,7 @@ fn textures_are_of_several_formats_whatever_they_are_called() {
     let path = folder.path("texture.png");
     use image::ImageFormat::{Bmp, Jpeg, Png, Tga};
     for (format, close) in [(Png, 0.0), (Jpeg, 0.05), (Bmp, 0.0), (Tga, 0.0)] {
-        // Nothing in a TGA file says what it is.
+        // A TGA file has no signature, so its name must tell the format.
         let path = if format == Tga { folder.path("texture.TGA") } else { path.clone() };
         std::fs::write(&path, picture(format)).unwrap();
         let texture = io::Texture::read(&path).unwrap();
@@ -213,7 +214,7 @@ fn textures_are_of_several_formats_whatever_they_are_called() {
             assert!((0..3).all(|k| (color[k] - expected[k]).abs() <= close + 1e-3), "{format:?} {u}: {color:?}");
         }
     }
-    // A picture cut short, and what is none.
+    // Truncated images, and bytes that are not an image.
     let jpeg = picture(Jpeg);
     for bytes in [&jpeg[..jpeg.len() / 3], &jpeg[..10], b"GIF89a", b""] {
         std::fs::write(&path, bytes).unwrap();
@@ -232,7 +233,7 @@ fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
     let (square, square_uv) = (corners(&[0.0, 1.0, 2.0, 3.0]), corners(&uv));
     let (triangle, triangle_uv) = (corners(&[0.0, 1.0, 4.0]), corners(&uv[2..]));
     for encoding in ENCODINGS {
-        // In either order, with the number of the texture between.
+        // In either order, with the texture number between.
         for turned in [false, true] {
             let row = |first: &[f64], second: &[f64], number: f64| match turned {
                 false => [first, &[number], second].concat(),
@@ -256,10 +257,10 @@ fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
             mesh.check().unwrap();
             assert!(mesh.materials[0].texture.is_some() && mesh.materials[1].texture.is_none());
             assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("none.png"), "{:?}", mesh.notes);
-            // As points, coordinates of faces are nobody's.
+            // Read as points, texture coordinates of faces are ignored.
             assert_eq!(io::read(&folder.path("a.ply"), &()).unwrap().texture, None);
 
-            // One face without coordinates leaves the mesh without.
+            // If one face has no texture coordinates, the mesh has none.
             let bare = row(&triangle, &[0.0], 0.0);
             let elements = [("vertex", &XYZ[..], &CORNERS[..]), ("face", &names[..], &[faces[0], &bare])];
             let mesh = read(&folder, "a.ply", &[&comments[..], &file(encoding, &elements)[4..]].concat());
@@ -268,7 +269,7 @@ fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
     }
 }
 
-/// Each of as many materials as a part of a building has, in a time that grows with their number.
+/// Reads 40,000 materials, as models of buildings have, in time linear in their number.
 #[test]
 fn many_materials_are_read_at_once() {
     let folder = Folder::new();
@@ -296,11 +297,11 @@ fn many_materials_are_read_at_once() {
     assert_eq!((paint.textures.len(), paint.numbers.len()), (1, 2 * count as usize));
 }
 
-/// Copies and links of one file are decoded once; others together have a limit.
+/// Links to one file and copies are decoded once; distinct images share a limit.
 #[test]
 fn images_of_a_mesh_have_a_limit() {
     let folder = Folder::new();
-    // Black, of few bytes.
+    // A black image, which compresses well.
     let image = |name: &str, width: u32, height: u32| {
         image::GrayImage::new(width, height).save(folder.path(name)).unwrap();
     };
@@ -324,12 +325,12 @@ fn images_of_a_mesh_have_a_limit() {
     let error = mesh(5..7).unwrap_err();
     let said = sentence(&error, &folder.path("6.png"));
     assert!(said.contains("images of one mesh have 268451840 pixels, more than the limit of 268435456"), "{said}");
-    // Points do without.
+    // Read as points, the file does not need the image.
     let points = io::read(&folder.path("a.obj"), &()).unwrap();
     assert!(points.notes[0].contains("images of its materials are left out") && points.faces.unwrap().paint.is_some());
 }
 
-/// A stranger's file may name what has no end.
+/// Files may name devices and pipes without an end.
 #[cfg(unix)]
 #[test]
 fn libraries_and_images_are_files() {

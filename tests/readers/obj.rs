@@ -23,7 +23,7 @@ fn vertices_keep_their_number_whatever_uses_them() {
     let (normals, radii) = (points.normals.unwrap(), points.radii.unwrap());
     assert_eq!((normals[3], radii[3]), ([0.0; 3], 0.0));
     assert!(close(normals[1], [0.0, 0.0, 1.0]) && close(normals[2], [0.0, 0.0, 1.0]));
-    // Half the diagonal of the unit square, and a tenth more.
+    // Half the diagonal of the unit square, times 1.1.
     assert!((radii[1] - 1.1 * 0.5f32.sqrt()).abs() < 1e-6);
 }
 
@@ -32,7 +32,7 @@ fn normals_are_weighted_by_area_or_the_files_own() {
     let folder = Folder::new();
     let faces = "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 1\n";
     let computed = folder.read("a.obj", format!("{faces}f 1 2 3\nf 1 3 4\n").as_bytes()).unwrap().normals.unwrap();
-    // Twice the areas: (0, 0, 2) and (1, 0, 0).
+    // Cross products (twice the areas): (0, 0, 2) and (1, 0, 0).
     let length = 5f32.sqrt();
     assert!(close(computed[0], [1.0 / length, 0.0, 2.0 / length]), "{computed:?}");
     assert!(close(computed[1], [0.0, 0.0, 1.0]) && close(computed[3], [1.0, 0.0, 0.0]));
@@ -42,13 +42,13 @@ fn normals_are_weighted_by_area_or_the_files_own() {
     let half = 0.5f32.sqrt();
     assert!(close(own[0], [half, 0.0, half]) && close(own[3], [1.0, 0.0, 0.0]), "{own:?}");
 
-    // One corner without: none can be relied on.
+    // If one corner has no normal, all normals are computed.
     let partly = format!("{faces}vn 0 0 3\nvn 4 0 0\nf 1//1 2//1 3\nf 1//2 3//2 4//2\n");
     assert_eq!(folder.read("a.obj", partly.as_bytes()).unwrap().normals.unwrap(), computed);
-    // Normals that the file has none of are not missed, whatever their numbers; neither are texture coordinates.
+    // Indices of normals and texture coordinates are ignored if the file has none of these.
     let without = format!("{faces}f 1/1/1 2/2/1 3/9/1\nf 1/1/-7 3//2 4/1/2\n");
     assert_eq!(folder.read("a.obj", without.as_bytes()).unwrap().normals.unwrap(), computed);
-    // A face may come before what it names.
+    // A face may precede its vertices.
     let early = format!("f 1 2 3\nf 1 3 4\n{faces}");
     assert_eq!(folder.read("a.obj", early.as_bytes()).unwrap().normals.unwrap(), computed);
 }
@@ -91,11 +91,11 @@ fn colours_may_be_codes_of_eight_bits() {
     let coded = colors("v 1 2 3 0 128 255\nv 1 2 3\nv 1 2 3 1 1 1 0.5\n");
     assert_eq!(coded, [[0.0, light(128.0), 1.0, 1.0], DEFAULT_COLOR, [light(1.0), light(1.0), light(1.0), 0.5]]);
     assert_eq!(colors("v 1 2 3 0 2 0 255\n"), [[0.0, light(2.0), 0.0, 1.0]]);
-    // A little more than the whole is no code.
+    // Values slightly above 1 do not make colours 8-bit codes.
     assert_eq!(colors("v 1 2 3 1 1.5 0\n"), [[1.0, srgb_to_linear(1.5) as f32, 0.0, 1.0]]);
 }
 
-/// ZBrush's colours of vertices, in comments.
+/// ZBrush stores vertex colours in comments.
 #[test]
 fn polypaint_gives_colours() {
     let folder = Folder::new();
@@ -103,15 +103,15 @@ fn polypaint_gives_colours() {
     let read = |text: &str| folder.read("a.obj", text.as_bytes()).unwrap().colors;
     let codes = |all: &[[u8; 4]]| Some(Colors::Srgb8(all.to_vec()));
     let [red, mixed, grey] = [[255, 0, 0, 255], [1, 35, 171, 255], [218, 218, 218, 255]];
-    // On lines of any length; the mask of a vertex is not its alpha.
+    // Lines may have any length; the mask of a vertex is not its alpha.
     let block = "#MRGB \n# The following MRGB block contains ZBrush Vertex Color\n#MRGB ffff000000ff0000\n#MRGB FF0123ABff0123ab\n# End of MRGB block\n";
     assert_eq!(read(&format!("{vertices}{block}f 1 2 3\n")), codes(&[red, red, mixed, mixed]));
-    // Too few, too many, and what is none.
+    // Too few colours, too many, and invalid ones.
     assert_eq!(read(&format!("{vertices}#MRGB ffff0000\n")), codes(&[red, grey, grey, grey]));
     assert_eq!(read(&format!("{vertices}#MRGB {}\n", "ffff0000".repeat(6))), codes(&[red; 4]));
     assert_eq!(read(&format!("{vertices}#MRGB ffff0000xyzxyzxyffff0000ff\n")), codes(&[red, grey, grey, grey]));
     assert_eq!(read(&format!("{vertices}#MRGB\n")), None);
-    // A vertex's own come first.
+    // Colours on the vertex lines take precedence.
     let own = read("v 0 0 0 0 0 1\n#MRGB ffff0000\n");
     assert_eq!(own, Some(Colors::Linear(vec![[0.0, 0.0, 1.0, 1.0]])));
 }
@@ -123,7 +123,7 @@ fn a_byte_order_mark_is_no_part_of_the_first_vertex() {
     let plain = folder.read("a.obj", text.as_bytes()).unwrap();
     assert_eq!(folder.read("a.obj", format!("\u{feff}{text}").as_bytes()).unwrap(), plain);
     assert_eq!(plain.positions.len(), 2);
-    // Only there.
+    // A byte order mark is skipped only at the start of the file.
     assert_eq!(folder.read("a.obj", text.replace("\nv", "\n\u{feff}v").as_bytes()).unwrap().positions.len(), 1);
 }
 
@@ -206,7 +206,7 @@ fn the_bunny_is_covered_and_faces_outwards() {
     assert!(outwards.count() > 1500);
 }
 
-/// UTF-16 of either byte order, with the byte order mark that says so.
+/// UTF-16 text in both byte orders, with a byte order mark.
 fn in_utf_16(text: &str) -> [Vec<u8>; 2] {
     let with_mark = || {
         text.encode_utf16().fold(vec![0xfeff], |mut codes, code| {
@@ -230,7 +230,7 @@ fn text_may_be_in_utf_16() {
         std::fs::write(folder.path("m\u{e4}rz.mtl"), library).unwrap();
         let mesh = io::read_mesh(&folder.path("a.obj"), &()).unwrap();
         assert_eq!((mesh.triangles.len(), mesh.materials[0].diffuse, mesh.notes), (1, [1.0, 0.0, 0.0, 1.0], vec![]));
-        // Half a code at the end, and one that is no character.
+        // Half a code unit at the end, and an invalid one.
         let mut damaged = bytes.clone();
         damaged.extend([0xd8, 0xd8, 0xd8]);
         assert_eq!(folder.read("a.obj", &damaged).unwrap(), expected);

@@ -1,4 +1,4 @@
-//! PCD files: those that must be read, and those that cannot be.
+//! PCD files, valid and damaged.
 
 use super::{Folder, Random, sentence};
 use epsplat::io::Points;
@@ -6,12 +6,12 @@ use epsplat::low_level::scene::Colors;
 
 pub const DATA: [&str; 3] = ["ascii", "binary", "binary_compressed"];
 
-/// Name, bytes, type and how many numbers.
+/// Name, size in bytes, type and count of a field.
 type Field = (&'static str, usize, char, usize);
 
 const XYZ: [Field; 3] = [("x", 4, 'F', 1), ("y", 8, 'F', 1), ("z", 2, 'I', 1)];
 
-/// A number as bytes, little-endian.
+/// A number as little-endian bytes of the field's type.
 fn bytes_of(value: f64, (_, size, kind, _): Field) -> Vec<u8> {
     match (kind, size) {
         ('F', 4) => (value as f32).to_le_bytes().to_vec(),
@@ -37,7 +37,7 @@ fn header(fields: &[Field], points: usize, data: &str) -> String {
     .concat()
 }
 
-/// A file of `rows`, each with all numbers of all fields.
+/// A file of `rows`; each row has all numbers of all fields.
 fn file(fields: &[Field], rows: &[&[f64]], data: &str) -> Vec<u8> {
     let mut bytes = header(fields, rows.len(), data).into_bytes();
     let spread: Vec<Field> = fields.iter().flat_map(|field| vec![*field; field.3]).collect();
@@ -69,7 +69,7 @@ fn file(fields: &[Field], rows: &[&[f64]], data: &str) -> Vec<u8> {
     bytes
 }
 
-/// LZF: the longest copy at each place, or else a byte as it is.
+/// An LZF encoder: the longest match at each position, otherwise a literal byte.
 fn pack(bytes: &[u8]) -> Vec<u8> {
     let (mut packed, mut at, mut run) = (Vec::new(), 0, Vec::new());
     let flush = |packed: &mut Vec<u8>, run: &mut Vec<u8>| {
@@ -130,7 +130,7 @@ fn many_points_come_back_from_every_encoding() {
     let rows: Vec<[f64; 6]> = (0..30_000)
         .map(|i| [f64::from(i % 100), f64::from(i) / 8.0, f64::from(i % 77), 0.0, 0.25, f64::from(i % 2)])
         .collect();
-    // The test's packing looks at every distance.
+    // The test's encoder tries every distance, so compressed files are short.
     for (data, count) in [("ascii", 30_000), ("binary", 30_000), ("binary_compressed", 600)] {
         let rows: Vec<&[f64]> = rows.iter().take(count).map(<[f64; 6]>::as_slice).collect();
         let points = folder.read("a.pcd", &file(&fields, &rows, data)).unwrap();
@@ -160,7 +160,7 @@ fn colours_are_packed_into_one_number_of_any_type() {
                 assert_eq!(points.colors, Some(expected), "{data} {kind} {name}");
             }
         }
-        // An alpha that is 0 everywhere was never set.
+        // An alpha that is 0 everywhere counts as unset.
         let fields = [XYZ[0], XYZ[1], XYZ[2], ("rgba", 4, 'U', 1)];
         let points = folder.read("a.pcd", &file(&fields, &[&[0.0, 0.0, 0.0, f64::from(0x10203)]], data)).unwrap();
         assert_eq!(points.colors, Some(Colors::Srgb8(vec![[1, 2, 3, 255]])));
@@ -178,7 +178,7 @@ fn older_versions_and_files_without_points() {
     let text = "VERSION .5\r\nFIELDS x y z\r\nSIZE 4 4 4\r\nTYPE F F F\r\nWIDTH 2\r\nHEIGHT 1\r\nDATA ascii\r\nnan nan nan\r\n\r\n1 2 3\r\n";
     let points = folder.read("A.PCD", text.as_bytes()).unwrap();
     assert!(points.positions[0].iter().all(|c| c.is_nan()) && points.positions[1] == [1.0, 2.0, 3.0]);
-    // By its first bytes, and without points.
+    // Recognised by its first bytes, and without points.
     let none = header(&XYZ, 0, "binary_compressed");
     assert_eq!(folder.read("cloud", none.trim_end().as_bytes()).unwrap(), Points::default());
 }
@@ -242,7 +242,7 @@ fn promises_are_held_against_the_file() {
             assert_eq!(message, said);
         }
     }
-    // A packed length beyond the file, and one that could never become what is promised.
+    // A compressed length beyond the file, and one too short for the promised data.
     let start = header(&XYZ, 3, DATA[2]).len();
     let mut long = file(&XYZ, &rows, DATA[2]);
     long[start..start + 4].fill(0xff);
@@ -263,7 +263,7 @@ fn cut_and_flipped_files_are_refused_or_read() {
         let whole = file(&fields, &rows, data);
         for length in 0..whole.len() {
             match folder.read("a.pcd", &whole[..length]) {
-                // The last digits of a last number in text may be missing.
+                // Truncated text may lack the last digits of its last number.
                 Ok(points) => {
                     assert!(data == "ascii" && length + 6 > whole.len() && points.positions.len() == 4, "{length}")
                 }
@@ -283,7 +283,7 @@ fn cut_and_flipped_files_are_refused_or_read() {
     }
 }
 
-/// Words in capitals or in lower case, and lines that end in carriage returns.
+/// Headers in upper or lower case, with lines that end in carriage returns.
 #[test]
 fn headers_are_read_in_either_case() {
     let folder = Folder::new();
@@ -299,7 +299,7 @@ fn headers_are_read_in_either_case() {
             assert_eq!(folder.read("a", &changed).unwrap(), expected, "{data}");
         }
     }
-    // Of two names that differ in case alone, the usual one is meant.
+    // If two names differ only in case, the usual one is used.
     let fields = [("X", 4, 'F', 1), XYZ[0], XYZ[1], XYZ[2]];
     let points = folder.read("a.pcd", &file(&fields, &[&[9.0, 1.0, 2.0, 3.0]], "ascii")).unwrap();
     assert_eq!(points.positions, [[1.0, 2.0, 3.0]]);

@@ -1,4 +1,4 @@
-//! PLY files that must be read, and what is written.
+//! Valid PLY files, and what `write_points` writes.
 
 use super::Folder;
 use epsplat::io::Points;
@@ -6,7 +6,7 @@ use epsplat::io::ply::{Color, ColorProperties, Properties, Vertex, write, write_
 use epsplat::low_level::scene::Colors;
 use epsplat::low_level::scene::color::srgb_to_linear;
 
-/// A number of a PLY file: text, or the bytes of its type.
+/// Encodes a number of a PLY file as text or as bytes of its type.
 fn encode(value: f64, kind: &str, encoding: &str) -> Vec<u8> {
     macro_rules! bytes {
         ($type:ty) => {
@@ -36,7 +36,8 @@ const KINDS: [&str; 16] = [
     "float32", "double", "float64",
 ];
 
-/// An element: name, properties (type, name; a list's type is `list COUNT ITEM`), and rows of numbers.
+/// An element: name, properties (type, name; a list's type is `list COUNT ITEM`), and rows of
+/// numbers.
 pub type Element<'a> = (&'a str, &'a [(&'a str, &'a str)], &'a [&'a [f64]]);
 
 pub fn file(encoding: &str, elements: &[Element]) -> Vec<u8> {
@@ -67,7 +68,8 @@ pub fn file(encoding: &str, elements: &[Element]) -> Vec<u8> {
     bytes
 }
 
-/// Lines end as they may on any system; the first byte of a binary file is a line feed, which belongs to no line.
+/// Any line ending is accepted. The first data byte of the binary file is a line feed, which must
+/// not be skipped.
 #[test]
 fn lines_may_end_in_carriage_returns() {
     let folder = Folder::new();
@@ -164,7 +166,7 @@ fn normals_and_radii_are_found_by_name() {
         let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties, &rows)])).unwrap();
         assert_eq!(points.normals.unwrap(), [[1.0, 2.0, 3.0]]);
         assert_eq!(points.radii.unwrap(), [0.5]);
-        // Without the radius, the scale; without a component, no normals.
+        // Without a radius the scale is used; without all components there are no normals.
         let points = folder
             .read("a.ply", &file(encoding, &[("vertex", &properties[1..7], &[&[9.0, 1.0, 2.0, 3.0, 1.0, 2.0]])]))
             .unwrap();
@@ -246,7 +248,7 @@ fn line_ends_and_comments_of_other_writers() {
     let folder = Folder::new();
     let text = "ply\nformat ascii 1.0\ncomment caf\u{e9}\n\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\nnan -inf\n1e3";
     for text in [text.to_owned(), text.replace('\n', "\r\n"), text.replace('\n', " \n")] {
-        // The comment in Latin-1.
+        // The comment is in Latin-1.
         let bytes: Vec<u8> = text.chars().map(|c| c as u8).collect();
         let points = folder.read("a.ply", &bytes).unwrap();
         assert_eq!(points.positions[0], [1.0, 2.0, 3.0]);
@@ -294,14 +296,15 @@ fn half_axes_and_texture_coordinates_are_found_by_name() {
             let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties, &[row])])).unwrap();
             assert_eq!(points.axes.unwrap(), [[[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]], "{encoding}");
             assert_eq!(points.texture.unwrap(), [[0.25, 0.75]], "{encoding} {names:?}");
-            // One name without its partner says nothing.
+            // Half-axes and texture coordinates need all their properties.
             let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties[..9], &[&row[..9]])])).unwrap();
             assert_eq!((points.axes, points.texture), (None, None));
         }
     }
 }
 
-/// Vertices as MeshLab, CloudCompare, Open3D and the Point Cloud Library lay them out, with what else they write.
+/// Vertices as MeshLab, CloudCompare, Open3D and the Point Cloud Library write them, with their
+/// other properties.
 #[test]
 fn files_of_other_programs_are_read() {
     let folder = Folder::new();
@@ -349,7 +352,7 @@ fn files_of_other_programs_are_read() {
     }
 }
 
-/// Points with every attribute, of which `attributes` chooses: a bit each.
+/// Points with the attributes whose bits are set in `attributes`.
 fn points_with(attributes: u32) -> Points {
     let count = 300;
     let all = 0..count;
@@ -385,7 +388,7 @@ fn every_attribute_survives_to_the_byte() {
         if points.axes.is_none() {
             assert_eq!(text(&read), text(&points), "{attributes:b}");
         } else {
-            // Half-axes bring a normal and a radius along.
+            // Half-axes imply a normal and a radius.
             let rest = Points { normals: read.normals.clone(), radii: read.radii.clone(), ..points };
             assert_eq!(text(&read), text(&rest), "{attributes:b}");
         }
@@ -396,7 +399,7 @@ fn every_attribute_survives_to_the_byte() {
     }
     contents.sort();
     contents.dedup();
-    // Only normals and radii that half-axes imply make no difference that is seen here, and those here differ.
+    // All files differ, as the points' normals and radii are not those that their half-axes imply.
     assert_eq!(contents.len(), 1 << 7);
 }
 

@@ -60,14 +60,14 @@ fn counts_are_promises_and_not_trusted() {
             let message = folder.refusal("a.ply", &bytes);
             assert_eq!(message, format!("the header promises {count} vertices, the file ends after 3"), "{format}");
 
-            // The same of an element before the vertices, with and without a list.
+            // The same for an element before the vertices, with and without a list.
             for property in ["property int a\n", "property list uchar int a\n"] {
                 let face = format!("format {format} 1.0\nelement face {count}\n{property}element vertex 1\n{XYZ}");
                 let message = folder.refusal("a.ply", &header(&face));
                 let said = format!("the header promises {count} rows of element 'face', the file ends after 0");
                 assert_eq!(message, said, "{format}");
             }
-            // Rows without properties take no space, and no time.
+            // Rows without properties take no space and no time.
             let empty = format!("format {format} 1.0\nelement ghost {count}\nelement vertex 0\n{XYZ}");
             assert_eq!(folder.read("a.ply", &header(&empty)).unwrap().positions.len(), 0);
         }
@@ -107,7 +107,7 @@ fn lists_of_impossible_length_are_refused() {
     }
 }
 
-/// Small files of each encoding with everything in them.
+/// Small files of each encoding that contain everything.
 fn samples() -> Vec<Vec<u8>> {
     let vertex = [
         ("float", "x"),
@@ -153,7 +153,8 @@ fn a_file_cut_anywhere_is_refused_or_read() {
         let mut lengths = Vec::new();
         for length in 0..sample.len() {
             match folder.read("a.ply", &sample[..length]) {
-                // What follows the vertices may be missing, or the last digits of a last number in text.
+                // Data after the vertices may be missing, and in text the last digits of the last
+                // number.
                 Ok(points) => assert_eq!(points.positions.len(), whole),
                 Err(error) => {
                     lengths.push(length);

@@ -1,5 +1,5 @@
-//! Ranges of the numbers of colours and intensities: one rule for all formats, and for all
-//! inputs together.
+//! Value ranges of colours and intensities: one rule for all formats, applied to all inputs
+//! together.
 
 use super::las::{file as las_file, point};
 use super::{Folder, data};
@@ -9,7 +9,7 @@ use epsplat::low_level::scene::color::srgb_to_linear;
 use las::{Color, Point};
 use std::fmt::Write;
 
-/// Two colours that take turns.
+/// Two colours that alternate.
 const ORANGE: [f64; 3] = [230.0, 120.0, 30.0];
 const BLUE: [f64; 3] = [30.0, 90.0, 220.0];
 
@@ -17,12 +17,12 @@ fn turns(i: usize) -> [f64; 3] {
     if i.is_multiple_of(2) { ORANGE } else { BLUE }
 }
 
-/// The place of a point in a square of 40 by 50.
+/// Position of point `i` in a grid of 40 by 50.
 fn place(i: usize) -> [f64; 3] {
     [(i % 40) as f64 * 0.1, (i / 40) as f64 * 0.1, 0.0]
 }
 
-/// A PLY text of points with more properties than a place: types and names, and their values.
+/// A PLY text file of points with additional properties (type, name) and their values.
 fn ply(properties: &[(&str, &str)], count: usize, values: impl Fn(usize) -> Vec<f64>) -> Vec<u8> {
     let mut text = format!("ply\nformat ascii 1.0\nelement vertex {count}\n");
     for (kind, name) in [("double", "x"), ("double", "y"), ("double", "z")].iter().chain(properties) {
@@ -40,8 +40,7 @@ fn rows(text: &mut String, count: usize, values: impl Fn(usize) -> Vec<f64>) {
     }
 }
 
-/// A PCD text of points with more fields than a place: names, sizes, types and counts, and their
-/// values.
+/// A PCD text file of points with additional fields (name, size, type, count) and their values.
 #[cfg(feature = "pcd")]
 fn pcd(fields: &[(&str, usize, char, usize)], count: usize, values: impl Fn(usize) -> Vec<f64>) -> Vec<u8> {
     let all = || [("x", 8, 'F', 1), ("y", 8, 'F', 1), ("z", 8, 'F', 1)].into_iter().chain(fields.iter().copied());
@@ -66,7 +65,7 @@ fn obj(count: usize, color: impl Fn(usize) -> [f64; 3]) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// A LAS file of a format with these colours and intensities.
+/// A LAS file with this point format, and colours and intensities from `of`.
 fn las(format: u8, count: usize, of: impl Fn(usize) -> ([f64; 3], u16)) -> Vec<u8> {
     let point = |i: usize| {
         let (color, intensity) = of(i);
@@ -78,7 +77,7 @@ fn las(format: u8, count: usize, of: impl Fn(usize) -> ([f64; 3], u16)) -> Vec<u
     las_file(4, format, false, (0..count).map(point))
 }
 
-/// An E57 file of one scan: what its colours are, and its intensities.
+/// An E57 file of one scan, with colours of this type and limits, and intensities.
 #[cfg(feature = "e57")]
 fn e57(
     colors: &e57::RecordDataType,
@@ -151,7 +150,7 @@ fn times(factor: f64) -> impl Fn(usize) -> Vec<f64> {
 fn eight_bit_values_in_wider_types_are_eight_bit_colours() {
     let folder = Folder::new();
     for kind in ["char", "uchar", "short", "ushort", "int", "uint", "float", "double"] {
-        // A signed byte is an unsigned one that a program took for signed.
+        // Some programs write unsigned bytes as signed ones.
         let signed = |value: f64| if kind == "char" && value > 127.0 { value - 256.0 } else { value };
         let properties = ["red", "green", "blue"].map(|name| (kind, name));
         let values = |i: usize| turns(i).map(signed).to_vec();
@@ -207,8 +206,8 @@ fn pcd_colours_are_channels_or_vectors_of_any_type() {
     assert_eq!(colors.linear(5), [light(305.0), light(40_001.0), 1.0, 1.0]);
 }
 
-/// A packed colour may be an integer, though its field is said to hold floats: by the digits of a
-/// text, or as the value of the float.
+/// A packed colour in a float field may be stored as an integer: as digits in text, or as the
+/// float's value.
 #[cfg(feature = "pcd")]
 #[test]
 fn a_float_field_may_hold_an_integer() {
@@ -266,17 +265,17 @@ fn e57_colours_follow_their_limits_unless_the_values_contradict_them() {
     for (light, code) in [r, g, b].into_iter().zip(ORANGE) {
         assert!((f64::from(light) - srgb_to_linear(code / 255.0)).abs() < 1e-6);
     }
-    // Limits that most values exceed are told.
+    // Limits that most values exceed are ignored with a note.
     let wrong = read(&integer(65535), Some([0.0, 255.0]), 257.0);
     assert_eq!(codes(&wrong)[0], [230, 120, 30, 255]);
     assert!(wrong.notes[0].contains("range from 0 to 255, but 6000 of 6000 numbers lie outside"), "{:?}", wrong.notes);
-    // Limits that are no wider than the values are those of the picture.
+    // Limits that contain all values are applied.
     let stretched = read(&integer(255), Some([0.0, 240.0]), 1.0).colors.unwrap();
     assert_eq!(stretched.linear(0)[0], srgb_to_linear(230.0 / 240.0) as f32);
 }
 
-/// At most one of a hundred numbers that are not zero is an outlier; one more, and all are of 16
-/// bits.
+/// If at most 1 % of the nonzero numbers exceed 255, they are outliers; with more, all numbers are
+/// 16-bit.
 #[test]
 fn few_outliers_do_not_make_sixteen_bits() {
     let folder = Folder::new();
@@ -299,7 +298,7 @@ fn few_outliers_do_not_make_sixteen_bits() {
             }
         }
     }
-    // Points without a colour say nothing: the few others do.
+    // Black points do not count: the few others decide.
     let color = |i: usize| if i < 10 { [300.0 * i as f64, 50_000.0, 40_000.0] } else { [0.0; 3] };
     let read = folder.read("a.las", &las(2, COUNT, |i| (color(i), 9))).unwrap();
     assert!(matches!(read.colors, Some(Colors::Linear(_))));
@@ -315,7 +314,7 @@ fn floats_are_light_in_ply_and_srgb_elsewhere() {
     assert_eq!(ply_colors.linear(0)[0], share);
     let of_obj = folder.read("a.obj", &obj(COUNT, shares)).unwrap().colors.unwrap();
     assert_eq!(of_obj.linear(0)[0], srgb_to_linear(share.into()) as f32);
-    // Light that is brighter than white is light, and its share is told.
+    // Values above 1 are kept as brighter than white, and their share is reported.
     let bright = |i: usize| shares(i).map(|share| if i.is_multiple_of(10) { share * 6.0 } else { share }).to_vec();
     let points = folder.read("a.ply", &ply(&float, COUNT, bright)).unwrap();
     assert!((points.colors.unwrap().linear(0)[0] - 6.0 * share).abs() < 1e-6);
@@ -324,13 +323,13 @@ fn floats_are_light_in_ply_and_srgb_elsewhere() {
         "{:?}",
         points.notes
     );
-    // Fractions of 255 keep what a byte has not.
+    // Non-integer values up to 255 keep their fractions.
     let halves = |i: usize| turns(i).map(|value| value + 0.5).to_vec();
     let points = folder.read("a.ply", &ply(&float, COUNT, halves)).unwrap();
     assert_eq!(points.colors.unwrap().linear(1)[2], srgb_to_linear(220.5 / 255.0) as f32);
 }
 
-/// Whatever range is taken, a picture that comes out nearly black says why.
+/// Whatever range is chosen, colours that are nearly black are reported.
 #[test]
 fn dark_pictures_are_told() {
     let folder = Folder::new();
@@ -367,8 +366,7 @@ fn together(folder: &Folder, files: &[(&str, Vec<u8>)]) -> Vec<Points> {
     inputs
 }
 
-/// Two tiles of one scan, of which one is darker, have one white: at the same intensity the same
-/// grey.
+/// Two tiles of one scan share their white level: equal intensities give equal greys.
 #[test]
 fn tiles_of_intensities_have_no_seam() {
     let folder = Folder::new();
@@ -406,13 +404,13 @@ fn tiles_of_intensities_have_no_seam() {
                 assert_eq!(code, [grey, grey, grey, 255], "{what}, point {i}");
             }
         }
-        // Each by itself would have a white of its own.
+        // Control: each tile alone has its own white level.
         assert_eq!((codes(&alone[0])[49], codes(&alone[1])[49]), ([255; 4], [255; 4]), "{what}");
     }
 }
 
-/// A dark tile of a 16-bit scan is no 8-bit file: all of a scene have one rule, and what that makes
-/// black is told.
+/// A dark tile of a 16-bit scan is not taken for 8-bit: one rule applies to the scene, and a nearly
+/// black tile is reported.
 #[test]
 fn tiles_of_colours_have_one_rule() {
     let folder = Folder::new();
@@ -425,7 +423,7 @@ fn tiles_of_colours_have_one_rule() {
     assert_eq!(tiles[1].colors.as_ref().unwrap().linear(0)[0], light(57507.0));
     assert!(tiles[0].notes[0].starts_with("warning: a.las: its colours are nearly black"), "{:?}", tiles[0].notes);
     assert!(tiles[1].notes.is_empty());
-    // Two tiles of one kind whose values differ: one alone has an outlier too many.
+    // Tiles of one kind are judged together: the first one alone would have too many outliers.
     let few = |i: usize| if i < 100 { [256.0, 120.0, 30.0] } else { turns(i) };
     let tiles = together(
         &folder,
@@ -481,11 +479,11 @@ fn intensities_show_where_colours_are_missing_or_zero() {
         assert_eq!(codes(&points), expected, "{name}");
         assert_eq!(points.notes, Vec::<String>::new());
     }
-    // Negative ones, as decibels are, have a black of their own.
+    // Negative intensities, such as decibels, have their own black level.
     let decibels = ply(&[("float", "intensity")], COUNT, |i| vec![-20.0 + (i % 101) as f64 * 0.2]);
     let codes = codes(&folder.read("a.ply", &decibels).unwrap());
     assert_eq!((codes[0], codes[50], codes[100]), ([0, 0, 0, 255], [128, 128, 128, 255], [255; 4]));
-    // Where all are the same they say nothing.
+    // Constant intensities are ignored.
     let same = ply(&[("float", "intensity")], COUNT, |_| vec![7.0]);
     assert_eq!(folder.read("a.ply", &same).unwrap().colors, None);
 }
@@ -560,7 +558,7 @@ fn what_a_file_has_is_listed() {
     assert!(found.format.starts_with("LAZ 1."), "{found:?}");
 }
 
-/// A class in the place of alpha is told, and there is a way to leave it out.
+/// Alpha values that are classes are reported, and can be ignored.
 #[test]
 fn alphas_that_are_no_opacities_are_told() {
     let folder = Folder::new();
@@ -576,7 +574,7 @@ fn alphas_that_are_no_opacities_are_told() {
         let options = ReadOptions { ignore_alpha: true, ..ReadOptions::default() };
         assert_turns(&io::read_with(&folder.path("a.ply"), options, &()).unwrap(), kind);
     }
-    // Alphas that are opacities, by the range of their numbers.
+    // Real opacities, scaled by the range of their type or values.
     for (kind, full) in [("uchar", 255.0), ("ushort", 65535.0), ("ushort", 255.0), ("float", 1.0), ("double", 255.0)] {
         let points = folder.read("a.ply", &with_alpha(kind, &|i| full * (i % 6) as f64 / 5.0)).unwrap();
         let alpha = points.colors.as_ref().unwrap().linear(3)[3];
@@ -585,7 +583,7 @@ fn alphas_that_are_no_opacities_are_told() {
     }
 }
 
-/// Rows that are read in pieces have the colours that all of them have together.
+/// Rows read in pieces have the same colours as in a read of all rows.
 #[test]
 fn pieces_have_the_colours_of_all_rows() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! What surfels leave uncovered of a mesh, and how far they are from it, where both have a formula.
+//! The uncovered parts of a mesh and the distances of surfels from it, compared with closed forms.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common;
@@ -33,20 +33,21 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
     let expected = 64.0 * PI / whole.ray_spacing.powi(2);
     assert!((whole.seen.rays as f64 / expected - 1.0).abs() < 0.01, "{whole:?}");
     assert!(whole.seen.uncovered == 0 && (whole.views_with_holes, whole.worst_view) == (0, None), "{whole:?}");
-    // From all around, a convex body's surface is seen evenly: the share of rays is that of the area. The disks around
+    // Seen from all around, a convex surface gets rays in proportion to its area. The disks around
     // the missing cap reach into it by their radius, 0.075.
     let cap = |angle: f64| 0.5 * (1.0 - angle.cos());
     for angle in [0.3, 0.8, 0.5 * PI] {
         let holed = seen(&mesh, &generated(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
         let share = holed.uncovered_share.unwrap();
-        // The mesh is closed, so behind the hole there are disks on each ray: those of the far side do not count.
+        // The mesh is closed, so each ray through the hole meets disks of the far side, which must
+        // not count.
         assert!(
             cap(angle - 0.08) < share && share < cap(angle),
             "{angle}: {share}, {} to {}",
             cap(angle - 0.08),
             cap(angle)
         );
-        // All but what lies at the outline are holes.
+        // All uncovered rays except those at the outline are holes.
         assert!(holed.hole_share.unwrap() > 0.9 * share);
         let worst = holed.worst_view.unwrap();
         assert!(!holed.is_hole_free() && worst.from[2] > 0.9 && worst.hole_share > 1.5 * share, "{worst:?}");
@@ -55,7 +56,8 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
 
 #[test]
 fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
-    // At 0.7 of the spacing square cells of four samples are just closed; the lattice's cells are others, so some gape.
+    // A radius of 0.7 spacings just closes square cells of four samples; this lattice has other
+    // cells, so some stay open.
     let scene = |factor: f32| {
         let mut scene = generated(Shape::Sphere, 2000, |_| true);
         for surfel in &mut scene.surfels {
@@ -66,10 +68,11 @@ fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
     let mesh = sphere(5, false);
     assert!(seen(&mesh, &scene(1.0)).is_hole_free());
     let gaping = seen(&mesh, &scene(0.4));
-    // Disks of 0.6 spacings' radius cover at most 0.36 pi of the surface where they do not overlap: 1.13, with gaps.
+    // Disks with a radius of 0.6 spacings cover at most 0.36 pi = 1.13 of the surface even if they
+    // do not overlap, so there are gaps.
     assert!(gaping.hole_share.unwrap() > 0.005 && gaping.views_with_holes == 64, "{gaping:?}");
     let touching = seen(&mesh, &scene(0.2));
-    // Of 0.3 spacings: they do not overlap and cover 0.09 pi.
+    // A radius of 0.3 spacings: the disks do not overlap and cover 0.09 pi.
     assert!((touching.uncovered_share.unwrap() - (1.0 - 0.09 * PI)).abs() < 0.02, "{touching:?}");
 }
 
@@ -80,7 +83,8 @@ fn a_hole_in_a_square_has_its_area() {
     // The disks' radius is 0.0212.
     let holed = seen(&square(), &keep(0.4)).uncovered_share.unwrap();
     assert!((PI * 0.375f64.powi(2) / 4.0..PI * 0.4f64.powi(2) / 4.0).contains(&holed), "{holed}");
-    // Off the surface by more than a radius, disks cover nothing, though a render from the front would show no hole.
+    // Disks farther from the surface than their radius cover nothing, though a render from the
+    // front would show no hole.
     let lifted = |height: f32| {
         let mut scene = keep(0.0);
         scene.surfels.iter_mut().for_each(|surfel| surfel.center[2] = height);
@@ -104,10 +108,10 @@ fn distances_are_those_by_which_surfels_are_moved() {
     let far = scene.surfels.len().div_ceil(50) as f64 / scene.surfels.len() as f64;
     assert!((centers.mean - (0.25 + 0.25 * far)).abs() < 1e-12 && centers.rms > centers.mean, "{centers:?}");
     assert!((centers.percentile_99 - 0.5).abs().max((centers.max - 0.5).abs()) < 1e-12, "{centers:?}");
-    // The disks lie parallel to the square and within it.
+    // The disks are parallel to the square and inside it.
     assert!((rims.mean - centers.mean).abs() < 1e-7);
 
-    // A disk of radius r on a sphere leaves it by sqrt(1 + r r) - 1 at the rim.
+    // The rim of a tangent disk of radius r is sqrt(1 + r r) - 1 above the unit sphere.
     let scene = generated(Shape::Sphere, 500, |_| true);
     let rims = distances(&scene, &sphere(7, false)).rims_to_mesh.unwrap();
     let expected = f64::from(scene.surfels[0].radius()).hypot(1.0) - 1.0;

@@ -1,4 +1,5 @@
-//! Meshes as surfels and triangles: what `epsplat hybrid` writes is what the mesh looks like, and it is read again whole.
+//! Meshes as surfels and triangles: the files that `epsplat hybrid` writes look like the mesh, and
+//! can be read again completely.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -20,7 +21,8 @@ fn scene(mesh: &Mesh) -> Scene {
     with_triangles(None, std::slice::from_ref(mesh)).unwrap().0
 }
 
-/// A mesh with all that a file can hold: two materials, one of which has an image, colours, normals, coordinates that f32 loses.
+/// A mesh with everything that a file can hold: two materials, one with an image, colours, normals,
+/// and coordinates that exceed f32 precision.
 fn rich() -> Mesh {
     let texel = |k: u8| [40 * k, 255 - 30 * k, 7, 255];
     let image = Arc::new(Texture::new(2, 3, (0..6).map(texel).collect()).unwrap());
@@ -53,7 +55,7 @@ fn a_mesh_that_is_written_is_read_again() {
     assert_eq!(scene(&again).triangles, scene(&mesh).triangles);
     let other = Mesh { material: Some(vec![0, 1]), ..mesh.clone() };
     assert_ne!(scene(&other).triangles, scene(&mesh).triangles);
-    // Without images, colours or normals there are none.
+    // A mesh without images, colours and normals is read without them.
     let bare = Mesh { positions: mesh.positions, triangles: mesh.triangles, ..Mesh::default() };
     io::ply::write_mesh(&folder.path("b.ply"), &bare, &[], &()).unwrap();
     let again = io::read_mesh(&folder.path("b.ply"), &()).unwrap();
@@ -71,14 +73,16 @@ fn parts_of_a_mesh_are_the_mesh() {
     let none = mesh.part(&[false; 2]);
     assert!(none.positions.is_empty() && none.triangles.is_empty() && none.check().is_ok());
     let pixel = pixel(&mesh, 100.0).unwrap();
-    // Two triangles of thousands of pixels stay.
+    // Two triangles of thousands of pixels stay triangles.
     let divided = hybrid(&mesh, pixel, &()).unwrap();
     assert_eq!((divided.report.kept, divided.report.surfels, divided.surfels), (2, 0, None));
     assert!(hybrid(&Mesh { material: Some(vec![0]), ..mesh }, pixel, &()).is_err());
 }
 
-/// A hall of a few large triangles around a bunny of many small ones: each is what it should be, the picture is that of the triangles, one
-/// command draws it, and what is left by `simplify` too.
+/// A hall of a few large triangles around a bunny of many small ones: surfels and triangles are
+/// chosen by size.
+///
+/// The picture equals that of the triangles, and one command draws it, also after `simplify`.
 #[test]
 fn one_command_draws_surfels_and_triangles() {
     let folder = Folder::new();
@@ -106,7 +110,7 @@ fn one_command_draws_surfels_and_triangles() {
     let told = render(&[text(&output)], &both);
     let triangles = format!("{kept} triangles drawn");
     assert!(told.contains("surfels and") && told.contains(&triangles), "{told}");
-    // Named twice they are drawn once.
+    // A file that is given twice has its triangles drawn once.
     let twice = render(&[text(&output), text(&output)], &folder.path("twice.exr"));
     assert!(twice.contains(&triangles), "{twice}");
     let difference =
@@ -120,7 +124,7 @@ fn one_command_draws_surfels_and_triangles() {
     let info = String::from_utf8(succeeds(&["info", text(&output)]).stdout).unwrap();
     assert!(info.contains("out.mesh.ply are drawn beside them"), "{info}");
 
-    // It overwrites nothing that it names, and without its triangles it is not drawn.
+    // The mesh file is not overwritten, and without it nothing is drawn.
     let named = folder.path("out.mesh.ply");
     fails(&["render", text(&output), "-o", text(&named)], 2, &["out.mesh.ply"]);
     std::fs::remove_file(&named).unwrap();
@@ -131,7 +135,7 @@ fn one_command_draws_surfels_and_triangles() {
     );
 }
 
-/// Where no triangle is small the picture has the bits of the mesh's own, images too.
+/// If no triangle is small, the picture equals that of the mesh bit by bit, with images too.
 #[test]
 fn large_triangles_all_stay() {
     let folder = Folder::new();
@@ -149,7 +153,8 @@ fn large_triangles_all_stay() {
     assert!(String::from_utf8(succeeds(&["info", text(&output)]).stdout).unwrap().contains("cube.mesh.ply"));
 }
 
-/// Normals that disagree with the winding leave no surface to be taken for closed, and what an image is multiplied with stays.
+/// With normals that contradict the winding, the surface is not taken for closed; the factor of an
+/// image is preserved.
 #[test]
 fn normals_and_materials_stay_what_they_are() {
     let mut ball = sphere(5, true);
@@ -164,16 +169,17 @@ fn normals_and_materials_stay_what_they_are() {
     let image = Arc::new(Texture::new(1, 1, vec![[188, 255, 0, 200]]).unwrap());
     let dim =
         Material { name: String::new(), diffuse: [0.5, 1.0, 1.0, 0.5], texture: Some(image.clone()), image: None };
-    // Half the light of 188 is the code 137.
+    // Half the light of code 188 is code 137.
     assert_eq!(dim.painted().unwrap().texels(), [[137, 255, 0, 100]]);
     assert!(Arc::ptr_eq(&Material { diffuse: [1.0; 4], ..dim }.painted().unwrap(), &image));
-    // Materials that no triangle has are left out.
+    // Materials without triangles are dropped.
     let mesh = rich();
     assert_eq!(mesh.part(&[true, false]).materials.len(), 1);
     assert!(mesh.part(&[true, false]).materials[0].texture.is_some());
 }
 
-/// Only what epsplat wrote names triangles, and names that a header cannot hold are refused.
+/// Only files that epsplat wrote can name triangles, and names that a header cannot hold are
+/// refused.
 #[test]
 fn names_of_triangles_are_read_whole_or_refused() {
     let folder = Folder::new();

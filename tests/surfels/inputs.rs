@@ -1,4 +1,4 @@
-//! Inputs as the command line is given them: through pipes, with formats that are named, with deleted points, and damaged.
+//! Inputs of the command line: pipes, explicit formats, withheld points, and damaged files.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -25,14 +25,14 @@ fn piped(arguments: &[&str], bytes: &[u8]) -> Output {
     })
 }
 
-/// The one line that a failed run says.
+/// The only line on stderr of a failed run.
 fn only_line(output: &Output, code: i32) -> String {
     let stderr = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!((output.status.code(), stderr.lines().count()), (Some(code), 1), "{stderr}");
     stderr.trim_end().strip_prefix("error: ").expect(&stderr).to_owned()
 }
 
-/// What `info` says of a file, but for where it is.
+/// The JSON of `info` without the input's path.
 fn info(output: Output) -> Value {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let mut info: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -40,7 +40,7 @@ fn info(output: Output) -> Value {
     info
 }
 
-/// Points of a LAS file, of which every third one is deleted.
+/// A LAS file of which every third point is withheld.
 fn third_withheld(count: u32) -> Vec<u8> {
     let mut writer = Writer::new(Cursor::new(Vec::new()), Builder::from((1, 2)).into_header().unwrap()).unwrap();
     for i in 0..count {
@@ -50,7 +50,7 @@ fn third_withheld(count: u32) -> Vec<u8> {
     writer.into_inner().unwrap().into_inner()
 }
 
-/// A file of each format, and the argument without which a pipe does not tell what it is.
+/// A file of each format, and the arguments that a pipe needs to identify it.
 fn one_of_each(folder: &Folder) -> Vec<(std::path::PathBuf, &'static [&'static str])> {
     let rows: String = (0..60).map(|i| format!("{} {} 0\n", i % 6, i / 6)).collect();
     let mut files = vec![
@@ -80,7 +80,7 @@ fn what_comes_through_a_pipe_is_what_the_file_holds() {
             let from_pipe = info(piped(&[&["info", name, "--json", "-"], format].concat(), &bytes));
             assert_eq!(from_pipe, from_file, "{name} {}", path.display());
         }
-        // A named pipe, as `<(...)` makes one.
+        // A named pipe, such as `<(...)` makes.
         #[cfg(unix)]
         {
             let line = r#""$0" info "$2" $3 --json - & cat "$1" > "$2"; wait $!"#;
@@ -92,7 +92,7 @@ fn what_comes_through_a_pipe_is_what_the_file_holds() {
             std::fs::remove_file(&named).unwrap();
         }
     }
-    // A mesh too, and several inputs of which one is a pipe.
+    // A mesh through a pipe, and several inputs of which one is a pipe.
     let bunny = std::fs::read(Path::new(DATA).join("bunny.obj")).unwrap();
     let (made, file) = (folder.path("made.ply"), folder.path("a.ply"));
     let sample = ["sample", "-", "--input-format", "obj", "--count", "100", "-o", text(&made)];
@@ -109,7 +109,7 @@ fn a_pipe_that_ends_early_or_holds_no_cloud_is_one_sentence() {
         let bytes = std::fs::read(&path).unwrap();
         for share in [0, 1, 40, 70] {
             let output = piped(&[&["info", "-"], format].concat(), &bytes[..bytes.len() * share / 100]);
-            // A part of an OBJ file is one too, if it ends between two lines, and if it has any vertex.
+            // A truncated OBJ file is valid if it ends between two lines and has a vertex.
             if !(format.len() == 2 && output.status.success()) {
                 only_line(&output, 1);
             }
@@ -119,7 +119,7 @@ fn a_pipe_that_ends_early_or_holds_no_cloud_is_one_sentence() {
     assert!(said.starts_with("standard input: its format is not known") && said.contains("--input-format"), "{said}");
     let said = only_line(&piped(&["info", "-", "--input-format", "ply"], b"v 1 2 3\n"), 1);
     assert_eq!(said, "standard input: it is not a PLY file: its first line is not 'ply'");
-    // What has no end is told from its start.
+    // An endless input is refused by its first bytes.
     #[cfg(target_os = "linux")]
     only_line(&epsplat(&["info", "/dev/zero"]), 1);
     fails(&["info", "a.ply", "--input-format", "png"], 2, &["--input-format", "ply"]);
@@ -159,7 +159,7 @@ fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
     let (left_out, kept) = (of(&[]), of(&["--keep-withheld"]));
     assert_eq!((&left_out["points"], &left_out["preparation"]["withheld"]), (&200.into(), &100.into()));
     assert_eq!((&kept["points"], &kept["preparation"]["withheld"]), (&300.into(), &0.into()));
-    // The command that `info` recommends reads the same.
+    // The command that `info` recommends gives the same.
     let table =
         String::from_utf8(succeeds(&["info", cloud, "--keep-withheld", "--input-format", "las"]).stdout).unwrap();
     assert!(table.contains(&format!("epsplat surfels {cloud} --input-format las --keep-withheld -o")), "{table}");
@@ -173,7 +173,7 @@ fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
     assert!(only_line(&piped(&["info", "-"], &all), 1).contains("the file ends after 0"));
 }
 
-/// The help names the formats of this build, and no others.
+/// The help names exactly the formats of this build.
 #[test]
 fn the_help_names_the_formats_that_are_read() {
     for command in ["info", "render", "surfels", "simplify", "coverage"] {
@@ -190,7 +190,7 @@ fn the_help_names_the_formats_that_are_read() {
     }
 }
 
-/// LAZ files at which the decoder once panicked, and printed so before the sentence.
+/// LAZ files on which the decoder once panicked and printed a message before the error.
 #[test]
 fn damaged_files_are_one_sentence() {
     let folder = Folder::new();
@@ -216,8 +216,8 @@ fn damaged_files_are_one_sentence() {
     assert_eq!(info(piped(&["info", "-", "--json", "-"], &without_chunks))["points"], 200);
 }
 
-/// Unreadable files of a folder are left out and told, if something can be read; a file that is
-/// named alone must be read. Files that begin with a dot are no part of a folder.
+/// Unreadable files of a folder are left out and reported if others can be read; a file that is
+/// named itself must be readable. Files whose name begins with a dot are ignored in a folder.
 #[test]
 fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     let folder = Folder::new();
@@ -234,7 +234,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     let (tiles, output) = (folder.path("tiles"), folder.path("o.ply"));
     let surfels = |more: &[&str]| epsplat(&[&["surfels", text(&tiles), "-o", text(&output)], more].concat());
     let told = |output: &Output| String::from_utf8(output.stderr.clone()).unwrap();
-    // Control: of a folder without any nothing is told, strictly neither.
+    // Control: with only readable files there is no report, in strict mode neither.
     for strict in [&[][..], &["--strict"]] {
         let whole = surfels(strict);
         assert!(whole.status.success() && told(&whole).contains("o.ply: 120 surfels"), "{}", told(&whole));
@@ -261,7 +261,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
         assert!(told(&succeeds(&picture)).contains("1 of 3 files of folders left out: "), "{name}");
         let strict = surfels(&["--strict"]);
         assert!(strict.status.code() == Some(1) && told(&strict).contains(name), "{name}: {}", told(&strict));
-        // Named alone, or beside the folder, it must be read.
+        // Named itself, alone or beside the folder, the file must be readable.
         let alone = tiles.join(name);
         fails(&["surfels", text(&alone), "-o", text(&output)], 1, &[name]);
         fails(&["info", text(&alone)], 1, &[name]);
@@ -269,17 +269,17 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
         let beside = folder.file(name, bytes);
         fails(&["surfels", text(&tiles), text(&beside), "-o", text(&output)], 1, &[name]);
     }
-    // Where nothing of a folder can be read the first file's fault is told.
+    // If no file of a folder can be read, the error is that of the first.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::write(tiles.join(name), "bad").unwrap());
     assert!(only_line(&surfels(&[]), 1).contains("a.ply"));
-    // A name that begins with a dot is no file of a folder, but can be given.
+    // A file whose name begins with a dot is ignored in a folder, but can be named itself.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::remove_file(tiles.join(name)).unwrap());
     fails(&["surfels", text(&tiles), "-o", text(&output)], 2, &["has no"]);
     let dotted = folder.file(".a.ply", &good);
     succeeds(&["info", text(&dotted)]);
 }
 
-/// A broken node of a COPC file is told with the picture that leaves it out, and in the JSON of
+/// A broken node of a COPC file is reported by `render`, which leaves it out, and in the JSON of
 /// `info`.
 #[test]
 fn a_broken_node_is_told_with_its_picture() {

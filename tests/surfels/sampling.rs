@@ -1,4 +1,5 @@
-//! Sampling of meshes: evenly, by priority, on the surface, without holes; and the baseline that it must beat.
+//! Sampling of meshes: even, by priority, on the surface and without holes, compared with the
+//! uniform baseline.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common;
@@ -30,7 +31,7 @@ fn uniform(mesh: &Mesh, count: usize) -> Points {
     sample(mesh, count, &Method::Uniform, 0, &()).unwrap().0
 }
 
-/// The distance of each point from the nearest other one.
+/// The distance of each point to its nearest neighbour.
 fn spacings(points: &Points) -> Vec<f64> {
     let all: Vec<DVec3> = points.positions.iter().map(|p| DVec3::from(*p)).collect();
     let nearest = |(i, a): (usize, &DVec3)| {
@@ -40,7 +41,7 @@ fn spacings(points: &Points) -> Vec<f64> {
     all.iter().enumerate().map(nearest).collect()
 }
 
-/// The square [0, 2] x [0, 1], whose right half is cut into `cuts` x `cuts` times as many triangles as the left one's two.
+/// The square [0, 2] x [0, 1] of two quads; the right one is divided into `cuts` x `cuts`.
 fn strip(cuts: u32) -> Mesh {
     let mut mesh = Mesh::default();
     let mut quad = |low: [f64; 2], size: f64| {
@@ -75,23 +76,24 @@ fn the_bunny_is_sampled_better_than_by_independent_points() {
     };
     let (ours, seen) = measured(by(&mesh, 5000, Priority::default()));
     let (theirs, seen_theirs) = measured(uniform(&mesh, 5000));
-    // Both lie on the triangles, to the rounding of f32 coordinates.
+    // Both lie on the triangles up to the rounding of f32 coordinates.
     for distances in [&ours, &theirs] {
         assert!(distances.centers_to_mesh.unwrap().max < 1e-6 * tree.radius());
     }
-    // From the mesh to the nearest centre. Independent points are 0.5 / sqrt(density) away in the mean; a hexagonal
-    // lattice, which is the best there is, 0.377.
+    // From the mesh to the nearest centre: independent points have a mean distance of 0.5 /
+    // sqrt(density), a hexagonal lattice, which is optimal, 0.377 / sqrt(density).
     let (near, far) = (ours.mesh_to_centers.unwrap(), theirs.mesh_to_centers.unwrap());
     assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
     // From the mesh to the nearest disk, and from the disks to the mesh.
     let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
-    // In the mean by little, as the baseline's disks lie in a triangle each and large ones in several, of which the nearest
-    // counts; but ours are all near. That each is as near to its own part as a plane can be is tested below.
+    // The mean is only slightly better: the baseline's disks lie in one triangle each, and of
+    // several large overlapping disks the nearest counts. But ours are all near. A test below shows
+    // that each is as near to its own cell as a plane can be.
     assert!(near.mean < far.mean && near.rms < 0.6 * far.rms, "{near:?} {far:?}");
     assert!(near.percentile_99 < 0.5 * far.percentile_99 && near.max < 0.6 * far.max, "{near:?} {far:?}");
     let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
     assert!(near.mean < 0.9 * far.mean && near.percentile_99 < far.percentile_99, "{near:?} {far:?}");
-    // And with smaller disks fewer holes.
+    // Smaller disks, and yet fewer holes.
     assert!(seen.hole_share.unwrap() < 1e-4, "{seen:?}");
     assert!(seen_theirs.seen.holes > 5 * seen.seen.holes, "{seen:?} {seen_theirs:?}");
 }
@@ -102,8 +104,9 @@ fn a_sphere_is_covered_evenly() {
     let count = 2000;
     let points = by(&mesh, count, Priority::Area);
     let spacing = (4.0 * PI / count as f64).sqrt();
-    // Distances to the nearest other sample, in spacings. Of independent points the mean is 1/2 and the smallest of 2,000 about
-    // 1/50; of a hexagonal lattice, which is the most even there is, both are 1.07.
+    // Distances to the nearest other sample, in spacings. Independent points have a mean of 1/2,
+    // and the smallest of 2,000 is about 1/50; in a hexagonal lattice, which is the most even one,
+    // all are 1.07.
     let nearest = |points: &Points| {
         let all: Vec<f64> = spacings(points).iter().map(|distance| distance / spacing).collect();
         (all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(f64::INFINITY, f64::min))
@@ -123,11 +126,11 @@ fn a_sphere_is_covered_evenly() {
     let tree = TriangleTree::new(&mesh).unwrap();
     let (scene, _) = build(vec![points], &()).unwrap();
     assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
-    // The radii are no larger than they must be: with half of them there are holes.
+    // The radii are not larger than necessary: half of them leaves holes.
     assert!(coverage(&tree, &longer(&scene, 0.5), 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
 }
 
-/// The disks of a scene, longer by a factor, that end at the same lines.
+/// The scene with its disks scaled by `factor`, clipped at the same lines.
 fn longer(scene: &Scene, factor: f32) -> Scene {
     let mut scene = scene.clone();
     for Clip(lines) in &mut scene.clips {
@@ -139,14 +142,14 @@ fn longer(scene: &Scene, factor: f32) -> Scene {
     scene
 }
 
-/// How much larger disks are written than what they must cover.
+/// Factor by which written disks exceed the radius that covers their cells.
 const OVERLAP: f32 = 1.28;
 
 #[test]
 fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells() {
-    // A cell that is flat lies in its disk, which is written longer than the cell: without that it still hides
-    // every point of the cell, from wherever that is seen, at outlines too. But only if cells end at edges: a disk that is seen
-    // edge-on from where its cell is seen covers nothing.
+    // A flat cell lies in its disk, which is larger than the cell. Without that factor the disk
+    // still hides each point of the cell from every direction, at outlines too. That holds only if
+    // cells end at edges: a disk seen edge-on, from where its cell is visible, covers nothing.
     let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
     for mesh in [cube, bar(3), bar(6)] {
         let tree = TriangleTree::new(&mesh).unwrap();
@@ -155,7 +158,7 @@ fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells()
         // The centres and half-axes are rounded to f32.
         let mut least = longer(&scene, 1.000_01 / OVERLAP);
         assert_eq!(uncovered(&least), 0);
-        // Controls: a tenth less, and with one in ten left out.
+        // Controls: disks smaller by 10 %, and one in ten left out.
         assert!(uncovered(&longer(&scene, 0.9 / OVERLAP)) > 0);
         least.clips = least.clips.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         least.surfels = least.surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
@@ -163,8 +166,10 @@ fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells()
     }
 }
 
-/// The samples' planes against those that are tilted by `angle` about eight axes: of how many samples another one is nearer, in
-/// the mean square, to the points of the mesh around.
+/// Compares each sample's plane with eight planes that are tilted by `angle`.
+///
+/// Returns for how many samples a tilted plane has a smaller mean squared distance to the mesh
+/// points of their cell.
 fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
     let centers: Vec<DVec3> = samples.positions.iter().map(|p| DVec3::from(*p)).collect();
     let normals = samples.normals.as_ref().unwrap();
@@ -174,7 +179,7 @@ fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
         [normal, s, t]
     };
     let frames: Vec<[DVec3; 3]> = normals.iter().map(frame).collect();
-    // Sums over the points of each cell of squared heights over the plane itself and over the tilted ones.
+    // For each cell, sums of squared heights over the plane itself and over the tilted ones.
     let mut squares = vec![[0.0; 9]; centers.len()];
     for point in uniform(mesh, 150_000).positions {
         let point = DVec3::from(point);
@@ -194,7 +199,7 @@ fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
 
 #[test]
 fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
-    // A sphere of large facets: a cell goes across several, and each facet stands off the others.
+    // A sphere of large facets: a cell spans several, which are not coplanar.
     let mesh = sphere(3, false);
     let samples = by(&mesh, 300, Priority::Area);
     let tilted = |angle: f64| {
@@ -205,12 +210,13 @@ fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
         let normals = samples.normals.as_ref().unwrap().iter().map(|n| tilt(*n)).collect();
         Points { normals: Some(normals), ..samples.clone() }
     };
-    // The mean square is a parabola over the tilt, so a plane that is off the nearest by less than half of `angle` is nearer
-    // than any that is tilted by it. Of 500 points in a cell, which are h = 0.015 high and p = 0.06 apart, chance turns the
-    // nearest plane by h / p / sqrt(500), a hundredth.
+    // The mean square is a parabola in the tilt, so a plane within `angle` / 2 of the best one
+    // beats all that are tilted by `angle`. With 500 points in a cell, of height h = 0.015 and
+    // extent p = 0.06, the best plane has a random error of h / p / sqrt(500), a hundredth.
     let angle = 0.1;
     assert_eq!(off_the_nearest_plane(&mesh, &samples, angle), 0);
-    // Controls: planes that are off by more than half of it; and those of facets, which are 0.07 off the sphere in the mean.
+    // Controls: planes that are off by more than half of `angle`, and planes of the facets, which
+    // are 0.07 off the sphere's on average.
     assert_eq!(off_the_nearest_plane(&mesh, &tilted(0.75 * angle), angle), 300);
     let places = samples.positions.iter().map(|p| DVec3::from(*p).normalize()).collect::<Vec<_>>();
     let facets = uniform(&mesh, 20_000);
@@ -225,14 +231,15 @@ fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
 
 #[test]
 fn normals_are_those_of_cells_but_none_blends_across_a_crease() {
-    // A sphere of large facets that names no normals.
+    // A sphere of large facets without normals.
     let mesh = sphere(3, false);
     let error = |points: &Points| {
         let normals = points.normals.as_ref().unwrap().iter();
         let angle = |(p, n): (&[f64; 3], &[f32; 3])| DVec3::from(*p).angle_between(DVec3::from(n.map(f64::from)));
         points.positions.iter().zip(normals).map(angle).sum::<f64>() / points.positions.len() as f64
     };
-    // Facets are 0.07 off in the mean. There are 512, so a cell goes across two or more.
+    // The facets' normals are 0.07 off on average. There are 512 facets, so a cell spans two or
+    // more.
     let (ours, facets) = (error(&by(&mesh, 300, Priority::Area)), error(&uniform(&mesh, 1000)));
     assert!(ours < 0.6 * facets && facets > 0.03, "{ours} {facets}");
     let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
@@ -243,14 +250,15 @@ fn normals_are_those_of_cells_but_none_blends_across_a_crease() {
 
 #[test]
 fn samples_follow_the_priority() {
-    // The right half has 32 triangles for every one of the left half, and the same area.
+    // The right half has 32 triangles, the left half 2, and both have the same area.
     let mesh = strip(4);
     let even = right_of(&by(&mesh, 1000, Priority::Area), 1.0);
     assert!((490..=510).contains(&even), "{even}");
-    // 32 of 34 triangles are right: 941 samples, of which the border's move over a little.
+    // 32 of 34 triangles are on the right: 941 samples, of which some at the border move to the
+    // left.
     let many = right_of(&by(&mesh, 1000, Priority::Triangles), 1.0);
     assert!((915..=945).contains(&many), "{many}");
-    // Any function of voxels will do.
+    // The priority can be any function of the voxels.
     let only_left = |_: &MeshSurface<'_>, voxels: &[Voxel]| {
         voxels.iter().map(|voxel| if voxel.bounds.center().x < 0.0 { voxel.area } else { 0.0 }).collect()
     };
@@ -258,7 +266,7 @@ fn samples_follow_the_priority() {
     let (points, sampling) = sample(&mesh, 100, &method, 0, &()).unwrap();
     assert_eq!((right_of(&points, 1.0), sampling.voxels, sampling.empty_voxels), (0, 8, 4));
 
-    // A flat square beside a sphere of the same area: the sphere bends.
+    // A flat square beside a sphere of the same area: only the sphere is curved.
     let mut both = sphere(4, false);
     let side = (4.0 * PI).sqrt();
     let first = both.positions.len() as u32;
@@ -270,7 +278,8 @@ fn samples_follow_the_priority() {
     assert!((980..1020).contains(&even), "{even}");
 }
 
-/// Where Tien 2008 places samples: the middle of each voxel projected, on the surface, and covering it; not as even as what is relaxed.
+/// Tien 2008 projects the centre of each voxel to the surface: the samples cover it, but less
+/// evenly than relaxed ones.
 #[test]
 fn projected_samples_cover_the_surface_less_evenly() {
     let mesh = sphere(4, true);
@@ -285,7 +294,7 @@ fn projected_samples_cover_the_surface_less_evenly() {
     assert!(coverage(&tree, &scene, 64, 96, &()).unwrap().is_hole_free());
     let nearest = |points: &Points| spacings(points).into_iter().fold(f64::INFINITY, f64::min);
     assert!(nearest(&points) < 0.3 * nearest(&by(&mesh, 3000, Priority::Area)));
-    // One in each voxel is at its middle: on a flat square, that of its box.
+    // A single sample in a voxel is at its centre; on a flat square, at that of its box.
     let method = Method::Projected { priority: &|_, voxels| vec![1.0; voxels.len()], depth: Some(4) };
     let mut square = sample(&strip(1), 16, &method, 0, &()).unwrap().0.positions;
     square.sort_by(|a, b| a.partial_cmp(b).unwrap());
@@ -306,11 +315,11 @@ fn a_triangle_counts_wholly_in_each_voxel_that_it_reaches() {
     };
     sample(&surface_mesh, 64, &Method::Stratified { priority: &both, depth: Some(3) }, 0, &()).unwrap();
     let [(touched, shared)] = seen.into_inner().unwrap()[..] else { panic!("asked twice") };
-    // Four triangles; each is cut by lines between the eight squares.
+    // Four triangles, each of which spans several of the eight squares.
     assert!((shared - 4.0).abs() < 1e-9 && touched > 8.0 && touched.fract() == 0.0, "{touched} {shared}");
 }
 
-/// The square with a texture: its left half one colour, its right half with stripes.
+/// The square with a texture: the left half has one colour, the right half stripes.
 fn striped() -> Mesh {
     let mut mesh = strip(1);
     let uv = |vertex: u32| mesh.positions[vertex as usize];
@@ -325,8 +334,8 @@ fn textures_give_colours_coordinates_and_priority() {
     let mesh = striped();
     let points = by(&mesh, 1000, Priority::Texture);
     let striped = right_of(&points, 1.0);
-    // A quarter of the samples is spread by area, half of it on the left; and the colour changes at the left half's own
-    // two borders, where the image is repeated.
+    // A quarter of the samples is distributed by area, half of these on the left. The colour also
+    // changes at the two borders of the left half, where the image repeats.
     assert!((750..875).contains(&striped), "{striped}");
     assert!((490..=510).contains(&right_of(&by(&mesh, 1000, Priority::Area), 1.0)));
     let (texture, Some(Colors::Linear(colors))) = (points.texture.as_ref().unwrap(), &points.colors) else {
@@ -382,7 +391,8 @@ fn what_cannot_be_sampled_is_counted_or_said() {
     let good = mesh.triangles.len() as u64;
     let first = mesh.positions.len() as u32;
     mesh.positions.extend([[f64::NAN, 0.0, 0.0], [1e300, 0.0, 0.0], [0.0; 3], [0.0; 3]]);
-    // Two that are not finite, three without an area, and two triangles that are there twice, once turned over.
+    // Two triangles that are not finite and three without an area; then two duplicates, one of them
+    // reversed.
     let bad = [[first, 0, 1], [first + 1, 0, 1], [0, 0, 1], [first + 2, first + 3, 1], [0, first + 2, 0]];
     mesh.triangles.extend(bad);
     mesh.triangles.extend([mesh.triangles[0], [2, 1, 0]]);
@@ -401,14 +411,15 @@ fn what_cannot_be_sampled_is_counted_or_said() {
     }
 }
 
-/// The share of a disk's radius by which disks go past an edge, and some more for those whose cells do.
+/// By which part of the largest radius disks may exceed an edge, with a margin for those whose
+/// cells do.
 const PAST: f64 = 0.03;
 
 #[test]
 fn disks_end_at_edges_and_borders() {
     let open = |sides: u32| {
         let mut mesh = bar(sides);
-        // Without its ends.
+        // Removes the ends of the bar.
         mesh.triangles.truncate(2 * sides as usize);
         mesh
     };
@@ -422,18 +433,18 @@ fn disks_end_at_edges_and_borders() {
         let radius = f64::from(scene.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
         assert!(rims(&scene).max < PAST * radius, "{:?} {radius}", rims(&scene));
         assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
-        // The control: whole disks.
+        // The control: unclipped disks.
         let whole = Scene { clips: Vec::new(), ..scene };
         assert!(rims(&whole).max > 10.0 * PAST * radius, "{:?} {radius}", rims(&whole));
     }
-    // A smooth surface has none.
+    // A smooth surface has no clip lines.
     let smooth = by(&sphere(5, false), 2000, Priority::Area);
     assert!(smooth.clips.is_none() && smooth.axes.is_some() && smooth.radii.is_some());
 }
 
 #[test]
 fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
-    // A bar that is lit as if it were round.
+    // A square bar with the normals of a round one.
     let mut mesh = bar(4);
     let outward = |vertex: u32| {
         let [x, y, _] = mesh.positions[vertex as usize];
@@ -451,12 +462,12 @@ fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
     });
     assert!(turned.count() > 300, "normals that are not those of the planes");
 
-    // With all normals inward disks are turned over, and end where they did.
+    // If all normals point inward, the disks are reversed and end at the same edges.
     for normal in mesh.normals.iter_mut().flatten().flatten() {
         *normal = normal.map(|c| -c);
     }
     let (inward, _) = build(vec![by(&mesh, 3000, Priority::Area)], &()).unwrap();
-    // At its ends the bar's normals are in their planes, and tell no side.
+    // At the ends of the bar the normals lie in the planes, so they do not tell a side.
     let mut pairs = scene.surfels.iter().zip(&inward.surfels).filter(|(a, _)| a.normal().normalize().z.abs() < 0.5);
     assert!(pairs.all(|(a, b)| a.normal().dot(b.normal()) < 0.0));
     assert!(inward.clips.iter().filter(|clip| !clip.is_none()).count() > 300);
@@ -466,7 +477,7 @@ fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
 
 #[test]
 fn caps_are_curved_as_the_mesh_is() {
-    // On a fine sphere rims lie much nearer to it than those of disks.
+    // On a fine sphere the rims of caps are much nearer to it than those of disks.
     let mesh = sphere(5, true);
     let tree = TriangleTree::new(&mesh).unwrap();
     let off = |points: Points| {
@@ -479,7 +490,7 @@ fn caps_are_curved_as_the_mesh_is() {
     assert_eq!(curved.caps.as_ref().unwrap().len(), 2000);
     let (disks, caps) = (off(points.clone()), off(curved));
     assert!(4.0 * caps < disks, "{caps} {disks}");
-    // Nothing curves on the sides of a bar, though it is lit as if it were round.
+    // The sides of a bar are not curved, though it has the normals of a round one.
     let mut mesh = bar(4);
     let outward = |vertex: u32| {
         let [x, y, _] = mesh.positions[vertex as usize];
@@ -489,6 +500,6 @@ fn caps_are_curved_as_the_mesh_is() {
     let caps = curve(by(&mesh, 3000, Priority::Area), &()).unwrap().caps.unwrap();
     let highest = caps.iter().map(Cap::highest).fold(0.0, f64::max);
     assert!(highest < 1e-6, "{highest}");
-    // What has no planes has no caps.
+    // Points without planes get no caps.
     assert!(curve(Points { axes: None, ..points }, &()).unwrap().caps.is_none());
 }

@@ -1,4 +1,5 @@
-//! What scans need of `epsplat render`: which way is up, a view that is told, radii within limits, and no outliers.
+//! Scans in `epsplat render`: the up direction, the report of the view, limits of radii, and the
+//! removal of outliers.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -6,7 +7,7 @@ use crate::common;
 
 use common::command::{DATA, Folder, fails, ply, succeeds, text};
 
-/// The line that says which view was chosen.
+/// The line that reports the chosen view.
 fn view(output: &std::process::Output) -> String {
     let stderr = String::from_utf8(output.stderr.clone()).unwrap();
     let lines: Vec<_> = stderr.lines().filter(|line| line.starts_with("view: ")).collect();
@@ -37,7 +38,8 @@ fn the_view_that_was_chosen_is_told_in_words_that_give_it_again() {
         let given = again.replace("(as asked for)", why);
         assert!(given == told && same == picture, "{told} {again}");
     }
-    // The control: another up is another picture, and the names of axes are their vectors.
+    // The control: another up direction gives another picture, and names of axes mean their
+    // vectors.
     let of = |up: &str| draw(&bunny, "up.png", &["--up", up]).1;
     assert!(of("z") != of("y") && of("z") == of("0,0,1") && of("-x") == of("-1,0,0"));
     assert!(of("y") == draw(&bunny, "default.png", &[]).1);
@@ -53,8 +55,8 @@ fn the_view_that_was_chosen_is_told_in_words_that_give_it_again() {
     assert_eq!((&report["view"]["up"], report["width"].as_u64()), (&serde_json::json!([0.0, 0.0, 1.0]), Some(48)));
 }
 
-/// A view straight down is turned by what little lies across up: that is told, with what turns
-/// north to the top.
+/// A view straight down is rotated by a tiny component across up: a warning names the up direction
+/// that puts north at the top.
 #[test]
 fn a_top_view_that_is_turned_is_told() {
     let folder = Folder::new();
@@ -66,15 +68,15 @@ fn a_top_view_that_is_turned_is_told() {
         let output = succeeds(&[&["render", text(&flat), "-o", text(&image)], &view[..], up].concat());
         String::from_utf8(output.stderr).unwrap()
     };
-    // Toward (sin 40, cos 40), a few tenths of a degree off.
+    // The target is a few tenths of a degree off, toward (sin 40, cos 40).
     let turned = told("10.257,10.306,0", &["--up", "z"]);
     assert!(
         turned.contains("warning: the view is only 0.5 degrees off") && turned.contains("north (+y) is 40 degrees"),
         "{turned}"
     );
     assert!(turned.contains("view: --eye 10,10,50 --target 10.257,10.306,0 --up z (as asked for)"), "{turned}");
-    // By the scene's own up it is the same; straight down, from aside and with north up nothing is
-    // odd.
+    // The scene's own up gives the same. There is no warning for a view straight down, from the
+    // side or with north up.
     assert!(told("10.257,10.306,0", &[]).contains("is 40 degrees from its top"));
     for (target, up) in [("10,10,0", &[][..]), ("30,10,0", &["--up", "z"]), ("10.257,10.306,0", &["--up", "y"])] {
         let told = told(target, up);
@@ -88,26 +90,26 @@ fn up_stays_what_it_was_in_what_is_written() {
     let made = folder.path("made.ply");
     let drawn = |input: &str| {
         let image = folder.path("view.png");
-        // So large that no disk is cut, which would take the camera farther away.
+        // Large enough that no disk is clipped, which would move the camera away.
         view(&succeeds(&["render", input, "-o", text(&image), "--size", "640x640", "--backend", "reference"]))
     };
     let up = || epsplat::io::read(&made, &()).unwrap().up.unwrap().name();
-    // As tall as wide, so that a reader who is not told would guess y.
+    // As tall as wide, so that without the comment y would be guessed.
     let rows: String = (0..1000).map(|i| format!("{} {} {}\n", i % 10, i / 10 % 10, i / 100)).collect();
     let tall = folder.file("tall.ply", ply("x y z", 1000, &rows).replace("end_header", "comment up z\nend_header"));
     for command in [&["surfels"][..], &["surfels", "--size", "ellipse"], &["simplify", "--tolerance", "rel:0.1"]] {
         succeeds(&[command, &[text(&tall), "-o", text(&made)]].concat());
         assert_eq!(up(), "z", "{command:?}");
     }
-    // The control: without the comment it would tip over.
+    // The control: without the comment the scene is tipped over.
     let unsaid = folder.file("unsaid.ply", ply("x y z", 1000, &rows));
     assert!(drawn(text(&unsaid)).ends_with("--up y (a guess)"));
-    // Of a scan the same camera, by way of surfels.
+    // A scan and the surfels made from it have the same camera.
     let scan = format!("{DATA}/autzen.laz");
     succeeds(&["surfels", &scan, "-o", text(&made)]);
     let (scan, surfels) = (drawn(&scan), drawn(text(&made)));
     assert!(scan == surfels && scan.ends_with("--up z (as the file or its format says)"), "{scan} {surfels}");
-    // An OBJ file has y up, however flat.
+    // OBJ files have y up, even if flat.
     let floor = folder.file("floor.obj", "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n");
     succeeds(&["sample", text(&floor), "-o", text(&made), "--count", "500"]);
     assert_eq!(up(), "y");

@@ -1,5 +1,7 @@
-//! Fewer surfels for the same surface: numbers against closed forms, coverage of the whole surface and not of its points only,
-//! and inputs that have nothing to grow on.
+//! Simplification of surfels, compared with closed forms.
+//!
+//! The whole surface must be covered, not only the input points; inputs on which no disk can grow
+//! are tested too.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -49,7 +51,7 @@ fn run(scene: &Scene, options: Options) -> (Vec<Surfel>, Report) {
     (simplified.surfels, report)
 }
 
-/// The surfel as large as it grew.
+/// The surfel at the size to which it grew; it is written larger.
 fn as_grown(surfel: &Surfel, tolerance: f64) -> Surfel {
     let shrunk = |axis: [f32; 3]| {
         let length = Vec3::from_array(axis).as_dvec3().length();
@@ -58,7 +60,7 @@ fn as_grown(surfel: &Surfel, tolerance: f64) -> Surfel {
     Surfel { s: shrunk(surfel.s), t: shrunk(surfel.t), ..*surfel }
 }
 
-/// Whether `surfel` is one of `sampled` as it came, or a little larger.
+/// Whether `surfel` is one of `sampled`, unchanged or slightly enlarged.
 fn came(surfel: &Surfel, sampled: &[Surfel]) -> bool {
     let along = |own: [f32; 3], other: [f32; 3]| {
         let [own, other] = [own, other].map(|axis| Vec3::from_array(axis).as_dvec3());
@@ -75,7 +77,7 @@ fn center(surfel: &Surfel) -> DVec3 {
     Vec3::from_array(surfel.center).as_dvec3()
 }
 
-/// Coordinates in the disk (u, v) and the height over it, along its normal, in world units.
+/// Disk coordinates (u, v) of `p`, and its height above the disk along the normal, world units.
 fn place(surfel: &Surfel, p: DVec3) -> DVec3 {
     let offset = p - center(surfel);
     let [s, t] = [surfel.s, surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
@@ -86,10 +88,11 @@ fn place(surfel: &Surfel, p: DVec3) -> DVec3 {
     )
 }
 
-/// Of points spread over the surface, those above no disk: a disk shrunk by `shrink` holds a point if it is within it and at most
-/// `height` away.
+/// The number of points spread over the surface that no disk holds.
+///
+/// A disk, scaled by `shrink`, holds a point above or below it that is at most `height` away.
 fn uncovered(surface: Shape, surfels: &[Surfel], shrink: f64, height: f64) -> usize {
-    // More than there are samples in any test, so most lie between them.
+    // More points than any test has samples, so most lie between the samples.
     let points = generate(surface, 60_000).map(|sample| DVec3::from_array(sample.position));
     let holds = |surfel: &Surfel, p: DVec3| {
         let at = place(surfel, p);
@@ -106,8 +109,8 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
     let (surfels, report) = run(&sphere, within(tolerance));
     assert_eq!(report.beyond_tolerance, 0);
     assert!(report.max_deviation <= tolerance * (1.0 + 1e-6), "{}", report.max_deviation);
-    // A disk halfway between the heights 1 and 1 - 2 E of a cap has the radius sqrt(1 - (1 - 2 E)²); the first point that it
-    // cannot hold is at most a spacing farther out.
+    // A disk halfway between the heights 1 and 1 - 2 E of a cap has the radius sqrt(1 - (1 - 2
+    // E)²). The first point beyond its reach is at most one spacing farther out.
     let sagitta = (1.0 - (1.0 - 2.0 * tolerance).powi(2)).sqrt();
     let spacing = (Shape::Sphere.area() / count as f64).sqrt();
     let grown = |surfel: &Surfel| f64::from(as_grown(surfel, tolerance).radius());
@@ -123,13 +126,15 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
         let normal = surfel.normal().as_dvec3().normalize();
         assert!(normal.dot(center(surfel) / distance) > 1.0 - 1e-6);
     }
-    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r²)): no fewer can cover the sphere. Circles that cover a
-    // plane overlap by at least 2 pi / sqrt(27) (Kershner 1939); greedy selection takes less than twice that.
+    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r²)), which gives a lower bound
+    // of the number. Circles that cover a plane overlap by at least 2 pi / sqrt(27) (Kershner
+    // 1939); greedy selection needs less than twice that.
     let cap = |radius: f64| 2.0 * PI * (1.0 - (1.0 - radius * radius).sqrt());
     let (fewest, kershner) = (Shape::Sphere.area() / cap(largest), 2.0 * PI / 27f64.sqrt());
     let number = surfels.len() as f64;
     assert!(number >= fewest && number <= 2.0 * kershner * fewest, "{number} of {fewest}");
-    // The area of a disk goes with the tolerance, so four times as many are needed for a quarter.
+    // A disk's area is proportional to the tolerance, so a quarter of it needs four times as many
+    // disks.
     let finer = run(&sphere, within(tolerance / 4.0)).0.len() as f64;
     assert!((3.2..5.0).contains(&(finer / number)), "{number}, {finer}");
 }
@@ -142,10 +147,11 @@ fn no_hole_is_left_between_the_points_either() {
             let options = Options { shape: splats, relaxations, ..within(tolerance) };
             let (surfels, _) = run(&sampled, options);
             let surfels: Vec<Surfel> = surfels.iter().map(|surfel| as_grown(surfel, tolerance)).collect();
-            // Cells of neighbours are cut in different planes, which is off by the square of their size over that of the surface.
+            // Neighbouring cells are cut in different planes, with an error of the squared ratio of
+            // their size to the surface's.
             let grown = 1.005;
             assert_eq!(uncovered(surface, &surfels, grown, 3.0 * tolerance), 0, "{surface:?} {splats:?} {relaxations}");
-            // Controls: with smaller disks there are holes, and with three in four of them.
+            // Controls: smaller disks leave holes, and so do three in four of them.
             assert!(uncovered(surface, &surfels, 0.85, 3.0 * tolerance) > 0);
             let fewer: Vec<Surfel> = surfels.chunks(4).flat_map(|four| &four[1..]).copied().collect();
             assert!(uncovered(surface, &fewer, grown, 3.0 * tolerance) > 0);
@@ -164,7 +170,7 @@ fn ellipses_and_relaxation_leave_fewer_where_they_can() {
     let disks = number(&torus, SplatShape::Disk, 0);
     assert!(number(&torus, SplatShape::Ellipse, 0) < 0.85 * disks);
     assert!(number(&torus, SplatShape::Disk, 3) < 0.95 * disks);
-    // A sphere bends the same way everywhere, so there ellipses are none.
+    // A sphere has the same curvature in all directions, so ellipses have no advantage.
     let sphere = shape(Shape::Sphere, 30_000);
     let ratio = number(&sphere, SplatShape::Ellipse, 0) / number(&sphere, SplatShape::Disk, 0);
     assert!((0.98..1.02).contains(&ratio), "{ratio}");
@@ -172,7 +178,7 @@ fn ellipses_and_relaxation_leave_fewer_where_they_can() {
 
 #[test]
 fn caps_are_fewer_than_half_of_the_disks_and_leave_no_hole() {
-    // A sphere is nearly a paraboloid in each place, and a torus bends both ways.
+    // A sphere is locally close to a paraboloid; a torus curves both ways.
     for (surface, count, tolerance) in [(Shape::Sphere, 6_000, 0.004), (Shape::Torus, 12_000, 0.004)] {
         let sampled = shape(surface, count);
         let of = |shape: SplatShape| simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
@@ -180,14 +186,15 @@ fn caps_are_fewer_than_half_of_the_disks_and_leave_no_hole() {
         assert!(3 * caps.surfels.len() < disks.surfels.len(), "{} {}", caps.surfels.len(), disks.surfels.len());
         assert!(report.max_deviation <= tolerance && report.beyond_tolerance == 0, "{report:?}");
         assert_eq!(caps.caps.len(), caps.surfels.len());
-        // Points of the surface lie within the tolerance of a cap, as far as the points between them do not.
+        // Input points lie within the tolerance of a cap; the surface between them may exceed it a
+        // little.
         let tree = DiskTree::new(&caps);
         let off = |scene: &DiskTree| {
             let points = generate(surface, 20_000).map(|sample| scene.distance(DVec3::from_array(sample.position)));
             points.fold(0.0, f64::max)
         };
         assert!(off(&tree) < 1.2 * tolerance, "{}", off(&tree));
-        // The controls: the same surfels flat, and one in ten left out.
+        // The controls: the same surfels without caps, and one in ten left out.
         let flat = DiskTree::new(&Scene { caps: Vec::new(), ..caps.clone() });
         assert!(off(&flat) > 3.0 * tolerance, "{}", off(&flat));
         let nine = |all: &[usize]| all.chunks(10).flat_map(|ten| ten[1..].to_vec()).collect::<Vec<_>>();
@@ -205,7 +212,7 @@ fn caps_are_fewer_than_half_of_the_disks_and_leave_no_hole() {
 /// Two sheets of a slab, one spacing apart or less, with normals outward or all upward.
 fn slab(gap: f64, outward: bool) -> Scene {
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    // Different lattices, or the points of one would lie exactly above those of the other.
+    // Different lattices, so that points of one are not exactly above those of the other.
     for (z, up, count) in [(gap, 1.0, 4_000), (0.0, if outward { -1.0 } else { 1.0 }, 3_700)] {
         for sample in generate(Shape::Plane, count) {
             positions.push([sample.position[0], sample.position[1], z]);
@@ -232,7 +239,7 @@ fn splats_do_not_bridge_to_another_sheet() {
         assert!(!sheet.is_empty() && sheet.iter().all(|s| (f64::from(s.center[2]) - z).abs() < 1e-6));
         assert_eq!(uncovered(Shape::Plane, &sheet, 1.0 + 1e-6, 0.02), 0);
     }
-    // Control: it is the normals that keep them apart.
+    // Control: without opposite normals the sheets are merged.
     assert!(off_sheet(&run(&slab(gap, false), options).0) > 0);
 }
 
@@ -243,15 +250,15 @@ fn a_surface_with_edges_is_neither_shortened_nor_drawn_out() {
     assert!(report.max_deviation == 0.0 && surfels.len() < 1_000, "{}", surfels.len());
     let surfels: Vec<Surfel> = surfels.iter().map(|s| as_grown(s, 0.0)).collect();
     assert_eq!(uncovered(Shape::Plane, &surfels, 1.0 + 1e-6, 1e-9), 0);
-    // The surface goes on for the 1.5 spacings of an input disk past the last point, and from any place on the edge it is at most
-    // a spacing to one of the last points.
+    // The surface extends past the last point by the radius of an input disk, 1.5 spacings, and
+    // from any place on the edge it is at most one spacing to one of the last points.
     let spacing = (Shape::Plane.area() / 10_000.0).sqrt();
     for surfel in &surfels {
         let grown = f64::from(surfel.radius());
         let past = center(surfel).truncate().abs().max_element() + grown - 1.0;
         assert!(past <= 2.5 * spacing, "{past} of {spacing}");
     }
-    // Two faces of a box: no disk leaves its face for the other.
+    // Two faces of a box: no disk extends from one face to the other.
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
     for sample in generate(Shape::Plane, 4_000) {
         let [x, y, _] = sample.position;
@@ -273,7 +280,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
     let method = Method::Stratified { priority: &evenly, depth: None };
     let tolerance = 0.001;
     let ellipses = Options { shape: SplatShape::Ellipse, relaxations: 2, ..within(tolerance) };
-    // Edges of 60 degrees, which no disk reaches around; and of 120, which disks must end at though the normals agree.
+    // Edges of 60 degrees, which no disk spans; and of 120 degrees, where disks must end though the
+    // normals are similar.
     for (sides, options) in [(3, within(tolerance)), (6, within(tolerance)), (6, ellipses)] {
         let mesh = bar(sides);
         let (points, _) = sample(&mesh, 6_000, &method, 0, &()).unwrap();
@@ -297,24 +305,26 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
         let seen = |scene: &Scene, side: u32| coverage(&tree, scene, 64, side, &()).unwrap();
         let whole = seen(&simplified, 256);
         assert!(whole.is_hole_free(), "{options:?}: {whole:?}");
-        // Nor is there a hole between whole disks as they grew, which is what selection sees to: some are written twice as long, as
-        // large as the samples were.
+        // The unclipped disks at the size to which they grew, on which the selection relies, leave
+        // no hole either. Some are written at twice that size, that of the samples.
         let uncut = |surfels: Vec<Surfel>| Scene { surfels, clips: Vec::new(), ..simplified.clone() };
         let fewer: Vec<Surfel> = surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         let least = seen(&uncut(surfels), 128);
         assert!(least.is_hole_free(), "{options:?}: {least:?}");
-        // Control: with one in ten left out.
+        // Control: one in ten left out.
         assert!(bare(&fewer) > 0);
         assert!(!seen(&uncut(fewer), 128).is_hole_free());
-        // Disks are as large as the faces where those are flat, and end with them: all but those that no two lines could cut.
+        // On flat faces disks become as large as the faces and end with them, except those that two
+        // lines cannot clip.
         let rims = SurfaceDistances::of(&simplified, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
         let spacing = sampled.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
         let largest = simplified.surfels.iter().map(|s| f64::from(s.radius())).fold(0.0, f64::max);
         assert!(rims.percentile_99 < 0.05 * spacing && largest > 6.0 * spacing, "{rims:?} {spacing}");
-        // At most a disk shows that covers its own cell, as an input disk does, and is written 0.4 longer.
+        // At worst, a disk covers only its own cell, as an input disk does, and is written 1.4
+        // times as large.
         let limit = 1.4 * sampled.surfels.iter().map(|s| f64::from(s.radius())).fold(0.0, f64::max);
         assert!(rims.max < limit, "{options:?}: {rims:?} {limit}");
-        // Control: half as long again, those that end at an edge show more.
+        // Control: disks enlarged by 1.5 stand out more at the edges.
         let longer = |s: &Surfel| Surfel { s: s.s.map(|c| 1.5 * c), t: s.t.map(|c| 1.5 * c), ..*s };
         let surfels = simplified.surfels.iter().map(longer).collect();
         let longer = Scene { surfels, clips: Vec::new(), ..simplified.clone() };
@@ -322,7 +332,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
     }
 }
 
-/// A closed cylinder along z from -1 to 1 and of circumference 2, of points in a plane's lattice; its edges are right angles.
+/// A closed cylinder along z from -1 to 1 of circumference 2, with points in a plane's lattice; its
+/// edges are right angles.
 fn cylinder(count: u64) -> (Scene, f64) {
     let radius = 1.0 / PI;
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
@@ -346,7 +357,7 @@ fn cylinder(count: u64) -> (Scene, f64) {
 fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     let (sampled, spacing) = cylinder(20_000);
     let tolerance = 0.002;
-    // How far a disk goes past the end of the cylinder, and how far it would without the lines at which it ends.
+    // How far a disk extends past the end of the cylinder; `whole` below ignores the clip lines.
     let past = |(surfel, clip): (&Surfel, Clip)| {
         let [s, t] = [surfel.s[2], surfel.t[2]].map(f64::from);
         let rim = (0..256).map(|k| (f64::from(k) / 128.0 * PI).sin_cos());
@@ -357,17 +368,18 @@ fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     for shape in [SplatShape::Disk, SplatShape::Ellipse] {
         let (simplified, _) = simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
         let Scene { surfels, clips, .. } = simplified;
-        // As far as a cell may, and eight tolerances more; and a fifth of a surfel's radius, by which those that are cut go past.
+        // The limit is that of a cell, plus eight tolerances, plus a fifth of a surfel's radius, by
+        // which clipped disks may exceed it.
         let radius = f64::from(sampled.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
         let limit = 2.5 * spacing + 8.0 * tolerance + 0.2 * radius;
         let farthest = surfels.iter().zip(clips).map(past).fold(0.0, f64::max);
         assert!(farthest <= limit, "{shape:?}: {farthest} of {limit}");
-        // There are some on the side that end there, and they are long.
+        // Some ellipses on the side end there, and they are long.
         let ratio = |s: &Surfel| f64::from(Vec3::from_array(s.s).length() / Vec3::from_array(s.t).length()).ln().abs();
         let ending = surfels.iter().filter(|surfel| whole(surfel) > 0.0 && surfel.normal().z.abs() < 0.5);
         let long = ending.clone().filter(|surfel| ratio(surfel) > 3f64.ln()).count();
         assert_eq!(long > 20, shape == SplatShape::Ellipse, "{long}");
-        // Control: longer by two fifths, ellipses are beyond.
+        // Control: enlarged by 1.4, ellipses exceed the limit.
         let longer = |s: &Surfel| whole(&Surfel { s: s.s.map(|c| 1.4 * c), t: s.t.map(|c| 1.4 * c), ..*s });
         assert!(shape == SplatShape::Disk || ending.map(longer).fold(0.0, f64::max) > limit);
     }
@@ -390,7 +402,7 @@ fn no_surfel_is_smaller_than_the_one_it_stands_in_for() {
         surfels.iter().filter(is_smaller).count()
     };
     assert_eq!(smaller(&surfels), 0);
-    // Control: as they grew, some are.
+    // Control: at the size to which they grew, some are smaller.
     assert!(smaller(&surfels.iter().map(|surfel| as_grown(surfel, tolerance)).collect::<Vec<_>>()) > 0);
 }
 
@@ -435,7 +447,7 @@ fn inputs_with_nothing_to_grow_on_keep_their_points() {
     let (surfels, report) = run(&alike, within(0.1));
     assert_eq!((surfels.len(), report.distinct_positions), (1, 1));
     assert!(center(&surfels[0]).distance(DVec3::new(3.0, 4.0, 5.0) - alike.origin) < 1e-6);
-    // Normals that cancel leave one of them.
+    // Normals that cancel: one of them is kept.
     let both: Vec<[f32; 3]> = (0..100).map(|i| [0.0, 0.0, if i % 2 == 0 { 1.0 } else { -1.0 }]).collect();
     let (surfels, _) = run(&scene(vec![[0.0; 3]; 100], Some(both)), within(0.1));
     assert!(surfels.len() == 1 && surfels[0].normal().z.abs() > 0.0);
@@ -444,7 +456,8 @@ fn inputs_with_nothing_to_grow_on_keep_their_points() {
         let (surfels, _) = run(&scene(few, None), within(0.0));
         assert!((1..=count as usize).contains(&surfels.len()));
     }
-    // Far from everything, each in its own direction: no disk of the sphere can hold one, and none gets a disk out to it.
+    // Distant points with different normals: no disk of the sphere can hold one, and none grows
+    // toward it.
     let mut positions: Vec<[f64; 3]> = generate(Shape::Sphere, 2_000).map(|sample| sample.position).collect();
     let lone = [[50.0, 0.0, 0.0], [0.0, -70.0, 1.0], [20.0, 20.0, 90.0]];
     positions.extend(lone);
@@ -457,7 +470,7 @@ fn inputs_with_nothing_to_grow_on_keep_their_points() {
     }
     let largest = surfels.iter().max_by(|a, b| a.radius().total_cmp(&b.radius())).unwrap();
     assert!(largest.radius() < 2.0 && surfels.len() < 300, "{largest:?} of {}", surfels.len());
-    // Not a number, and on a line.
+    // A point that is not finite, and points on a line.
     let odd = vec![[f64::NAN, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0], [0.0, f64::INFINITY, 0.0]];
     assert!(!run(&scene(odd, None), within(0.5)).0.is_empty());
     let line: Vec<[f64; 3]> = (0..500).map(|i| [f64::from(i), 0.0, 0.0]).collect();
@@ -482,7 +495,7 @@ fn colours_are_means_over_what_is_covered() {
     let mut mixed = 0;
     for (index, surfel) in simplified.surfels.iter().enumerate() {
         let [r, g, b, a] = simplified.colors.linear(index).map(f64::from);
-        // Shares of red and blue.
+        // The fractions of red and blue.
         let (red, blue) = (r / 4.0, b / 2.0);
         assert!((red + blue - 1.0).abs() < 1e-5 && g == 0.0 && (a - 1.0).abs() < 1e-6);
         let (x, radius) = (f64::from(surfel.center[0]), f64::from(as_grown(surfel, 0.01).radius()));
@@ -490,7 +503,7 @@ fn colours_are_means_over_what_is_covered() {
             assert_eq!(red.round(), f64::from(u8::from(x < 0.0)));
             assert!(red.min(blue) < 1e-6);
         } else if x.abs() < 0.5 * radius && radius > 0.2 {
-            // The segment of a disk beyond a chord, as a share of it.
+            // The fraction of a disk beyond a chord.
             let c = x / radius;
             let share = (c.acos() - c * (1.0 - c * c).sqrt()) / PI;
             assert!((red - share).abs() < 0.1, "{red} {share}");
@@ -500,8 +513,11 @@ fn colours_are_means_over_what_is_covered() {
     assert!(mixed > 0);
 }
 
-/// As Tien 2008 selects: every point lies within the ratio of a disk's radius, at its height within the tolerance; more disks than cells need,
-/// and the fewer the greater the ratio. The order of points changes nothing.
+/// The selection of Tien 2008: every point lies within `ratio` times a disk's radius, and its
+/// height within the tolerance.
+///
+/// It needs more disks than `simplify`, and fewer with a greater ratio. The order of points does
+/// not matter.
 #[test]
 fn disks_as_in_the_thesis_conquer_every_point() {
     let (tolerance, sphere) = (0.004, shape(Shape::Sphere, 6_000));
@@ -526,7 +542,7 @@ fn disks_as_in_the_thesis_conquer_every_point() {
         [disks.surfels, by(&other, 0.6).0.surfels].map(|all| all.into_iter().map(|s| s.center).collect::<Vec<_>>());
     [&mut a, &mut b].into_iter().for_each(|all| all.sort_by(|a, b| a.partial_cmp(b).unwrap()));
     assert_eq!(a, b);
-    // A few points are all there are neighbours.
+    // With so few points, all are neighbours.
     let three = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], Some(vec![[0.0, 0.0, 1.0]; 3]));
     assert_eq!(by(&three, 1.0).1.selected, 1);
 }
@@ -559,21 +575,21 @@ fn larger_surfels_end_where_those_did_that_they_stand_for() {
         let [with, without] = [points, unclipped].map(|points| build(vec![points], &()).unwrap().0);
         let (simplified, report) = simplify(&with, &within(0.001), &()).unwrap();
         let (control, report_without) = simplify(&without, &within(0.001), &()).unwrap();
-        // Cut at two ends a disk may grow past them, and fewer are needed.
+        // Disks clipped at two edges may grow past them, so fewer are needed.
         assert!(report.selected < report_without.selected / 2, "{report:?} {report_without:?}");
         let rims = |scene: &Scene| SurfaceDistances::of(scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
         let spacing = with.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
         let (ours, theirs) = (rims(&simplified), rims(&Scene { clips: Vec::new(), ..control }));
         assert!(ours.mean < 0.7 * theirs.mean && ours.percentile_99 < 0.8 * spacing, "{ours:?} {theirs:?} {spacing}");
         assert!(coverage(&tree, &simplified, 64, 128, &()).unwrap().is_hole_free());
-        // The control: without its lines it stands out.
+        // The control: without its clip lines it extends past the edges.
         assert!(rims(&Scene { clips: Vec::new(), ..simplified }).mean > 3.0 * ours.mean);
     }
 }
 
 #[test]
 fn no_surfel_fills_the_notch_of_a_face() {
-    // An L: the square [-1, 1] without its upper right quarter, a prism from z = 0 to 1.
+    // An L-shaped prism from z = 0 to 1: the square [-1, 1] without its upper right quarter.
     let outline = [[-1.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
     let positions = [0.0, 1.0].into_iter().flat_map(|z| outline.map(|[x, y]| [x, y, z])).collect();
     let mut triangles = Vec::new();

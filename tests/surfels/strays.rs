@@ -1,5 +1,7 @@
-//! Map coordinates do not jitter: strays, distant clusters, offsets of 1e12 and cameras far from the core leave the picture that
-//! the scene has alone, near zero.
+//! Map coordinates do not jitter.
+//!
+//! With strays, distant clusters, offsets of 1e12 or cameras far away, the picture equals that of
+//! the scene alone near zero.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -16,11 +18,11 @@ use epsplat::low_level::surfels::analytic::{Shape, generate};
 use epsplat::low_level::surfels::{Preparation, build, build_textured};
 use glam::DVec3;
 
-/// A corner of the world in UTM.
+/// A place in UTM coordinates.
 const MAP: DVec3 = DVec3::new(7e5, 6.26e6, 120.0);
 
-/// Spheres of radius 10 around `centers`, on a lattice of 2^-16 so that coordinates of up to 2^36 hold its points, and points at
-/// `strays`.
+/// Spheres of radius 10 around `centers`, and points at `strays`. All points are on a lattice of
+/// 2^-16, so that f64 coordinates of up to 2^36 represent them exactly.
 fn points(centers: &[DVec3], strays: &[DVec3]) -> Points {
     let samples: Vec<_> = generate(Shape::Sphere, 4000).collect();
     let on_lattice = |x: f64| (x * 65536.0).round() / 65536.0;
@@ -47,14 +49,15 @@ fn scene(centers: &[DVec3], strays: &[DVec3]) -> (Scene, Preparation) {
     build(vec![points(centers, strays)], &()).unwrap()
 }
 
-/// From 30 units away, or through a longer lens from `away` times as far.
+/// A camera 30 units away, or `away` times as far with a longer lens.
 fn camera(target: DVec3, away: f64) -> Camera {
     let eye = target + DVec3::new(4.0, 3.0, 29.0) * away;
     let fov = 2.0 * (0.4f64 / away).atan().to_degrees();
     Camera::look_at((128, 112), Lens::Fov(fov), eye, target, Some(DVec3::Y), Up::Y, 1.0).unwrap()
 }
 
-/// The kernels' picture of `scene` against the f64 reference of the sphere alone around zero, which has no digits to lose.
+/// Compares the kernels' picture of `scene` with the f64 reference of the sphere alone at zero,
+/// where no precision is lost.
 fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOptions) -> Option<Comparison> {
     let gpu = common::gpu()?;
     let maps = Maps::ON_DEVICE;
@@ -70,7 +73,8 @@ fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOption
 
 fn is_the_same(name: &str, scene: &Scene, center: DVec3, away: f64) {
     for low_pass in [LowPass::None, LowPass::Ewa] {
-        // From far away a tolerance of a radius would be within the digits of depths, and the sphere's back within 1e-6 of its front.
+        // From far away, an epsilon of one radius would be below the precision of depths, and the
+        // sphere's back within 1e-6 of its front.
         let (epsilon, cull) = (Epsilon::Relative(0.01), if away > 1e5 { Cull::Back } else { Cull::Auto });
         let options = RenderOptions { low_pass, epsilon, cull, ..RenderOptions::default() };
         let Some(comparison) = against_alone(scene, center, away, &options) else { return };
@@ -88,7 +92,7 @@ fn a_stray_leaves_the_scene_as_it_is() {
         assert_eq!(preparation.strays, strays.len() as u64);
         assert!(preparation.notes().iter().any(|note| note.contains("stray")), "{:?}", preparation.notes());
         is_the_same(&format!("{strays:?}"), &scene, MAP, 1.0);
-        // Where the origin goes by all points it is somewhere in between.
+        // If strays counted, the origin would be between them and the scene.
         assert!((scene.origin - MAP).length() < 20.0, "{}", scene.origin);
     }
 }
@@ -102,7 +106,7 @@ fn distant_clusters_are_each_as_they_are() {
         for center in [MAP, other] {
             is_the_same(&format!("{apart}"), &scene, center, 1.0);
         }
-        // The control: f32 centres alone.
+        // The control: centres in f32 only.
         let single = Scene { low: vec![], ..scene };
         if let Some(comparison) = against_alone(&single, other, 1.0, &RenderOptions::default()) {
             assert!(comparison.rmse_decided.unwrap() > 1e-3, "{apart}: {comparison:?}");
@@ -112,7 +116,7 @@ fn distant_clusters_are_each_as_they_are() {
 
 #[test]
 fn offsets_of_1e12_and_cameras_far_away_change_nothing() {
-    // 2^36, which holds the lattice's points, and 1e12, where an f64 has 2^-13 left.
+    // At 2^36 the lattice's points are exact; at 1e12 an f64 has a resolution of 2^-13.
     let far = DVec3::new(2f64.powi(36), -(2f64.powi(36)), 2f64.powi(35));
     is_the_same("2^36", &scene(&[far], &[]).0, far, 1.0);
     let (rounded, _) = scene(&[DVec3::splat(1e12)], &[]);
@@ -170,8 +174,10 @@ fn a_texture_far_away_is_where_it_is_near_zero() {
     assert!(error(&Scene { low: vec![], ..far }) > 1e-3);
 }
 
-/// A scan of 20,000 points, 100 by 80 by 10, and what lies beside it: the scene, and how much of the picture's width or height the scan
-/// fills.
+/// A scan of 20,000 points, 100 by 80 by 10, with additional points `beside`.
+///
+/// Returns the scene, the preparation, and the fraction of the picture's width or height that the
+/// scan fills.
 fn filled(beside: &[DVec3]) -> (Scene, Preparation, f64) {
     let at = |k: usize, step: f64| (k as f64 * step).fract();
     let scan = (0..20_000)
@@ -194,7 +200,7 @@ fn a_few_points_at_some_extents_do_not_shrink_the_picture() {
     assert_eq!(preparation.strays, 3);
     assert!((share - alone).abs() < 0.01, "{share} {alone}");
     assert!(preparation.notes().iter().any(|note| note.starts_with("3 points stray")), "{:?}", preparation.notes());
-    // What a scanner writes where it saw nothing is at one place, however often.
+    // Scanners write missing returns at one position, many times.
     let (_, preparation, share) = filled(&vec![DVec3::new(50.0, 40.0, -700.0); 500]);
     assert!(preparation.strays == 500 && (share - alone).abs() < 0.01, "{preparation:?} {share}");
 }
@@ -212,12 +218,12 @@ fn what_is_real_stays_in_the_picture() {
         }
         share
     };
-    // A mast of few points, each within reach of the next, up to three times the scan's width.
+    // A mast of few points, each near the next, up to three times the width of the scan.
     let mast = (1..=30).map(|k| DVec3::new(50.0, 40.0, 10.0 * f64::from(k))).collect();
     assert!(all_shown(mast, "mast") < 0.6);
-    // A hut far off, of more points than strays come together.
+    // A distant hut with more points than a group of strays may have.
     all_shown((0..25).map(|k| DVec3::new(400.0 + f64::from(k % 5), f64::from(k / 5), 3.0)).collect(), "hut");
-    // One point just beside.
+    // One point close beside the scan.
     all_shown(vec![DVec3::new(118.0, 40.0, 5.0)], "kerb");
 }
 

@@ -1,4 +1,4 @@
-//! The ray-cast truth against closed forms, and a mesh against the surface that it approximates.
+//! The ray-cast truth compared with closed forms, and a mesh with the surface that it approximates.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common;
@@ -17,7 +17,7 @@ use epsplat::low_level::surfels::analytic::Shape;
 use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::DVec3;
 
-/// Looks at the origin from `eye`, with an odd number of pixels so that one has its centre on the axis.
+/// Looks at the origin from `eye`. With an odd `side`, the axis goes through the centre of a pixel.
 fn camera(side: u32, lens: Lens, eye: DVec3) -> Camera {
     Camera::look_at((side, side), lens, eye, DVec3::ZERO, Some(DVec3::Y), Up::Y, 1e-3).unwrap()
 }
@@ -30,12 +30,12 @@ fn depth(truth: &Truth, pixel: usize) -> f64 {
     truth.frame.map(Map::Depth).unwrap()[pixel].into()
 }
 
-/// Pixels that the surface covers, as an area.
+/// The area that the surface covers, pixels.
 fn area(truth: &Truth) -> f64 {
     truth.coverage.iter().map(|&share| f64::from(share)).sum()
 }
 
-/// Through a sphere a ray meets its front and its back.
+/// A ray through a transparent sphere meets its front and its back.
 #[test]
 fn rays_go_through_what_lets_them_through() {
     let camera = camera(51, Lens::Fov(30.0), DVec3::new(0.0, 0.0, 5.0));
@@ -61,10 +61,11 @@ fn a_sphere_has_the_outline_and_depths_of_its_formula() {
         (camera, truth)
     };
     let center = 100 * 201 + 100;
-    // A pinhole at distance 5 sees the cone of tangents, tan = 1 / sqrt(5^2 - 1); f = 100.5 / tan(15 degrees).
+    // A pinhole at distance 5 sees the cone of tangents, tan = 1 / sqrt(5^2 - 1); f = 100.5 /
+    // tan(15 degrees).
     let (pinhole, seen) = truth(Lens::Fov(30.0));
     let radius = pinhole.fx / 24f64.sqrt();
-    // What 16 samples a pixel leave uncertain along the outline: 2.7e-5 was measured.
+    // The error of 16 samples per pixel along the outline; 2.7e-5 was measured.
     assert!((area(&seen) / (PI * radius * radius) - 1.0).abs() < 1e-4, "{}", area(&seen));
     let (orthographic, flat) = truth(Lens::OrthographicHeight(2.5));
     let scale = orthographic.fx;
@@ -97,7 +98,8 @@ fn a_torus_has_its_hole() {
     let truth = cast(&Surface::Analytic(Shape::Torus), &camera);
     let center = 100 * 201 + 100;
     assert_eq!((depth(&truth, center), truth.coverage[center]), (f64::INFINITY, 0.0));
-    // pi (1.4^2 - 0.6^2), times the square of the scale; two outlines of half the radius: 4.2e-4 was measured.
+    // pi (1.4^2 - 0.6^2) times the squared scale. Two outlines at half the radius: 4.2e-4 was
+    // measured.
     let expected = 1.6 * PI * camera.fx * camera.fx;
     assert!((area(&truth) / expected - 1.0).abs() < 1e-3, "{}", area(&truth) / expected);
     // The crest of the tube, and its bottom.
@@ -106,14 +108,14 @@ fn a_torus_has_its_hole() {
     let half = (0.16 - x * x).sqrt();
     assert!((depth(&truth, at) - (3.0 - half)).abs() < 3e-7);
     assert!((f64::from(truth.second_depth[at]) - (3.0 + half)).abs() < 3e-7);
-    // From the side four walls follow each other: the second is the tube's own far wall.
+    // Seen from the side, a ray meets four walls; the second is the far wall of the same tube.
     let side = self::camera(101, Lens::OrthographicHeight(4.0), DVec3::new(4.0, 0.0, 0.0));
     let side = cast(&Surface::Analytic(Shape::Torus), &side);
     let center = 50 * 101 + 50;
     assert!((depth(&side, center) - 2.6).abs() < 1e-6 && (side.second_depth[center] - 3.4).abs() < 1e-6);
 }
 
-/// A plane seen head-on, where every cosine has a formula.
+/// A plane seen head-on, for which every cosine has a formula.
 #[test]
 fn highlights_are_phongs() {
     let (size, distance, exponent) = (65, 5.0, 20.0);
@@ -131,7 +133,8 @@ fn highlights_are_phongs() {
     for pixel in (0..diffuse.color.len()).filter(|pixel| diffuse.map(Map::Depth).unwrap()[*pixel].is_finite()) {
         let [x, y] = [pixel % 65, pixel / 65].map(|k| (k as f64 - 32.0) / camera.fx);
         let toward_eye = DVec3::new(-x, y, 1.0).normalize();
-        // The headlight's own direction comes back by twice its angle; the other's is mirrored at z.
+        // The headlight's reflection deviates by twice its angle; that of the other light is
+        // mirrored at z.
         let of_headlight = 0.5 * toward_eye.z * (2.0 * toward_eye.z * toward_eye.z - 1.0).powf(exponent);
         let mirrored = DVec3::new(-toward.x, -toward.y, toward.z).dot(toward_eye).max(0.0);
         let of_other = 0.25 * toward.z * mirrored.powf(exponent);
@@ -142,7 +145,7 @@ fn highlights_are_phongs() {
         brightest = if alone > brightest.0 { (alone, pixel) } else { brightest };
         seen += 1;
     }
-    // The light stands to the right of the eye, so it is mirrored from the right of the middle.
+    // The light is to the right of the eye, so its highlight is to the right of the centre.
     let expected = 32.0 + toward.x / toward.z * camera.fx;
     assert!(seen > 3500 && (brightest.1 as f64 % 65.0 - expected).abs() <= 1.0, "{brightest:?} {expected}");
 }
@@ -160,7 +163,8 @@ fn shading_and_background_are_those_of_a_render() {
         let [r, g, b, alpha] = plain.frame.color[pixel];
         assert!(r == g && g == b && alpha == 1.0);
         light += f64::from(r);
-        // The headlight's cosine on z = 0 is that of the ray, here between those at the pixel's far and near corner.
+        // The headlight's cosine on z = 0 is that of the ray, which is between those at the pixel's
+        // far and near corners.
         let [x, y] = [pixel % 65, pixel / 65].map(|k| (k as f64 - 32.0).abs());
         let cosine = |across: f64| {
             let [x, y] = [(x + across).max(0.0), (y + across).max(0.0)].map(|d| d / camera.fx);
@@ -172,7 +176,7 @@ fn shading_and_background_are_those_of_a_render() {
     }
     let covered = (0..plain.coverage.len()).filter(inside).count();
     assert!(covered > 3500 && (light / covered as f64 - 0.5).abs() < 0.02, "{light} of {covered}");
-    // Beside the square there is background, and where it covers a part of the pixel, a part of it.
+    // Outside the square there is background; partly covered pixels contain a part of it.
     assert_eq!(plain.frame.color[0], [0.0, 0.5, 0.0, 1.0]);
     let mixed = |pixel: &usize| plain.coverage[*pixel] > 0.0 && plain.coverage[*pixel] < 1.0;
     for pixel in (0..plain.coverage.len()).filter(mixed) {
@@ -195,7 +199,8 @@ fn a_finer_mesh_comes_nearer_at_the_order_of_its_elements() {
         let depth = ratio(&|(flat, _)| flat.depth_relative.unwrap().mean);
         let flat = ratio(&|(flat, _)| flat.normal_degrees.unwrap().mean);
         let smooth = ratio(&|(_, smooth)| smooth.normal_degrees.unwrap().mean);
-        // Half the edge: a quarter of the sagitta, half the slope of a facet, and a quarter of what interpolation misses.
+        // Halving the edges gives a quarter of the depth error, half of the facets' normal error,
+        // and a quarter of that of interpolated normals.
         assert!((3.8..4.2).contains(&depth) && (1.9..2.1).contains(&flat) && (3.8..4.2).contains(&smooth));
     }
     assert!(errors[2].0.depth_relative.unwrap().mean < 1e-4 && errors[2].1.normal_degrees.unwrap().mean < 0.1);
@@ -203,7 +208,8 @@ fn a_finer_mesh_comes_nearer_at_the_order_of_its_elements() {
 
 #[test]
 fn no_ray_slips_through_an_edge_or_a_vertex() {
-    // Pixel centres and samples lie exactly on the octahedron's edges and vertices, and its outline is exact.
+    // Pixel centres and samples lie exactly on the octahedron's edges and vertices, and its outline
+    // is exact.
     let eye = DVec3::new(0.0, 0.0, 4.0);
     for (side, cuts) in [(65, 0), (64, 0), (257, 3)] {
         let camera = camera(side, Lens::OrthographicScale([32.0, 32.0, side as f64 / 2.0, side as f64 / 2.0]), eye);
@@ -216,7 +222,8 @@ fn no_ray_slips_through_an_edge_or_a_vertex() {
             if inside {
                 assert_eq!(truth.coverage[pixel], 1.0, "{x} {y}");
                 let second = f64::from(truth.second_depth[pixel]);
-                // The two walls are mirror images, also where the ray meets several triangles of one at once.
+                // The two walls are mirror images, also where the ray meets several triangles of
+                // one wall at once.
                 assert!((depth(&truth, pixel) + second - 8.0).abs() < 1e-6, "{x} {y}: {second}");
             }
         }
@@ -233,7 +240,7 @@ fn a_mesh_in_map_coordinates_loses_no_digits() {
     let there = Camera { eye: here.eye + offset, ..here };
     let far = cast(&Surface::mesh(&mesh).unwrap(), &there);
     let error = reconstruction(&far.frame, &near).unwrap();
-    // 5.8e6 in f64 is rounded to 5e-10, and the mesh with it.
+    // At 5.8e6 an f64 is rounded to 5e-10, and so is the mesh.
     assert_eq!((error.silhouette_iou, error.hole_rate), (Some(1.0), Some(0.0)));
     assert!(error.depth_relative.unwrap().mean < 1e-8 && error.max_abs < 1e-5, "{error:?}");
 }
@@ -261,14 +268,14 @@ fn what_has_no_area_is_not_there() {
     };
     nothing(&degenerate);
     nothing(&Mesh { triangles: vec![[0, 1, 5]], ..degenerate.clone() });
-    // They hide nothing of a triangle beside them.
+    // Degenerate triangles do not hide others.
     let mut mixed = degenerate;
     mixed.positions.extend([[-1.0, -1.0, 0.5], [1.0, -1.0, 0.5], [0.0, 1.0, 0.5]]);
     mixed.triangles.push([6, 7, 8]);
     let truth = cast(&Surface::mesh(&mixed).unwrap(), &camera);
     assert_eq!(depth(&truth, 16 * 33 + 16), 4.5);
     assert_eq!(truth.second_depth[16 * 33 + 16], f32::INFINITY);
-    // Over no pixels, no measure says that all is well.
+    // Without pixels no measure reports success.
     let error = reconstruction(&empty.frame, &empty).unwrap();
     assert_eq!(
         (error.depth_relative, error.hole_rate, error.leak_rate, error.silhouette_iou, error.outline_px),
@@ -297,7 +304,7 @@ fn obj_files_keep_their_normals_and_colors() {
     assert_eq!(read("f 1 2 3 4").frame.normals().unwrap()[center], [0.0, 0.0, 1.0]);
     let smooth = read("f 1//1 2//1 3//1 4//1").frame;
     assert_eq!(smooth.normals().unwrap()[center], [0.0, 0.6, 0.8]);
-    // Half way from red to blue, in linear light.
+    // Halfway from red to blue, in linear light.
     let [r, g, b, alpha] = smooth.color[center];
     assert!((r - 0.5).abs() < 1e-6 && g == 0.0 && (b - 0.5).abs() < 1e-6 && alpha == 1.0, "{:?}", smooth.color[center]);
     for (name, bytes) in [("missing.obj", None), ("cloud.ply", Some("ply\n")), ("bad.obj", Some("f 1 2 3\n"))] {
@@ -327,15 +334,15 @@ fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     let vertex_normals = points.normals.unwrap();
     mesh.normals = Some(mesh.triangles.iter().map(|t| t.map(|vertex| vertex_normals[vertex as usize])).collect());
     let smooth = error(&Surface::mesh(&mesh).unwrap());
-    // The surfels cover the triangles, so there are no holes, and end where these do.
+    // The surfels cover the triangles, so there are no holes, and end at their borders.
     assert_eq!(faceted.hole_rate, Some(0.0));
     eprintln!("{faceted:?} {smooth:?}");
     assert!(faceted.silhouette_iou.unwrap() > 0.99 && faceted.leak_rate.unwrap() < 1e-3);
-    // The file names no normals and its facets are large for it: surfels lie in them, 0.29 degrees from the facets' own normals, and
-    // as far from the normals of vertices, interpolated, as the facets are.
+    // The file has no normals and large facets. The surfels lie in the facets, 0.29 degrees from
+    // their normals; they differ from interpolated vertex normals as much as the facets do.
     let (facets, vertices) = (faceted.normal_degrees.unwrap().mean, smooth.normal_degrees.unwrap().mean);
     assert!(facets < 0.5 && (6.0..7.0).contains(&vertices), "{facets} {vertices}");
-    // Neither truth differs in depth. The mean error is 0.23 %, the median 0.12 %.
+    // Both truths have the same depth. The mean error is 0.23 %, the median 0.12 %.
     assert_eq!(faceted.depth_relative, smooth.depth_relative);
     assert!(faceted.depth_relative.unwrap().mean < 0.003);
 }

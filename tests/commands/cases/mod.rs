@@ -1,8 +1,9 @@
-//! Files as strangers' programs write them, that were once drawn wrong or refused for the wrong
-//! reason: each a small one that stands for its kind, with the right value. Files of other formats
-//! and types of each kind are made in `tests/readers`.
+//! Small files as other programs write them that epsplat once drew wrong or refused for the wrong
+//! reason.
 //!
-//! Two meshes far from each other, one of these kinds, are in `tests/pictures/far.rs`.
+//! Each stands for its kind and is tested for the right value. `tests/readers` generates the other
+//! formats and types of each kind, and `tests/pictures/far.rs` tests two meshes far from each
+//! other.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -14,23 +15,22 @@ use std::path::PathBuf;
 use crate::common::command::{Folder, epsplat, succeeds, text};
 use serde_json::Value;
 
-/// One of the files.
+/// Path of one of the files.
 fn case(name: &str) -> String {
     format!("{}/tests/commands/cases/files/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The outcome of `epsplat info` on a file, with these options.
+/// JSON output of `epsplat info` on a file, with these options.
 fn info(path: &str, options: &[&str]) -> Value {
     serde_json::from_slice(&succeeds(&[&["info", path, "--json", "-"], options].concat()).stdout).unwrap()
 }
 
-/// All that `epsplat info` tells people of a file.
+/// The text that `epsplat info` prints for a file.
 fn told(path: &str) -> String {
     String::from_utf8(succeeds(&["info", path]).stdout).unwrap()
 }
 
-/// The picture of these arguments of `epsplat render`, without light: sRGB codes and alphas, row by
-/// row; and what it told.
+/// Renders unlit with these arguments; returns the image (sRGB codes and alpha) and stderr.
 fn drawn(folder: &Folder, arguments: &[&str]) -> (image::RgbaImage, String) {
     let path: PathBuf = folder.path("drawn.png");
     let fixed = ["--shading", "unlit", "-o", text(&path)];
@@ -40,7 +40,7 @@ fn drawn(folder: &Folder, arguments: &[&str]) -> (image::RgbaImage, String) {
     (image::open(&path).unwrap().to_rgba8(), told)
 }
 
-/// The codes of the pixels that the picture covers wholly.
+/// The codes of the fully opaque pixels.
 fn covered(image: &image::RgbaImage) -> Vec<[u8; 3]> {
     let opaque = image.pixels().filter(|pixel| pixel.0[3] == 255);
     opaque.map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).collect()

@@ -1,11 +1,11 @@
-//! Colours, and pictures that are the same however they are drawn.
+//! Colours, and pictures that must be equal however they are drawn.
 
 use std::collections::BTreeSet;
 
 use super::{case, covered, drawn};
 use crate::common::command::{DATA, Folder, succeeds, text};
 
-/// The mean of codes.
+/// The mean of the codes, by channel.
 fn mean(codes: &[[u8; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|k| codes.iter().map(|code| f64::from(code[k])).sum::<f64>() / codes.len() as f64)
 }
@@ -22,14 +22,14 @@ fn numbers_of_colours_mean_what_their_program_meant() {
         "pcd_pdal_red_green_blue.pcd",
     ] {
         let codes = covered(&drawn(&folder, &[&case(name), "--size", "64x64"]).0);
-        // Blended, most pixels are neither.
+        // Blending makes most pixels neither colour.
         for own in [[230, 120, 30], [30, 90, 220]] {
             let is_own = |code: &&[u8; 3]| code.iter().zip(own).all(|(a, b): (&u8, u8)| a.abs_diff(b) <= 2);
             let count = codes.iter().filter(is_own).count();
             assert!(20 * count > codes.len() && count > 20, "{name}: {own:?} {count} of {}", codes.len());
         }
     }
-    // One number of 256 among 8-bit ones.
+    // A single value of 256 among 8-bit values does not make the file 16-bit.
     let codes = covered(&drawn(&folder, &[&case("las_8bit_one_256.las"), "--size", "64x64"]).0);
     assert!(codes.len() > 300 && mean(&codes).iter().sum::<f64>() > 150.0, "{:?}", mean(&codes));
 }
@@ -43,7 +43,7 @@ fn intensity_shows_where_no_colour_does() {
         assert!(codes.iter().all(|[r, g, b]| r == g && g == b), "{name}");
         assert!(levels.len() > 20 && *levels.last().unwrap() > 120, "{name}: {levels:?}");
     }
-    // Two tiles have one white, the brighter one's.
+    // Two tiles share one white level, that of the brighter one.
     let [a, b] = ["las_tileA_intensity.las", "las_tileB_intensity.las"].map(case);
     let view = ["--eye", "10,5,40", "--target", "10,5,0", "--up", "0,1,0", "--ortho", "10", "--size", "96x48"];
     let picture = |inputs: &[&str]| drawn(&folder, &[inputs, &view].concat()).0;
@@ -80,7 +80,8 @@ fn faces_have_their_colours() {
 fn materials_paint_as_they_say() {
     let folder = Folder::new();
     let view = ["--eye", "0,0,4", "--target", "0,0,0", "--up", "0,1,0", "--ortho", "2", "--size", "64x64"];
-    // Codes at a place of the image's plane, in -1 to 1, right and up.
+    // Returns the code at a point of the image plane; both coordinates are in -1 to 1, right and
+    // up.
     let at = |file: &str, how: &[&str]| {
         let (image, told) = drawn(&folder, &[how, &[&case(file)], &view].concat());
         let code = move |(x, y): (f64, f64)| {
@@ -89,7 +90,7 @@ fn materials_paint_as_they_say() {
         };
         (code, told)
     };
-    // Red, green; blue, yellow from above, as the image has them.
+    // The texture as it should appear: red and green above blue and yellow.
     let quarters = [[255, 0, 0], [0, 200, 0], [0, 0, 255], [255, 230, 0]];
     let places = |middle: f64, half: f64| {
         [(-half, half), (half, half), (-half, -half), (half, -half)].map(|(x, y)| (x + middle, y + middle))
@@ -97,7 +98,7 @@ fn materials_paint_as_they_say() {
     for how in [&[][..], &["--triangles"]] {
         let (code, _) = at("obj/t_map_kd_lower.obj", how);
         assert_eq!(places(0.0, 0.5).map(code), quarters, "{how:?}");
-        // Two by two of them.
+        // The texture repeats two by two times.
         let (code, _) = at("obj/t_scale_2.obj", how);
         for middle in [-0.5, 0.5] {
             assert_eq!(places(middle, 0.25).map(&code), quarters, "{how:?} {middle}");
@@ -108,7 +109,8 @@ fn materials_paint_as_they_say() {
     assert!(told.contains("Kd") && told.contains("black"), "{told}");
 }
 
-/// The largest difference of two pictures, and the share of pixels that one of them covers alone.
+/// Compares two pictures: the largest difference, and the share of pixels that only one of them
+/// covers.
 fn apart(folder: &Folder, arguments: [&[&str]; 2]) -> serde_json::Value {
     let paths = ["one.exr", "other.exr"].map(|name| folder.path(name));
     for (arguments, path) in arguments.iter().zip(&paths) {

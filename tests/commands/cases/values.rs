@@ -1,11 +1,11 @@
-//! Counts, sizes, sides and notes.
+//! Point counts, sizes, front and back sides, and notes.
 
 use super::{case, drawn, info, told};
 use crate::common::command::{Folder, ply, succeeds, text};
 
 #[test]
 fn counts_are_those_of_the_points_that_are_there() {
-    // The 64-bit count says 3,000, the one of older versions 7.
+    // The 64-bit count is 3,000; the legacy one is 7.
     let laz = case("las14_pdrf7_legacy_disagrees.laz");
     assert_eq!(info(&laz, &[])["points"], 3000);
     assert!(told(&laz).contains("and 7 in the field of older versions: 3000 are read"));
@@ -18,7 +18,7 @@ fn counts_are_those_of_the_points_that_are_there() {
 fn a_scale_of_zero_is_told() {
     let las = case("las_scale_zero.las");
     assert!(told(&las).contains("the scale along x, y, z is 0"));
-    // Along one axis, and in the other direction: a scale that is no number.
+    // The same with a scale of zero along some of the axes, and the control without one.
     let folder = Folder::new();
     let bytes = std::fs::read(&las).unwrap();
     let with = |scales: [f64; 3]| {
@@ -42,7 +42,7 @@ fn degrees_beside_metres_are_hinted_at() {
     let hint = "project it to metres first";
     assert!(told(&case("las_lonlat_degrees.las")).contains(hint));
     let folder = Folder::new();
-    // A hillside of a kilometre, in other formats, orders and hemispheres.
+    // A hillside of one kilometre, in other formats, axis orders and hemispheres.
     let rows = |of: &dyn Fn(f64, f64, f64) -> [f64; 3], prefix: &str| -> String {
         let row = |k: i32| {
             let (u, v) = (f64::from(k % 20) / 20.0, f64::from(k / 20) / 20.0);
@@ -88,7 +88,7 @@ fn alphas_that_are_classes_are_hinted_at_and_can_be_left_out() {
         alphas(&without) > 200 && alphas(&with) == 0
     };
     assert!(told(&file).contains(hint) && opaque(&file));
-    // Other types, and what is an opacity.
+    // Other types, and alpha values that really are opacities.
     let rows = |alpha: &dyn Fn(usize) -> String| -> String {
         let row = |k: usize| format!("{} {} 0 200 100 50 {}\n", k % 20, k / 20, alpha(k));
         (0..400).map(row).collect()
@@ -115,12 +115,12 @@ fn alphas_that_are_classes_are_hinted_at_and_can_be_left_out() {
 
 #[test]
 fn gaussians_are_those_that_the_file_means() {
-    // Two thirds of the rows are zeros, and say nothing of the others.
+    // Two thirds of the rows are zeros, which must not affect the statistics of the others.
     let zeros = info(&case("gs_postshot_zero_rows.ply"), &[]);
     let preparation = &zeros["preparation"];
     assert_eq!((&preparation["surfels"], &preparation["shapeless"]), (&100.into(), &200.into()));
     assert!(told(&case("gs_postshot_zero_rows.ply")).contains("0 were thicker than a tenth"));
-    // s = e^-4.60517, f = 0.05, and the opacity falls by the volume that the shape gained.
+    // s = e^-4.60517, f = 0.05; the opacity decreases as the filter increases the volume.
     let filtered = info(&case("gs_one_filter3d.ply"), &["--flatten"]);
     let near = |value: &serde_json::Value, right: f64| (value.as_f64().unwrap() / right - 1.0).abs() < 1e-4;
     assert!(near(&filtered["gaussians"]["deviations"][0], 0.050_990_2), "{filtered}");

@@ -1,4 +1,4 @@
-//! The host's mirrors of what bindings hold, and where a module differs from them.
+//! The host's mirrors of the bindings' element types, and how a module differs from them.
 
 use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
@@ -9,7 +9,7 @@ use epsplat::low_level::plan::SceneNeeds;
 use epsplat::low_level::scene::Surfel;
 use naga::{AddressSpace, ArraySize, Module, ScalarKind, TypeInner};
 
-/// A type as host and device can compare it: so many scalars of one kind.
+/// A type in a form that host and device share: a number of scalars of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
     kind: ScalarKind,
@@ -57,7 +57,7 @@ macro_rules! mirror {
         fn shape<F: Shaped>(_: fn(&$ty) -> &F) -> Shape {
             F::SHAPE
         }
-        // A field that is not listed does not compile.
+        // Does not compile if a field is missing from the list.
         let _complete = |value: $ty| { let $ty { $($field: _),* } = value; };
         let members = vec![$(Member {
             name: stringify!($field).to_owned(),
@@ -112,15 +112,16 @@ pub fn mirrors() -> BTreeMap<&'static str, Struct> {
     ])
 }
 
-/// What a binding's elements are on the host.
+/// The host's type of a binding's elements.
 pub enum Element {
     Struct(&'static str),
-    /// A struct, or words of which the kernels make it.
+    /// A struct, or u32 words that the kernels decode into it.
     Words(&'static str),
     Plain(&'static [Shape]),
 }
 
-/// What an accumulator keeps a sum in, and how many of them (twice, as packed ones hold two sums).
+/// The types of an accumulator's sums, and the number of elements per sum, times two (a packed
+/// element holds two sums).
 pub fn sums_of(accumulator: &str) -> (&'static [Shape], u32) {
     match accumulator {
         "fixed" => (&[u32::SHAPE], 4),
@@ -137,7 +138,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
     BTreeMap::from([
         ("view", Element::Struct("View")),
         ("band", Element::Struct("Band")),
-        // By words that an adapter reads well, or two words of any surfel.
+        // Words of 32 or 64 bits, whichever suits the adapter.
         ("surfels", Element::Words("Surfel")),
         ("splats", Element::Words("Splat")),
         ("projected", Element::Words("Splat")),
@@ -168,7 +169,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
-        // A colour, or a depth and a colour in one number.
+        // A colour, or depth and colour in one u64.
         ("winners", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
         ("list_starts", Element::Plain(WORD)),
@@ -190,7 +191,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("queued_triangles", Element::Plain(WORD)),
         ("rare_triangles", Element::Plain(WORD)),
         ("listed_triangles", Element::Plain(WORD)),
-        // A number and a depth, or both in one.
+        // A number and a depth, or both in one u64.
         ("nearest_triangles", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
         ("named_triangles", Element::Plain(WORD)),
         ("triangle_attributes", Element::Plain(&[f32::SHAPE])),
@@ -204,7 +205,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
     ])
 }
 
-/// The shape of a type without structs; an error for what must not be shared.
+/// Returns the shape of a type without structs; fails for types that must not be shared.
 fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String> {
     let one = |scalar: naga::Scalar| match scalar.width {
         width @ (4 | 8) => Ok(Shape { kind: scalar.kind, width: width.into(), scalars: 1 }),
@@ -228,12 +229,12 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
     }
 }
 
-/// The accumulator whose sums are kept alike: 64-bit atomics keep those of `fixed` as `fixed64` does.
+/// The accumulator with the same layout of sums: `fixed` with 64-bit atomics has that of `fixed64`.
 pub fn kept_as(needs: &SceneNeeds) -> &'static str {
     if needs.atomics_u64 { "fixed64" } else { needs.accumulator.name() }
 }
 
-/// Differences between a module's bindings and the host's mirrors, in words.
+/// Describes each difference between a module's bindings and the host's mirrors.
 pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
     let (mirrors, elements) = (mirrors(), elements(accumulator));
     let mut found = Vec::new();
@@ -248,11 +249,11 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
             found.push(format!("the host has no buffer {name}"));
             continue;
         };
-        // A splat's filter, where it has one, follows it.
+        // A splat's filter, if any, follows the splat in its record.
         let filtered = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Filter"));
         let filtered =
             filtered.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
-        // And so do its lines and its cap, in two rows of four words each, and its fade in one.
+        // Then come its clip lines and its cap, two rows of four words each, and its fade, one row.
         let has = |name: &str| {
             let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
             found.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1))
@@ -320,7 +321,7 @@ fn compare(
     found: &mut Vec<String>,
 ) {
     let mut device = Vec::new();
-    // The lines, the cap and the fade of a splat are members in WGSL alone: in its record they come after its filter.
+    // The clip lines, cap and fade are members only in WGSL; in the record they follow the filter.
     let (members, span) = match members {
         [own @ .., clip, cap, fade]
             if name == "Splat" && [clip, cap, fade].map(|m| m.name.as_deref()) == ["clip", "cap", "fade"].map(Some) =>

@@ -1,5 +1,7 @@
-//! WGSL states the layout, Rust mirrors it, this decides: name, offset, size and scalar kind of every member of every
-//! struct that a binding of any reachable module can see, and the constants that both sides hold.
+//! The memory layout that WGSL states must equal the Rust mirrors.
+//!
+//! Compares name, offset, size and scalar kind of every member of every struct in the bindings of
+//! every reachable module, and the constants that both sides define.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -25,7 +27,7 @@ use epsplat::low_level::scene::kernel::{LEAST_AT_RIM, LEAST_WEIGHT};
 use mirrors::{differences, elements, kept_as, mirrors, sums_of};
 use naga::{AddressSpace, Expression, Literal, Module};
 
-/// The first module of `needs`.
+/// Reflects the first module of `needs`.
 fn first_of(sources: &Sources, needs: &SceneNeeds) -> Module {
     reflect(&sources.join(&passes::modules(needs)[0].files)).unwrap().0
 }
@@ -57,12 +59,12 @@ fn every_binding_has_the_hosts_layout() {
         seen.extend(buffers.filter_map(|(_, v)| v.binding.and(v.name.clone())));
     }
     let known: BTreeSet<String> = elements("fixed").keys().map(|name| (*name).to_owned()).collect();
-    assert_eq!(seen, known, "buffers in WGSL, and those the host knows");
+    assert_eq!(seen, known, "buffers in WGSL, and in the host's list");
 }
 
 #[test]
 fn a_changed_layout_is_noticed() {
-    // So that no kernel uses `middle`, and the module stays valid.
+    // Without culling no kernel uses `middle`, so the module stays valid.
     let needs = common::all_needs().into_iter().find(|needs| !needs.cull).unwrap();
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
@@ -86,7 +88,7 @@ fn a_changed_layout_is_noticed() {
     assert!(longer.contains("Band"), "{longer}");
     let retyped = broken("    middle: f32,\n", "    middle: u32,\n");
     assert!(retyped.contains("middle") && retyped.contains("Uint"), "{retyped}");
-    // Sums of another kind than the accumulator's.
+    // The sums are of another type than the accumulator's.
     let wide = SceneNeeds { accumulator: Accumulator::Fixed64, ..needs };
     let other = &first_of(&Sources::default(), &wide);
     assert_eq!(differences(other, "packed64"), Vec::<String>::new());
@@ -180,15 +182,15 @@ fn constants_agree() {
             assert_eq!(entry.workgroup_size, kernel.workgroup, "{}", entry.name);
         }
     }
-    // The least weights are whole numbers of units, and the bits that follow from them are kept.
+    // The least weights are whole numbers of units; constants derived from them match.
     assert_eq!((f64::from(ONE) * LEAST_AT_RIM).fract(), 0.0);
     const { assert!(LEAST_WEIGHT * (1u64 << 40) as f64 == 65_536.0) };
-    // A pixel's row fits beside the flag, its column below the row.
+    // A pixel's column is in the low 16 bits, its row above, below the flag.
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
     const { assert!(MAX_SIDE - 1 <= 0xffff) };
-    // A batch's number fits what anchors leave of their words (cull.wgsl).
+    // A batch number fits in the spare bits of anchors (cull.wgsl).
     const { assert!(MOST_GROUPS < 1 << 18) };
-    // The scale is stated once: no kernel repeats it as a number.
+    // The scale is defined once; no kernel repeats its value.
     let repeated = FILES.iter().map(|(_, text)| text.matches(&ONE.to_string()).count()).sum::<usize>();
     assert_eq!(repeated, 1);
 }

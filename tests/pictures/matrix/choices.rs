@@ -1,5 +1,7 @@
-//! Options for the matrix: each is left as it is most of the time, so that several meet in one
-//! picture and few pictures are refused.
+//! Random options for the matrix.
+//!
+//! Most options keep their default, so that several features meet in one picture and few pictures
+//! are refused.
 
 use epsplat::low_level::plan::{Accumulator, Optimisation, RenderOptions};
 use epsplat::low_level::scene::composite::ALL_LAYERS;
@@ -16,7 +18,7 @@ fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
     choices[random.below(choices.len())]
 }
 
-/// Options for a picture of `scene`; not all that go together with each other and with it.
+/// Draws options for a picture of `scene`, which may not go with it or with each other.
 pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
     let mut options = RenderOptions {
         epsilon: epsilon(random),
@@ -68,8 +70,8 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
         options.accumulator = pick(random, &[Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64]);
     }
     if options.facing.is_some() && judge::has_few_digits(options.accumulator) {
-        // The reference says what each sample weighs for one sample a pixel alone, as points are
-        // measured in pixels.
+        // Points are measured in pixels, so the reference knows what a sample weighs only with one
+        // sample per pixel.
         options.samples = Samples::ONE;
     }
     if random.one_in(4) {
@@ -82,14 +84,14 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
         options.background = [random.unit(), random.unit(), random.unit(), random.unit()].map(|c| c as f32);
     }
     if scene.encoded && random.one_in(2) {
-        // The defaults of such scenes.
+        // The defaults for such scenes.
         (options.composite, options.shading) = (Composite::Gaussians, Shading::Unlit);
         (options.kernel, options.low_pass) = (gaussian::KERNEL, LowPass::Gaussians);
     }
     options
 }
 
-/// A few optimisations left out.
+/// Optimisations to leave out, each with a chance of 1 in 4.
 pub fn without(random: &mut Random) -> Vec<Optimisation> {
     Optimisation::ALL.iter().filter(|_| random.one_in(4)).map(|(optimisation, _)| *optimisation).collect()
 }
@@ -131,7 +133,8 @@ fn composite(random: &mut Random) -> Composite {
     }
 }
 
-/// Often none, then most often one alone: what another map asks for too hides a fault.
+/// Often no map, otherwise mostly one alone: what a second map needs could hide a fault of the
+/// first.
 fn maps(random: &mut Random) -> Maps {
     let of_device: Vec<Map> = MAPS.iter().filter(|row| row.image_word.is_some()).map(|row| row.map).collect();
     let count = pick(random, &[0, 0, 1, 1, 1, 2, 3, 5]);

@@ -1,26 +1,27 @@
-//! The demands on the frames of one combination: the same bits however they are drawn, and the
-//! reference's values where it decides.
+//! Judges the frames of a combination: the same bits in all forms, and the reference's values at
+//! decided pixels.
 
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::{Accumulator, AccumulatorRow};
 use epsplat::low_level::scene::Map;
 
-/// Pixels with a fragment nearer to a yes-or-no decision than this are left to rounding.
+/// The decision margin below which a pixel is left to rounding.
 const DECIDED: f32 = 1e-4;
 
-/// How far values may lie apart, relative to one and to themselves.
+/// The largest difference of values, as a fraction of the larger of 1 and the reference's value.
 const APART: f32 = 3e-4;
 
-/// The same of painted surfels. Their coordinates on a texture err with the inverse square of the
-/// cosine at which a surfel is seen, and where they differ much a pixel passes from the texture to
-/// blended colours, which `tests/texture` bounds: here as many pixels may be further apart as
-/// [`STRAYING`] says.
+/// The largest difference for textured surfels.
+///
+/// Their texture coordinates err with the inverse square of the cosine at which a surfel is seen.
+/// Where they err much, a pixel changes from the texture to blended colours;
+/// `tests/pictures/texture` bounds that, and here a share of [`STRAYING`] pixels may differ more.
 const APART_OF_TEXTURES: f32 = 3e-3;
 
-/// The share of decided pixels of painted surfels.
+/// The share of decided pixels of textured surfels that may differ more.
 const STRAYING: f64 = 0.03;
 
-/// All bits of a frame, by what they are of.
+/// All bits of a frame's colours and maps, by name, without the map `but`.
 fn parts(frame: &Frame, but: Option<Map>) -> Vec<(&'static str, Vec<u32>)> {
     let color = frame.color.iter().flatten().map(|value| value.to_bits()).collect();
     let maps = frame.maps();
@@ -28,7 +29,7 @@ fn parts(frame: &Frame, but: Option<Map>) -> Vec<(&'static str, Vec<u32>)> {
     [("color", color)].into_iter().chain(maps.iter().filter(|map| Some(*map) != but).map(of_map)).collect()
 }
 
-/// In how many values of what two frames differ, but for a map; empty if they are the same.
+/// Describes the values whose bits differ between two frames, without the map `but`; empty if none.
 pub fn bits_apart(one: &Frame, other: &Frame, but: Option<Map>) -> String {
     let pairs = parts(one, but).into_iter().zip(parts(other, but));
     let told = pairs.filter_map(|((name, a), (other_name, b))| {
@@ -43,22 +44,22 @@ pub fn bits_apart(one: &Frame, other: &Frame, but: Option<Map>) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
-/// Pixels that the reference leaves to rounding.
+/// The number of pixels that the reference leaves to rounding.
 pub fn undecided(reference: &Frame) -> usize {
     reference.map(Map::Decision).unwrap().iter().filter(|decision| **decision < DECIDED).count()
 }
 
-/// Whether sums have one word, of which small weights leave little.
+/// Whether each sum is one word, in which small weights have few digits.
 pub fn has_few_digits(accumulator: Accumulator) -> bool {
     matches!(accumulator, Accumulator::Fixed32 | Accumulator::Packed64)
 }
 
-/// How far the means of each pixel lie apart by [`AccumulatorRow::error_bound`], in a scene of
-/// `surfels` whose attributes span `span`.
+/// The bound on the error of each pixel's means, by [`AccumulatorRow::error_bound`], in a scene of
+/// `surfels` surfels whose attributes span `span`.
 ///
-/// `each` is the reference's frame of all samples, with maps of counts and weights, and `[across,
-/// down]` of its pixels are samples of one pixel. A mean of few weights is worth nothing: no mean is
-/// further apart than its span.
+/// `each` is the reference's frame with one pixel per sample and with maps of counts and weights;
+/// `[across, down]` of its pixels are the samples of one pixel. A mean of tiny weights may be
+/// anything, so a bound is never more than the span.
 pub fn of_sums(
     each: &Frame,
     [across, down]: [usize; 2],
@@ -76,9 +77,9 @@ pub fn of_sums(
     apart
 }
 
-/// In which decided pixels `frame` is not what the `reference` says; empty if in none.
+/// Describes the decided pixels whose colour or maps differ from the `reference`; empty if none.
 ///
-/// `digits` is how far means lie apart at each pixel because of the digits of their sums
+/// `digits` is the extra error allowed at each pixel because of the digits of its sums
 /// ([`of_sums`]).
 pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) -> String {
     let decision = reference.map(Map::Decision).unwrap();
@@ -105,7 +106,7 @@ pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) ->
     };
     let pixels = (0..decision.len()).filter(decided);
     tell("color", pixels.clone().filter(differs).collect(), &|pixel| format!("{:?}", colors(pixel)));
-    // Which of two surfels weighs more is no decision of the map.
+    // Which of two surfels weighs more is not among the decisions that the margin covers.
     for map in frame.maps().iter().filter(|map| *map != Map::Index) {
         let width = map.width();
         let of = |frame: &Frame, pixel: usize| frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec();

@@ -1,18 +1,19 @@
-//! A random sample of the combinations of options, by a seed: shapes, colours, filters, samples,
-//! composites, joins, maps, accumulators and organisations. Each combination is drawn in every
-//! organisation and in another form (another order of surfels, small buffers, an adapter that lacks
-//! what can be lacked, optimisations left out), which must give the same bits; and it is compared
-//! with the f64 reference wherever that decides.
+//! Random combinations of options: all forms give the same bits, and these match the f64 reference.
 //!
-//! `EPSPLAT_MATRIX_FRAMES` frames of the device are drawn, from the combination
-//! `EPSPLAT_MATRIX_SEED` on, whose number is its seed:
+//! A seed chooses shapes, colours, filters, samples, composites, joins, maps, accumulators and
+//! organisations. Each combination is drawn in every organisation and in another form: another
+//! order of surfels, small buffers, an adapter without some features, or without some
+//! optimisations. The reference judges the pixels that rounding does not decide.
+//!
+//! The device draws `EPSPLAT_MATRIX_FRAMES` frames, starting with the combination of seed
+//! `EPSPLAT_MATRIX_SEED`:
 //!
 //! ```text
 //! EPSPLAT_MATRIX_FRAMES=4000 EPSPLAT_MATRIX_SEED=1000 \
 //!   cargo test --release --test pictures matrix::every -- --nocapture
 //! ```
 //!
-//! Refused options are counted, by sentence, and others are drawn in their place.
+//! Refused options are counted by their error, and others are drawn instead.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -32,28 +33,28 @@ use crate::common;
 use common::Random;
 use scenes::Sampled;
 
-/// Frames of the device that the suite draws.
+/// Frames that the device draws by default.
 const FRAMES: usize = 300;
 
-/// Views of each combination.
+/// Views per combination.
 const VIEWS: usize = 3;
 
-/// Combinations that are drawn before it is looked how many frames that were.
+/// Combinations that are drawn before the frames are counted.
 const AT_ONCE: u64 = 8;
 
 /// Threads that draw.
 const WORKERS: usize = 2;
 
-/// Draws of options until some go together: one in a few does.
+/// Attempts to draw options that go together; one in a few succeeds.
 const DRAWS: usize = 400;
 
-/// Devices: all that the adapter has, and what every WebGPU implementation has.
+/// Two devices: one with all features of the adapter, one with core WebGPU only.
 struct Devices {
     whole: Gpu,
     core: Gpu,
 }
 
-/// A scene, a view and options that go together.
+/// A scene, a view, and options that go together.
 struct Combination {
     seed: u64,
     sampled: Sampled,
@@ -61,14 +62,14 @@ struct Combination {
     random: Random,
 }
 
-/// The outcome of some combinations.
+/// The outcome of several combinations.
 #[derive(Default)]
 struct Tally {
     combinations: usize,
     frames: usize,
     pixels: usize,
     undecided: usize,
-    /// Options that were drawn, and those that were refused, by sentence.
+    /// Options drawn; `refused` counts those that the checks refused, by error.
     drawn: usize,
     refused: BTreeMap<String, usize>,
     failures: Vec<String>,
@@ -86,7 +87,7 @@ impl Tally {
         self
     }
 
-    /// The counts, and each refusal with its share of all that was drawn.
+    /// Prints the counts, and each refusal with its share of the options drawn.
     fn print(&self) {
         let refused: usize = self.refused.values().sum();
         eprintln!(
@@ -110,7 +111,7 @@ fn checked(scene: &Scene, options: &RenderOptions) -> epsplat::Result<()> {
     check::scene(&Facts::of(scene), options, false)
 }
 
-/// The combination of a seed: options are drawn until some are accepted.
+/// Returns the combination of a seed: draws options until some are accepted.
 fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
     let mut random = Random(seed);
     let sampled = scenes::sampled(&mut random);
@@ -126,7 +127,7 @@ fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
     None
 }
 
-/// How else a combination is drawn.
+/// Chooses another form of a combination, which must give the same bits.
 fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static str, Scene, RenderOptions, Gpu) {
     let Combination { sampled: Sampled { scene, .. }, options, random, .. } = combination;
     let (scene, options, whole) = (scene.clone(), options.clone(), devices.whole.clone());
@@ -153,7 +154,7 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
         let other = RenderOptions { organisation, ..options.clone() };
         match checked(scene, &other) {
             Ok(()) => forms.push((name, scene.clone(), other, devices.whole.clone())),
-            // Sums of one word are scattered alone.
+            // Other accumulators do not support every organisation.
             Err(_) if options.accumulator != Accumulator::Fixed => {}
             Err(why) => *tally.refused.entry(format!("by {name}: {why}")).or_default() += 1,
         }
@@ -164,7 +165,7 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
         if !wrong.is_empty() {
             let size = (camera.width, camera.height, camera.projection);
             let failure = format!("seed {seed}: {about:?}, {size:?}, {options:?}:\n    {}", wrong.join("\n    "));
-            // A long run tells it at once.
+            // Printed at once, because a run can be long.
             eprintln!("{failure}");
             tally.failures.push(failure);
             return;
@@ -172,8 +173,9 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
     }
 }
 
-/// The combination's view, and others that differ by parts of a pixel and a little in size: kernels
-/// are built once for all of them.
+/// The combination's view, and others that are shifted by up to 3 pixels and scaled by up to 10 %.
+///
+/// Kernels are compiled once for all of them.
 fn views(combination: &mut Combination) -> Vec<Camera> {
     let Combination { sampled: Sampled { camera, .. }, random, .. } = combination;
     let mut another = || {
@@ -184,7 +186,7 @@ fn views(combination: &mut Combination) -> Vec<Camera> {
     std::iter::once(camera.clone()).chain(others).collect()
 }
 
-/// The faults of a picture, drawn as it is and in other forms.
+/// The faults of one picture: against the reference, and of its other forms.
 fn wrong(
     (scene, camera, options): (&Scene, &Camera, &RenderOptions),
     forms: &[(&'static str, Scene, RenderOptions, Gpu)],
@@ -212,11 +214,11 @@ fn wrong(
     let mut wrong = Vec::new();
     wrong.extend((!apart.is_empty()).then(|| format!("reference: {apart}")));
     for (name, scene, options, gpu) in forms {
-        // Numbers are those of another order.
+        // Another order changes the surfels' numbers, so the index map is not compared.
         let but = (*name == "another order").then_some(Map::Index);
         tally.frames += 1;
         match frame(scene, options, &on(gpu)) {
-            // Sums of other forms take atomics that an adapter may lack.
+            // Another form may use atomics that its adapter lacks.
             Err(why) if why.contains("which this adapter lacks") => {
                 *tally.refused.entry(format!("by {name}: {why}")).or_default() += 1;
             }
@@ -230,7 +232,7 @@ fn wrong(
     wrong
 }
 
-/// How far means may lie apart at each pixel because of the digits of their sums.
+/// The error per pixel that a sum's few digits explain: 0 where sums have many digits.
 fn digits(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Vec<f32>, String> {
     if !judge::has_few_digits(options.accumulator) {
         return Ok(vec![0.0; camera.pixels()]);
@@ -242,7 +244,7 @@ fn digits(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Vec
     let frame = render(scene, &sampled, &one, &Backend::Reference, &()).map_err(|error| error.to_string())?.0;
     let (low, high) = scene.color_range();
     let span = (0..4).map(|k| f64::from(high[k].max(0.0) - low[k].min(0.0))).fold(1.0, f64::max);
-    // Light multiplies colours; a highlight turns its power times as fast as the normal, whose
+    // Light multiplies colours. A highlight changes `shininess` times as fast as the normal, whose
     // components span 2.
     let light: f64 = options.lights.iter().map(|light| f64::from(light.intensity())).sum();
     let lit = match options.shading {
@@ -258,7 +260,7 @@ fn devices() -> Option<Devices> {
     Some(Devices { whole: common::gpu()?, core: common::core_gpu()? })
 }
 
-/// The outcome of the combinations of `seeds`.
+/// The tally of the combinations of `seeds`.
 fn of_seeds(seeds: &[u64], devices: &Devices) -> Tally {
     let mut tally = Tally::default();
     for seed in seeds {
@@ -281,7 +283,7 @@ fn every_combination_is_drawn_alike_and_right() {
     let (mut tally, devices) = (Tally::default(), &devices);
     while tally.frames < frames {
         let seeds: Vec<u64> = (seed..seed + AT_ONCE).collect();
-        // Threads of their own: those of a pool would take another render up while one waits.
+        // Plain threads: a waiting thread of a pool would start another render.
         let workers = seeds.chunks(AT_ONCE as usize / WORKERS).map(|seeds| move || of_seeds(seeds, devices));
         let tallies = std::thread::scope(|scope| {
             let running: Vec<_> = workers.map(|worker| scope.spawn(worker)).collect();
@@ -295,7 +297,7 @@ fn every_combination_is_drawn_alike_and_right() {
     assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
 }
 
-/// Faults of the kind that the matrix is for are found in few combinations that could show them.
+/// Faults of the kind that the matrix is for are found in 24 combinations that could show them.
 #[test]
 fn a_fault_in_one_organisation_is_found() {
     let Some(devices) = devices() else { return };

@@ -1,4 +1,4 @@
-//! Scenes and views for the matrix: each a small one of random kind, by a seed.
+//! Random small scenes and views for the matrix, by seed.
 
 use std::sync::Arc;
 
@@ -10,15 +10,15 @@ use glam::{DMat3, DVec3, Vec3};
 use crate::common::scenes::{cases, painted, sphere};
 use crate::common::{Random, meshes};
 
-/// A scene, a view of it, and what it has, by name.
+/// A scene, a view of it, and the names of its features.
 pub struct Sampled {
     pub scene: Scene,
     pub camera: Camera,
     pub about: Vec<&'static str>,
 }
 
-/// Surfels before they have caps, colours and the like, a view of them, and where and how large a
-/// mesh beside them is.
+/// A scene without caps, colours and the like, a view of it, and the centre and size of a mesh
+/// beside it.
 struct Base {
     scene: Scene,
     camera: Camera,
@@ -26,7 +26,7 @@ struct Base {
     name: &'static str,
 }
 
-/// A scene and a view of it.
+/// Draws a random scene and a view of it.
 pub fn sampled(random: &mut Random) -> Sampled {
     let Base { mut scene, camera, mesh, name } = match random.below(8) {
         0 => strange(random),
@@ -70,7 +70,7 @@ pub fn sampled(random: &mut Random) -> Sampled {
         [0, second].into_iter().for_each(|first| scene.provenance.push(first, Vec::new(), None));
     }
     if random.one_in(4) {
-        // A mesh may be too small or too large to be one.
+        // A mesh may be too small or too large to be accepted.
         if let Ok((both, _)) = with_triangles(Some(scene.clone()), &[triangles(mesh, random)]) {
             about.push("triangles");
             scene = both;
@@ -79,7 +79,7 @@ pub fn sampled(random: &mut Random) -> Sampled {
     Sampled { scene, camera, about }
 }
 
-/// The surfels at `indices`, with all that they have; triangles and the rest stay.
+/// The surfels at `indices` with all their attributes; triangles and the rest stay.
 pub fn taken(scene: &Scene, indices: &[usize]) -> Scene {
     fn of<T: Copy>(all: &[T], indices: &[usize]) -> Vec<T> {
         indices.iter().filter_map(|&k| all.get(k).copied()).collect()
@@ -123,7 +123,7 @@ fn direction(random: &mut Random) -> DVec3 {
     }
 }
 
-/// A view of the unit ball about `origin` from outside, from close by or from inside.
+/// A view of the unit ball around `origin`, from outside, from close by or from inside.
 fn view(origin: DVec3, random: &mut Random) -> Camera {
     let size = [9 + random.below(56) as u32, 9 + random.below(40) as u32];
     let distance = match random.below(6) {
@@ -154,7 +154,7 @@ fn origin(random: &mut Random) -> DVec3 {
     if random.one_in(6) { DVec3::new(450_000.123, 6_000_000.456, 300.789) } else { DVec3::ZERO }
 }
 
-/// A noisy unit sphere.
+/// A unit sphere, with noise in half of the cases.
 fn ball(random: &mut Random) -> Base {
     let origin = origin(random);
     let mut scene = sphere(40 + random.below(460), random.between(1.0, 2.8));
@@ -171,7 +171,7 @@ fn ball(random: &mut Random) -> Base {
     Base { scene, camera, mesh, name: "ball" }
 }
 
-/// Disks of all sizes and turns in the unit ball.
+/// Disks of many sizes, aspects and orientations in the unit ball.
 fn cloud(random: &mut Random) -> Base {
     let origin = origin(random);
     let surfel = |random: &mut Random| {
@@ -187,7 +187,7 @@ fn cloud(random: &mut Random) -> Base {
     Base { scene: Scene { origin, surfels, ..Scene::default() }, camera, mesh, name: "cloud" }
 }
 
-/// A part of one of the scenes of edge-on, thin and huge surfels, in a smaller image.
+/// A third of a scene of edge-on, thin or huge surfels, in a smaller image.
 fn strange(random: &mut Random) -> Base {
     let case = cases().swap_remove(random.below(9));
     let (scene, mut camera) = (case.scene, case.camera);
@@ -202,7 +202,7 @@ fn strange(random: &mut Random) -> Base {
     Base { scene: taken(&scene, &kept), camera, mesh, name: "strange" }
 }
 
-/// A part of a painted sphere.
+/// A fifth of a textured sphere, with surfels twice as large.
 fn paintings(random: &mut Random) -> Base {
     let scene = painted(1 + random.below(2) as u32);
     let kept: Vec<usize> = (0..scene.surfels.len()).filter(|_| random.one_in(5)).collect();
@@ -218,7 +218,7 @@ fn paintings(random: &mut Random) -> Base {
     Base { scene, camera, mesh, name: "painted" }
 }
 
-/// Gives the scene colours of some kind.
+/// Gives the scene random colours and returns the name of their kind.
 fn colour(scene: &mut Scene, random: &mut Random) -> &'static str {
     let count = scene.surfels.len();
     let code = |random: &mut Random| random.below(256) as u8;
@@ -279,15 +279,14 @@ fn clip(random: &mut Random) -> Clip {
     }
 }
 
-/// A unit normal near that of the plane.
+/// A unit normal near the surfel's own.
 fn tilted(surfel: &Surfel, random: &mut Random) -> [f32; 3] {
     let [s, t] = [surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
     let normal = s.normalize_or_zero().cross(t.normalize_or_zero()).normalize_or(DVec3::Z);
     (normal + direction(random) * 0.4).normalize().as_vec3().to_array()
 }
 
-/// A sphere of triangles around a place: with normals, colours or a picture at its corners, or
-/// without.
+/// A sphere of triangles around `center`, with or without normals, colours and a texture.
 fn triangles((center, size): (DVec3, f64), random: &mut Random) -> Mesh {
     let mut mesh = meshes::sphere(random.below(3) as u32, random.one_in(2));
     let turn = DMat3::from_axis_angle(direction(random), random.between(0.0, 3.0));

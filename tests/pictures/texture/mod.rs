@@ -1,4 +1,5 @@
-//! Surfels painted by a texture: the device against the twin, painted surfels against rays, and what cannot be painted.
+//! Textured surfels: the device against its twin, pictures against rays, and inputs that cannot be
+//! textured.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -38,10 +39,11 @@ fn waves(opaque: bool) -> Texture {
     Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
 }
 
-/// Linear light from texel to texel: 100 codes of a wave of 64 / 3 texels are 30 codes a texel, at most 0.0086 each.
+/// The largest difference of neighbouring texels in linear light: 100 codes of a wave of 64 / 3
+/// texels are 30 codes per texel, each at most 0.0086.
 const STEEPEST: f64 = 30.0 * 0.0086;
 
-/// The belt of a sphere whose texture goes around it once, with a seam from end to end.
+/// The belt of a sphere; the texture goes around it once, with a seam from end to end.
 fn globe(count: usize, radius: f64, texture: Texture) -> Scene {
     build_textured(vec![belt(count, radius)], vec![texture], &()).unwrap().0
 }
@@ -65,7 +67,7 @@ fn textured(scene: &Scene) -> &Textured {
     textured
 }
 
-/// Toward the seam, which the camera of [`sphere_camera`] does not see.
+/// A camera that sees the seam, unlike that of [`sphere_camera`].
 fn camera(size: u32, projection: Projection) -> Camera {
     let eye = DVec3::new(-2.6, 0.7, 0.9);
     let lens = sphere_camera(size, projection);
@@ -76,8 +78,11 @@ fn camera(size: u32, projection: Projection) -> Camera {
     Camera::look_at((size, size), lens, eye, DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
 }
 
-/// Pixels at which the device's colour is farther from the twin's than the sums' bound, the texture's slope and the passage
-/// between the texture and the blended colour allow; and how many were looked at, were undecided, and lie in the passage.
+/// Counts the pixels whose colours on the device and in the twin differ by more than the bounds.
+///
+/// The bounds add the error of the sums, the texture's slope, and the transition between the
+/// texture and the blended colour. The counts are of pixels beyond the bounds, covered, undecided,
+/// and in the transition.
 fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sources: &Sources) -> Option<[usize; 4]> {
     let gpu = common::gpu()?;
     let options = RenderOptions { accumulator, ..unlit() };
@@ -92,7 +97,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
     let sums = accumulate::reference(splats.iter(), scene, camera, &exact, 0, &nearest);
     let range = textured(scene).range();
     let [width, height] = textured(scene).mipmaps()[0].levels()[0].size().map(f64::from);
-    // Colour for a step in the texture, of one in u or in v.
+    // The change of colour per unit of u and v.
     let slope = STEEPEST * width.hypot(height);
     let (mut found, mut worst) = ([0; 4], 0f64);
     for (pixel, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.weight > 0.0) {
@@ -103,18 +108,20 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
         }
         let [u, v, squared, reach_2, _] = sum.place.map(|total| total / sum.weight);
         let variance = squared - u * u - v * v;
-        // Of a mean as a fraction of its range; and what f32 makes of a fragment's weight and of its place on the disk.
+        // The error of a mean as a fraction of its range, and of a fragment's f32 weight and place
+        // on the disk.
         let mean = 3.0 * (row.error_bound)(sum.count.max(1).into(), sum.weight, fraction_bits);
         let fragment = 2e-6;
         let apart = variance.max(0.0).sqrt() + reach_2.sqrt();
-        // A fragment's point errs by a few roundings of its distance, which is about 3, and along the surface by more the more
-        // that is tilted; the coordinates gain less than 0.4 for a unit.
+        // A fragment's point errs by a few roundings of its distance, about 3, and by more along a
+        // tilted surface. Its texture coordinates change by less than 0.4 per unit.
         let normal = Vec3::from_array(twin.normals().unwrap()[pixel]).as_dvec3();
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
         let cosine = normal.dot(camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize()).abs();
         let of_point = 4.0 * (-24f64).exp2() * 3.0 * 0.4 / (cosine * cosine).max(1e-4);
         let of_lookup = slope * f64::from(range.span) * (mean + fragment * apart + of_point);
-        // The variance is a difference of means of size 1/2 at most; where it is far from the passage the share is 0 or 1 for both.
+        // The variance is a difference of means of at most 1/2. Far from the transition, the
+        // texture's share is 0 or 1 in both.
         let of_ratio = 3.0 * mean / reach_2 + fragment * (1.0 + variance / reach_2);
         let ratio = variance / reach_2;
         let in_passage = ratio > 1.0 - of_ratio && ratio < 2.0 + of_ratio;
@@ -134,7 +141,8 @@ fn unlit() -> RenderOptions {
     RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
 }
 
-/// Coordinates of fragments outside the disks leave the scene's range: both take the range's end.
+/// Fragments outside their disks have texture coordinates beyond the scene's range: device and twin
+/// clamp them alike.
 #[test]
 fn filtered_surfels_are_painted_alike_outside_their_disks() {
     let Some(gpu) = common::gpu() else { return };
@@ -154,7 +162,7 @@ fn filtered_surfels_are_painted_alike_outside_their_disks() {
     };
     let error = apart(Sources::default());
     assert!(error < 1e-4, "{error}");
-    // Control: another end of the range.
+    // Control: other ends of the range.
     let from = "let seen = clamp(beyond, vec2<f32>(0.0), vec2<f32>(1.0));";
     let cut =
         Sources::default().replace("texture.wgsl", from, "let seen = clamp(beyond, vec2<f32>(0.1), vec2<f32>(0.9));");
@@ -204,7 +212,7 @@ fn a_painted_image_does_not_depend_on_the_order_of_surfels() {
     let drawn = |scene: &Scene| bits(&render(scene, &camera, &unlit(), &backend, &()).unwrap().0);
     let first = drawn(&scene);
     assert_eq!(first, drawn(&shuffled(&scene, 7)));
-    // Another texture makes another image.
+    // Control: another texture gives another image.
     assert_ne!(first, drawn(&globe(2000, 1.5, waves(false))));
 }
 
@@ -224,7 +232,8 @@ fn board() -> Scene {
     build_textured(vec![points], vec![texture], &()).unwrap().0
 }
 
-/// Of many texels a pixel shows their mean, of few the texels; the device as the twin does. A kernel that knows no halvings picks some.
+/// A pixel shows the mean of the many texels it covers, or parts of a single texel; device and twin
+/// agree. Without mipmaps a kernel picks single texels.
 #[test]
 fn what_is_seen_from_afar_is_averaged() {
     let Some(gpu) = common::gpu() else { return };
@@ -234,7 +243,7 @@ fn what_is_seen_from_afar_is_averaged() {
     let cameras = [
         view(Lens::Fov(40.0)),
         view(Lens::OrthographicHeight(2.2)),
-        // Four pixels a texel.
+        // Four pixels per texel.
         view(Lens::OrthographicHeight(2.0 / 256.0 * 48.0 / 4.0)),
     ];
     let picking = Sources::default().replace("textures.wgsl", "0.5 * log2(max(texels, 1.0))", "0.0").unwrap();
@@ -245,7 +254,7 @@ fn what_is_seen_from_afar_is_averaged() {
         let (twin, _) = render(&scene, camera, &exact, &Backend::Reference, &()).unwrap();
         let (device, _) = render(&scene, camera, &unlit(), &backend, &()).unwrap();
         let (picked, _) = render(&scene, camera, &unlit(), &picks, &()).unwrap();
-        // Away from the square's outline, where nothing but it shows.
+        // Away from the square's outline, where only the square shows.
         let inner = |pixel: &usize| (16..32).contains(&(pixel % 48)) && (16..32).contains(&(pixel / 48));
         let off = |frame: &Frame, pixel: usize| f64::from((frame.color[pixel][0] - twin.color[pixel][0]).abs());
         let decided = twin.map(Map::Decision).unwrap();
@@ -263,7 +272,7 @@ fn what_is_seen_from_afar_is_averaged() {
     }
 }
 
-/// A scene with other places.
+/// The scene with its places in the texture changed by `other`.
 fn with_places(scene: &Scene, other: impl Fn(&Place) -> Place) -> Scene {
     let painted = textured(scene);
     let places = painted.places().iter().map(other).collect();
@@ -272,8 +281,11 @@ fn with_places(scene: &Scene, other: impl Fn(&Place) -> Place) -> Scene {
     Scene { colors: Colors::Textured(again), ..scene.clone() }
 }
 
-/// The root of the mean squared difference between what is drawn of [`globe`] and the texture at the very points of the sphere,
-/// away from the outline and the belt's ends: over the pixels that lie two surfels from the seam and over those nearer to it.
+/// The RMS difference between the picture of a [`globe`] and the texture at the exact points of the
+/// sphere.
+///
+/// Pixels at the outline and at the belt's ends are left out. The first value is over pixels at
+/// least two spacings from the seam, the second over those nearer to it.
 fn apart_from_the_sphere(scene: &Scene, texture: &Texture, spacing: f64) -> [f64; 2] {
     let camera = camera(240, Projection::Pinhole);
     let (frame, _) = render(scene, &camera, &unlit(), &Backend::Reference, &()).unwrap();
@@ -313,9 +325,9 @@ fn a_texture_shows_what_is_finer_than_surfels() {
     let painted = globe(count, 0.9, texture.clone());
     let at_centers = textured(&painted).places().iter().map(|place| texture.at(place.center[0], place.center[1]));
     let colored = Scene { colors: Colors::Linear(at_centers.collect()), ..painted.clone() };
-    // Of the paper's TexZ map: a splat has the coordinates of its centre.
+    // As in the paper's TexZ map, all of a splat has the coordinates of its centre.
     let of_centers = with_places(&painted, |place| Place { slopes: [[0.0; 3]; 2], ..*place });
-    // Seams are not told from anything else.
+    // A large reach blends across seams too.
     let across_seams = with_places(&painted, |place| Place { reach: 10.0, ..*place });
     let apart = |scene: &Scene| apart_from_the_sphere(scene, &texture, spacing);
     let [by_texture, by_color, of_centers, across] = [&painted, &colored, &of_centers, &across_seams].map(apart);
@@ -324,12 +336,13 @@ fn a_texture_shows_what_is_finer_than_surfels() {
     assert!(by_texture[1] < 0.6 * across[1] && by_texture[1] < 0.7 * by_color[1]);
 }
 
-/// Within an absolute tolerance.
+/// Options with an absolute tolerance.
 fn within(tolerance: f64, shape: SplatShape) -> Options {
     Options { tolerance: Tolerance::Absolute(tolerance), shape, relaxations: 0 }
 }
 
-/// A plane whose coordinates jump at a seam: surfels that are left keep theirs, and none shows across it; in a file too.
+/// After simplification surfels keep their texture coordinates, and none shows past a seam; also
+/// after PLY. The coordinates of the plane jump at the seam.
 #[test]
 fn simplified_surfels_keep_their_place_in_a_texture() {
     let across = |x: f64| if x > 0.0 { 0.5 } else { 0.0 };
@@ -345,7 +358,7 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
     };
     let (scene, _, own) = build_at_vertices(vec![sampled], &()).unwrap();
     let options = within(1e-3, SplatShape::Disk);
-    // How far a surfel shows past the seam, at most, from its own side.
+    // The farthest that any surfel shows past the seam, from its own side.
     let past = |left: &Points| {
         let shown = build_at_vertices(vec![left.clone()], &()).unwrap().0;
         let reaches = shown.surfels.iter().enumerate().map(|(index, surfel)| {
@@ -385,7 +398,8 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
     }
 }
 
-/// A third of the surfels of a globe paint it as well; with slopes that the few have of one another, they do not.
+/// A third of a globe's surfels paint it nearly as well; with slopes fitted to the few alone they
+/// do not.
 #[test]
 fn a_texture_survives_simplification() {
     let texture = waves(true);
@@ -406,7 +420,8 @@ fn a_texture_survives_simplification() {
     assert!(before[0] < 0.001 && after[0] < 0.005 && refitted[0] > 2.0 * after[0]);
 }
 
-/// The TexZ map: coordinates are those of the very points that are seen, depths those of the map of depths, for device and twin.
+/// The TexZ map holds the texture coordinates of the point that is seen, and its depth, on the
+/// device and in the twin.
 #[test]
 fn texz_holds_where_a_pixel_lies_in_the_texture() {
     let scene = globe(6000, 1.2, waves(true));
@@ -422,7 +437,7 @@ fn texz_holds_where_a_pixel_lies_in_the_texture() {
             continue;
         }
         let (x, y) = ((pixel % 96) as f64 + 0.5, (pixel / 96) as f64 + 0.5);
-        // On the sphere, below the disks.
+        // The seen point, moved onto the sphere inside the disks.
         let point = (camera.eye + camera.ray(x, y) * f64::from(z)).normalize();
         let seam = point.x < 0.0 && point.z.abs() < 0.15;
         if point.y.abs() < 0.6 && !seam {
@@ -442,7 +457,7 @@ fn texz_holds_where_a_pixel_lies_in_the_texture() {
         let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| a != &b && (a - b).abs() >= 1e-4);
         pairs.filter(|pair| far(*pair)).count()
     };
-    // Rims and epsilon decide otherwise at few.
+    // Few pixels are decided differently at rims and at epsilon.
     assert!(off(&device) < 40, "{}", off(&device));
     let unslanted = with_places(&scene, |place| Place { slopes: [[0.0; 3]; 2], ..*place });
     let gpu = common::gpu().unwrap();
@@ -490,7 +505,7 @@ fn places_that_are_no_numbers_are_counted() {
     assert_eq!(preparation.replaced_places, 1);
     assert!(preparation.notes().iter().any(|note| note.contains("1 points had texture coordinates")));
     assert_eq!(textured(&scene).places()[12].center, [0.0; 2]);
-    // Along x the coordinate gains 0.1 a unit.
+    // Along x the coordinate u increases by 0.1 per unit.
     let [u_slope, v_slope] = textured(&scene).places()[6].slopes.map(Vec3::from_array);
     assert!(u_slope.distance(0.1 * Vec3::X) < 1e-6 && v_slope.length() < 1e-6, "{u_slope} {v_slope}");
 }

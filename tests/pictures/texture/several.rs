@@ -1,4 +1,4 @@
-//! Several textures in a scene.
+//! Several textures in one scene, on surfels and on triangles: the device against its twin.
 
 use super::*;
 use epsplat::io::ply;
@@ -7,7 +7,7 @@ use epsplat::low_level::scene::{Triangle, Triangles};
 
 const BARE: [f32; 4] = [0.2, 0.5, 0.1, 1.0];
 
-/// As steep as [`waves`], and others.
+/// As steep as [`waves`], in other colours.
 fn other_waves() -> Texture {
     let first = waves(true);
     let [width, height] = first.size();
@@ -15,7 +15,7 @@ fn other_waves() -> Texture {
     Texture::new(width, height, turned.collect()).unwrap()
 }
 
-/// The belt of a sphere: upper parts in the first texture, lower ones in the second, and below these none.
+/// A belt with the first texture above, the second in the middle, and none below.
 fn parted(count: usize, radius: f64) -> Points {
     let mut points = belt(count, radius);
     let number = |[_, y, _]: &[f64; 3]| if *y > 0.2 { 0 } else { [1, u32::MAX][usize::from(*y < -0.3)] };
@@ -28,7 +28,7 @@ fn both() -> Vec<Texture> {
     vec![waves(true), other_waves()]
 }
 
-/// The device as the twin, where two of them meet too.
+/// Device and twin agree, also where two textures meet.
 #[test]
 fn the_device_paints_several_as_its_twin_does() {
     if common::gpu().is_none() {
@@ -53,7 +53,8 @@ fn the_device_paints_several_as_its_twin_does() {
     }
 }
 
-/// Where one alone shows it is as if there were no other, but for the digits that a wider plane takes; where none is, colours are as blended.
+/// Each texture shows as if it were alone, except for precision lost in a wider atlas. Surfels
+/// without a texture show their blended colours.
 #[test]
 fn each_texture_shows_as_if_it_were_alone() {
     let camera = camera(96, Projection::Pinhole);
@@ -76,7 +77,8 @@ fn each_texture_shows_as_if_it_were_alone() {
         let off = (camera.eye.length_squared() - along * along).min(1.0);
         let point = camera.eye + ray * (along - (1.0 - off).sqrt());
         let height = point.y;
-        // Two radii from where they meet, and away from the seam of each, which is told less sharply in a wider plane.
+        // Two radii from where the parts meet, and away from each texture's seam, which is found
+        // less sharply in a wider atlas.
         let part =
             [(0.35, 0.9), (-0.15, 0.05), (-0.9, -0.45)].iter().position(|(low, high)| height > *low && height < *high);
         let Some(part) = part.filter(|_| off < 0.9 && point.z.abs() > 0.2) else { continue };
@@ -89,7 +91,7 @@ fn each_texture_shows_as_if_it_were_alone() {
     assert!(compared.iter().all(|count| *count > 100) && differs > 1000, "{compared:?} {differs}");
 }
 
-/// Numbers survive a file and [`simplify_in_texture`], with the coordinates that belong to them.
+/// Texture numbers and their coordinates survive a file and [`simplify_in_texture`].
 #[test]
 fn numbers_survive_files_and_simplification() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,7 +114,7 @@ fn numbers_survive_files_and_simplification() {
         assert_eq!(*number, expected, "{y}");
         seen[(*number).min(2) as usize] += 1;
         let around = [0.5 + z.atan2(*x) / TAU, 1.0 - y.acos() / PI];
-        // Where no texture is, coordinates are nothing.
+        // Surfels without a texture have meaningless coordinates.
         let seam = *x < 0.0 && z.abs() < 0.2 || *number == u32::MAX;
         let off = (f64::from(*u) - around[0]).abs().max((f64::from(*v) - around[1]).abs());
         assert!(seam || off < 2e-3, "{u} {v} and {around:?}");
@@ -120,7 +122,8 @@ fn numbers_survive_files_and_simplification() {
     assert!(seen.iter().all(|count| *count > 50), "{seen:?}");
 }
 
-/// One for all inputs, one for each, or as many as the numbers of points name.
+/// Textures number one for all inputs, one per input, or as many as the points' texture numbers
+/// need.
 #[test]
 fn textures_are_as_many_as_are_named() {
     let plain = || belt(300, 1.5);
@@ -131,7 +134,7 @@ fn textures_are_as_many_as_are_named() {
     assert_eq!(count(made(vec![plain(), plain()], vec![waves(true)]).unwrap()), 1);
     assert_eq!(count(made(vec![plain(), plain()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![several()], both()).unwrap()), 2);
-    // A last image that no point is in, and an input that needs none.
+    // A last image that no point uses, and an input that needs none.
     assert_eq!(count(made(vec![plain()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), Points::default()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), several()], [both(), both()[..1].to_vec()].concat()).unwrap()), 3);
@@ -147,14 +150,15 @@ fn textures_are_as_many_as_are_named() {
         let error = made(inputs, textures).unwrap_err();
         assert!(error.to_string().contains(told), "{error}");
     }
-    // The second input's are the second texture's.
+    // The second input uses the second texture.
     let scene = made(vec![plain(), plain()], both()).unwrap();
     let first = textured(&scene).places().len() / 2;
     let number = |place: &Place| textured(&scene).atlas().number(place.center.map(f64::from));
     assert!(textured(&scene).places().iter().enumerate().all(|(k, place)| number(place) == u32::from(k >= first)));
 }
 
-/// The way of a user: a mesh of two images and a plain colour, sampled, and painted as `sample` says.
+/// A user's way: a mesh with several images and a plain colour is sampled, and rendered as `sample`
+/// says.
 #[test]
 fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -174,7 +178,7 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
             "v {left} 0 0\nv {right} 0 0\nv {right} 2 0\nv {left} 2 0\nusemtl {material}\nf -4/1 -3/2 -2/3 -1/4\n"
         );
     }
-    // A triangle without an area, of which there are no samples.
+    // A triangle without an area has no samples.
     mesh += "usemtl d\nf -1/1 -1/2 -1/3\n";
     std::fs::write(path("three.obj"), mesh).unwrap();
     let run = |arguments: &[&str]| {
@@ -203,14 +207,16 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
     let all: Vec<&str> = ["render"].into_iter().chain(command.split(' ')).chain(view).collect();
     run(&all);
     let picture = image::open(path("three.png")).unwrap().to_rgba8();
-    // A unit is 16 pixels: the parts have their middles a third of the width apart.
+    // A unit is 16 pixels, and the three parts' middles are a third of the width apart.
     for (x, code) in [(16, [255, 0, 0, 255]), (48, [0, 0, 255, 255]), (80, [0, 255, 0, 255])] {
         assert_eq!(picture.get_pixel(x, 24).0, code, "{x}");
     }
 }
 
-/// Surfels of two textures that lie among each other: how fast coordinates change is told by those of one texture alone. Had one texture both
-/// places, some would be taken to change as fast as from one to the other.
+/// Slopes of coordinates come only from neighbours in the same texture.
+///
+/// Surfels of two textures lie among each other. If both were in one texture, some coordinates
+/// would seem to change as fast as they jump from one place to the other.
 #[test]
 fn neighbours_in_another_texture_tell_nothing() {
     let first = belt(2000, 1.5);
@@ -236,7 +242,8 @@ fn neighbours_in_another_texture_tell_nothing() {
     assert!(two < 2.0 * alone && one > 10.0 * alone, "{alone} {two} {one}");
 }
 
-/// Past the edges of its image a surfel shows that image, on every side, and where all its coordinates are one place.
+/// Past the edges of its image a surfel shows that image, on every side, and also where all its
+/// coordinates are one point.
 #[test]
 fn no_texture_shows_past_the_edges_of_another() {
     let Some(gpu) = common::gpu() else { return };
@@ -283,7 +290,8 @@ fn no_texture_shows_past_the_edges_of_another() {
     }
 }
 
-/// Surfels and triangles with textures of their own in one scene: the device as the twin; other numbers would be seen.
+/// Surfels and triangles have their own textures: device and twin agree, and a wrong number would
+/// show.
 #[test]
 fn surfels_and_triangles_have_their_own_textures() {
     let Some(gpu) = common::gpu() else { return };
@@ -316,7 +324,7 @@ fn surfels_and_triangles_have_their_own_textures() {
     }
 }
 
-/// Numbers of several inputs are told apart, where any has some.
+/// Inputs that are simplified together get distinct texture numbers, if any input has some.
 #[test]
 fn inputs_that_are_simplified_together_keep_their_textures() {
     let numbers = |inputs: Vec<Points>| {

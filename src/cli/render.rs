@@ -4,7 +4,7 @@ mod arguments;
 mod output;
 mod views;
 
-use epsplat::{Error, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
+use epsplat::{Error, Files, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
 use serde::Serialize;
 
 pub use self::arguments::Arguments;
@@ -23,9 +23,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn one(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     check_format(arguments, format)?;
-    let scene = Scene::open(&arguments.inputs, &arguments.scene)?;
-    outputs::check(arguments.files(&scene), [&arguments.output].into_iter().chain(&arguments.json))?;
+    let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
+    outputs::check(arguments.files(&files), [&arguments.output].into_iter().chain(&arguments.json))?;
     let view = View::new(&arguments.camera)?;
+    let scene = Scene::of_files(files, &arguments.scene)?;
 
     let bars = Bars::new();
     let mut renderer = Renderer::new(&scene, &arguments.options, &arguments.device, &bars)?;

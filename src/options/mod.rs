@@ -36,6 +36,14 @@ pub use surfels::{LimitOptions, SurfelOptions};
 pub use transparency::TransparencyOptions;
 pub use triangles::TriangleOptions;
 
+pub use crate::gpu::Replacement;
+pub use crate::plan::{Accumulator, BackendName, BlendFormat, Optimisation, Organisation, RasterDepth};
+pub use crate::scene::{
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Join, Kernel, Light, LowPass, NodeShape, Outline,
+    PointShape, PointSize, Samples, Shading, ShadingAt, Tail,
+};
+pub use crate::surfels::Size;
+
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};

@@ -61,7 +61,15 @@ impl Scene {
     ///
     /// [`Error::Read`] for a missing file, [`Error::Usage`] for a folder without readable files.
     pub fn open(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &SceneOptions) -> Result<Self> {
-        let files = Files::new(paths, &options.input)?;
+        Self::of_files(Files::new(paths, &options.input)?, options)
+    }
+
+    /// Makes a scene of files that are listed already; they say how they are read.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] for a missing file.
+    pub fn of_files(files: Files, options: &SceneOptions) -> Result<Self> {
         for path in files.paths().iter().filter(|path| path.as_os_str() != "-") {
             path.metadata().map_err(|error| Error::read(path, error))?;
         }

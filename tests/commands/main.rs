@@ -7,5 +7,6 @@ mod cases;
 mod cli;
 #[path = "../common/mod.rs"]
 mod common;
+mod examples;
 mod readme;
 mod report;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::Scene;
+use epsplat::Files;
 use epsplat::options::parse::scale;
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 
@@ -78,11 +78,11 @@ pub(super) struct ViewArguments {
 }
 
 impl Arguments {
-    /// Lists the files that are read, those of `scene` included and those of `--cameras` not.
-    pub(super) fn files<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = Source<'a>> {
+    /// Lists all files that are read, `inputs` included and those of `--cameras` not.
+    pub(super) fn files<'a>(&'a self, inputs: &'a Files) -> impl Iterator<Item = Source<'a>> {
         let SceneOptions { surfels, triangles, .. } = &self.scene;
         let others = triangles.texture.iter().chain(&self.camera.file).chain(&surfels.textures);
         let meshes = triangles.meshes.iter().map(Source::cloud);
-        Source::of(scene.files()).chain(meshes).chain(others.map(Source::other))
+        Source::of(inputs).chain(meshes).chain(others.map(Source::other))
     }
 }

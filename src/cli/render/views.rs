@@ -10,7 +10,7 @@ use std::time::Instant;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::low_level::frame::pixel_bytes;
-use epsplat::{Error, Maps, Picture, Progress, ReadReport, Renderer, Report, Result, Scene, View};
+use epsplat::{Error, Files, Maps, Picture, Progress, ReadReport, Renderer, Report, Result, Scene, View};
 use serde::Serialize;
 
 use super::super::outputs::Source;
@@ -56,9 +56,10 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let maps = Maps::of(&arguments.options.maps.aov);
     let format = arguments.views.format.unwrap_or(if maps == Maps::NONE { Format::Png } else { Format::Exr });
     check_format(arguments, format)?;
-    let scene = Scene::open(&arguments.inputs, &arguments.scene)?;
+    let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
     let views = views(arguments, path, format)?;
-    check_outputs(arguments, &scene, path, &views)?;
+    check_outputs(arguments, &files, path, &views)?;
+    let scene = Scene::of_files(files, &arguments.scene)?;
 
     let bars = Bars::new();
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
@@ -150,10 +151,10 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
 }
 
 /// Fails, before anything is rendered, if a picture would overwrite an input or cannot be written.
-fn check_outputs(arguments: &Arguments, scene: &Scene, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
+fn check_outputs(arguments: &Arguments, inputs: &Files, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
     check_folder(&arguments.output, cameras)?;
     let of_colmap = ["cameras.txt", "images.txt"].map(|name| cameras.join(name));
-    let read = arguments.files(scene).chain([Source::other(cameras)]).chain(of_colmap.iter().map(Source::other));
+    let read = arguments.files(inputs).chain([Source::other(cameras)]).chain(of_colmap.iter().map(Source::other));
     let pictures = views.iter().map(|(file, _)| file.as_path());
     outputs::check_distinct(read, pictures.clone().chain(arguments.json.as_deref()))?;
     arguments.json.iter().try_for_each(|json| outputs::try_output(json))?;

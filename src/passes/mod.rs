@@ -40,8 +40,11 @@
 //!   twin such as [`index`], its row in `MAP_PASSES`, and a kernel in `wgsl/`. The build finds
 //!   kernel files by itself. A file with loops names the proof that they end (`gpu/loops.rs`); else
 //!   its loops are counted at run time.
-//! - **An experiment** needs no variant: [`Sources::replace`](crate::gpu::Sources::replace) changes
-//!   the text of a kernel at run time.
+//! - **A kernel function** of one's own needs no variant: `--source kernel_ellipse.wgsl=mine.wgsl`,
+//!   `sources` of a study, or a [`Replacement`](crate::gpu::Replacement) from Rust puts a text in the
+//!   place of a built-in file. A blending kernel's text is evaluated in f64 too, which is its twin;
+//!   its weights that are NaN, infinite, negative or above 1, and loops that do not end, are counted
+//!   in the report.
 
 pub mod accumulate;
 pub mod attributes;

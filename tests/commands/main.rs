@@ -8,5 +8,6 @@ mod cli;
 #[path = "../common/mod.rs"]
 mod common;
 mod examples;
+mod own_kernel;
 mod readme;
 mod report;

@@ -6,7 +6,7 @@
 //! ```
 
 use epsplat::options::Replacement;
-use epsplat::{DeviceOptions, Frame, RenderOptions, Renderer, Result, Scene, SceneOptions, View};
+use epsplat::{CameraOptions, DeviceOptions, Frame, RenderOptions, Renderer, Result, Scene, SceneOptions, View};
 
 /// The weight at the squared distance `rho2` from a disk's centre, in radii squared: Wendland's C2
 /// function.
@@ -22,9 +22,10 @@ fn main() -> Result<()> {
     let scene = Scene::open([input], &SceneOptions::default())?;
     let mut options = RenderOptions::default();
     options.research.sources = vec![Replacement::new("kernel_ellipse.wgsl", KERNEL)];
+    let view = View::new(&CameraOptions { size: Some((400, 400)), ..CameraOptions::default() })?;
     let rendered = |backend: &str, options: &RenderOptions| -> Result<Frame> {
         let device = DeviceOptions { backend: backend.parse()?, ..DeviceOptions::default() };
-        let picture = Renderer::new(&scene, options, &device, &())?.frame(&View::default(), &())?;
+        let picture = Renderer::new(&scene, options, &device, &())?.frame(&view, &())?;
         // A weight that is NaN, infinite, negative or above 1 would be counted here.
         if let Some(wrong) = picture.report.kernel.and_then(|faults| faults.sentence()) {
             println!("{wrong}");

@@ -8,9 +8,15 @@ fn main() -> io::Result<()> {
     let variable = |name: &str| env::var(name).map_err(io::Error::other);
     let folder = Path::new(&variable("CARGO_MANIFEST_DIR")?).join("wgsl");
     println!("cargo::rerun-if-changed=wgsl");
-    let mut paths = fs::read_dir(&folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    let mut paths = Vec::new();
+    for stage in fs::read_dir(&folder)? {
+        for file in fs::read_dir(stage?.path())? {
+            paths.push(file?.path());
+        }
+    }
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "wgsl"));
-    paths.sort();
+    // Modules name files without their folders.
+    paths.sort_by(|one, other| one.file_name().cmp(&other.file_name()));
     let mut list = String::from("/// Every file of `wgsl/`: name and text.\npub const FILES: &[(&str, &str)] = &[\n");
     for path in &paths {
         let Some(name) = path.file_name() else { continue };

@@ -1,6 +1,6 @@
 //! The structs and constants that host and device share, and nothing else.
 //!
-//! `wgsl/layout.wgsl` defines the layout; `tests/layout` compares it with this mirror field by
+//! `wgsl/common/layout.wgsl` defines the layout; `tests/layout` compares it with this mirror field by
 //! field.
 
 use bytemuck::{Pod, Zeroable};
@@ -21,18 +21,18 @@ pub const QUEUE_GRID: u32 = 2;
 /// workgroup.
 pub const QUEUE_LISTING: u32 = 5;
 
-/// Width of a tile, pixels (`wgsl/covered.wgsl`).
+/// Width of a tile, pixels (`wgsl/visibility/covered.wgsl`).
 pub const TILE_WIDTH: u32 = 8;
 
 /// Height of a tile, pixels, if its invocations share the splats that they fetch
-/// (`wgsl/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same splat.
+/// (`wgsl/project/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same splat.
 pub const TILE_ROWS_SHARED: u32 = 16;
 
 /// Height of a tile, pixels, if its invocations do not share splats.
 pub const TILE_ROWS_PLAIN: u32 = 8;
 
 /// Words at the start of the list of covered tiles: the number of tiles, and two grids of
-/// workgroups (`wgsl/covered.wgsl`).
+/// workgroups (`wgsl/visibility/covered.wgsl`).
 pub const COVERED_LIST: u32 = 8;
 
 /// First word of that list's grid with one workgroup per tile.
@@ -42,7 +42,7 @@ pub const COVERED_GRID: u32 = 1;
 pub const COVERED_GRID_OF_EIGHTS: u32 = 4;
 
 /// Words at the start of the tile lists: the greatest length so far of all lists together, and of
-/// one list (`wgsl/bin.wgsl`).
+/// one list (`wgsl/tiles/bin.wgsl`).
 pub const LIST_ENDS: u32 = 2;
 
 /// Side of the blocks of tiles that share a list of large splats, pixels.
@@ -58,19 +58,19 @@ pub const MOST_ROUNDS: u32 = 32_768;
 /// Side of the square workgroup that draws a large splat, in invocations.
 pub const TILE: u32 = 16;
 
-/// Surfels of a batch: consecutive in memory, and culled together (`wgsl/cull.wgsl`).
+/// Surfels of a batch: consecutive in memory, and culled together (`wgsl/visibility/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
 /// Surfels of a run, a number of whole batches that are dealt out together. Of 64, 512 and 4096,
 /// this gave the shortest frames on a software adapter.
 pub const RUN: u32 = 512;
 
-/// First word of the grid over the nodes to judge, in the state of a cut (`wgsl/select.wgsl`).
+/// First word of the grid over the nodes to judge, in the state of a cut (`wgsl/levels/select.wgsl`).
 pub const JUDGE_GRID: u32 = 4;
 /// First word of the grid over the nodes to spread, the last in that state; see [`JUDGE_GRID`].
 pub const SPREAD_GRID: u32 = 7;
 
-/// Nodes that one invocation judges (`wgsl/select.wgsl`). Of 1, 4, 8, 16 and 32 on a software
+/// Nodes that one invocation judges (`wgsl/levels/select.wgsl`). Of 1, 4, 8, 16 and 32 on a software
 /// adapter, 8 was fastest for cuts of 15,000 nodes and 16 for cuts of 330,000.
 pub const JUDGED: u32 = 8;
 
@@ -90,13 +90,13 @@ pub const OTHER_BRANCH: u32 = 2;
 pub const PART_OF_LEAF: u32 = 3;
 
 /// Words at the start of a list of batches: a grid of workgroups over all batches, and one over the
-/// far batches (`wgsl/cull.wgsl`).
+/// far batches (`wgsl/visibility/cull.wgsl`).
 pub const LIST_START: u32 = 6;
 
 /// First word of that list's grid over the far batches.
 pub const LIST_FAR: u32 = 3;
 
-/// Side of the tiles of the occlusion test, pixels (`wgsl/occlusion.wgsl`).
+/// Side of the tiles of the occlusion test, pixels (`wgsl/visibility/occlusion.wgsl`).
 pub const OCCLUSION_TILE: u32 = 8;
 
 /// Units of a weight of 1 in the sums of the accumulator `fixed`: 2^32 - 2^10. It fits one word, is
@@ -107,7 +107,7 @@ pub const ONE: u32 = u32::MAX - 1023;
 /// Bit of [`Splat::bounds_last`] that is set if s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
 
-/// Camera, options and facts of one render, for the kernels; `wgsl/layout.wgsl` explains the
+/// Camera, options and facts of one render, for the kernels; `wgsl/common/layout.wgsl` explains the
 /// fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -159,7 +159,7 @@ pub struct Band {
     pub padding_1: u32,
 }
 
-/// A projected surfel; `wgsl/layout.wgsl` explains the fields.
+/// A projected surfel; `wgsl/common/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -174,7 +174,7 @@ pub struct Splat {
     pub a_low: [f32; 3],
 }
 
-/// A page of surfels; `wgsl/layout.wgsl` explains the fields.
+/// A page of surfels; `wgsl/common/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -189,7 +189,7 @@ pub struct Page {
     pub padding_2: u32,
 }
 
-/// A node of a tree; `wgsl/layout.wgsl` explains the fields.
+/// A node of a tree; `wgsl/common/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -202,7 +202,7 @@ pub struct TreeNode {
     pub cone: f32,
 }
 
-/// A branch, neighbouring subtrees of a tree; `wgsl/layout.wgsl` explains the fields.
+/// A branch, neighbouring subtrees of a tree; `wgsl/common/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -217,7 +217,7 @@ pub struct Branch {
     pub padding_1: u32,
 }
 
-/// Input of the low-pass for one splat; `wgsl/filter.wgsl` explains the fields.
+/// Input of the low-pass for one splat; `wgsl/project/filter.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]

@@ -1,7 +1,7 @@
 //! Error bounds of caps, and scenes of caps that are hard to intersect.
 //!
 //! The bounds limit how far a fragment of the device may lie from its f64 twin. They follow, to
-//! first order, from the operations of `wgsl/curved.wgsl`. With the names of
+//! first order, from the operations of `wgsl/project/curved.wgsl`. With the names of
 //! [`passes::curved`](crate::passes::curved), e = 2^-24, k = |s||t| / |s x t|, and all lengths in
 //! units of r:
 //!

@@ -1,7 +1,7 @@
 //! Bounds how far a fragment of the device may lie from its f64 twin.
 //!
-//! The bounds follow, to first order, from the operations of `wgsl/camera_*.wgsl`, `wgsl/rows.wgsl`
-//! and `wgsl/footprint.wgsl`. With e = 2^-24 (half a unit in the last place of 1), camera-space p,
+//! The bounds follow, to first order, from the operations of `wgsl/camera_*.wgsl`, `wgsl/accumulate/rows.wgsl`
+//! and `wgsl/project/footprint.wgsl`. With e = 2^-24 (half a unit in the last place of 1), camera-space p,
 //! s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera
 //! `|(s x t).z| / (|s| |t|)`):
 //!

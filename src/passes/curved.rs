@@ -1,5 +1,5 @@
 //! A cap at a pixel: a surfel that curves out of its plane ([`Cap`]). The twin of
-//! `wgsl/curved.wgsl`.
+//! `wgsl/project/curved.wgsl`.
 //!
 //! **Rows.** With N the inverse of [s t n], n the unit normal, a point q relative to the surfel's
 //! centre has the coordinates `(u, v, w) = N q`, and the cap is

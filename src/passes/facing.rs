@@ -1,7 +1,7 @@
 //! Points that face the camera (Schuetz and Wimmer 2015): their half-axes and their intersection
 //! with a ray.
 //!
-//! The twin of `wgsl/facing.wgsl` and `wgsl/axes_facing.wgsl`.
+//! The twin of `wgsl/project/facing.wgsl` and `wgsl/project/axes_facing.wgsl`.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! A splat at a pixel: coverage, depth and rho. The twin of `wgsl/footprint.wgsl`.
+//! A splat at a pixel: coverage, depth and rho. The twin of `wgsl/project/footprint.wgsl`.
 
 use glam::DVec2;
 

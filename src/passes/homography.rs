@@ -1,14 +1,14 @@
 //! A disk's image in one camera: the homography from pixels to the disk, and the extent of its
 //! outline.
 //!
-//! The twin of `wgsl/camera_pinhole.wgsl` and `wgsl/camera_orthographic.wgsl`.
+//! The twin of `wgsl/common/camera_pinhole.wgsl` and `wgsl/common/camera_orthographic.wgsl`.
 //!
 //! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies
 //! `(a, b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4).
 //! The rows of that matrix are `t x p`, `p x s` and `s x t`, divided by `p . (s x t)`. It is stored
 //! relative to the pixel that holds the splat's own centre: relative to the image's origin, a splat
 //! of two pixels at column 1000 would lose nine bits of its shape to cancellation. The kernel finds
-//! that centre in doubled f32 precision (`wgsl/double.wgsl`), so u and v err by a few units of
+//! that centre in doubled f32 precision (`wgsl/common/double.wgsl`), so u and v err by a few units of
 //! 2^-24, divided by the cosine of the angle between view ray and normal.
 //!
 //! **Extent.** The lines x = k that are tangent to the disk's outline solve a quadratic in k. A

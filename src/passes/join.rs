@@ -46,7 +46,7 @@ pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, op
 }
 
 /// Converts a straight linear colour to sRGB codes: the twin of `color_beside` in
-/// `wgsl/join_coded.wgsl`.
+/// `wgsl/triangles/join_coded.wgsl`.
 fn coded([r, g, b, alpha]: [f64; 4]) -> [f64; 4] {
     let [r, g, b] = [r, g, b].map(linear_to_srgb);
     [r, g, b, alpha]

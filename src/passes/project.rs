@@ -21,7 +21,7 @@ use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, c
 /// A surfel with its index, and with its cap if some surfel of the scene curves.
 pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
 
-/// The f64 twin of `wgsl/project.wgsl` for one surfel; `None` if it can touch no pixel.
+/// The f64 twin of `wgsl/project/project.wgsl` for one surfel; `None` if it can touch no pixel.
 ///
 /// `relative` is the surfel's centre relative to the camera's eye, world units.
 pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {

@@ -103,7 +103,7 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
 pub const LONGEST: u64 = 8_000;
 
 /// Words of a kind of lists before their entries: the sizes that the frame needed, and the end of
-/// each list (`wgsl/bin.wgsl`).
+/// each list (`wgsl/tiles/bin.wgsl`).
 pub fn list_words(plan: &Plan, of: Listed, band: &Band) -> u64 {
     let [across, down] = match of {
         Listed::Large => [BLOCK_SIDE; 2],

@@ -9,7 +9,7 @@ use super::Band;
 /// succeeds; where a list's length changes with the view, this holds for the present view.
 pub const MOST_TRIES: usize = 7;
 
-/// The lists of splats that may touch each cell of the image (`wgsl/bin.wgsl`).
+/// The lists of splats that may touch each cell of the image (`wgsl/tiles/bin.wgsl`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listed {
     /// Large splats, by blocks of tiles.

@@ -15,19 +15,19 @@ pub enum Optimisation {
     /// (`passes/order.rs`).
     Order,
     /// Splats that lie behind all nearest depths of their pixels are skipped, since they add
-    /// nothing (`wgsl/occlusion.wgsl`).
+    /// nothing (`wgsl/visibility/occlusion.wgsl`).
     Hiding,
     /// Identical surfels are drawn once (`scene/copies.rs`).
     Copies,
     /// Two values share a 64-bit word, which one atomic operation serves: two sums
-    /// (`wgsl/accumulator_fixed_pairs.wgsl`), or the nearest depth and its colour
-    /// (`wgsl/nearest_color.wgsl`).
+    /// (`wgsl/accumulate/accumulator_fixed_pairs.wgsl`), or the nearest depth and its colour
+    /// (`wgsl/visibility/nearest_color.wgsl`).
     Pairs,
-    /// Records are read and written 64 bits at a time (`wgsl/words_long.wgsl`).
+    /// Records are read and written 64 bits at a time (`wgsl/common/words_long.wgsl`).
     LongWords,
     /// Tiles sum small splats too (`passes/tiles.rs`).
     Gathering,
-    /// The invocations of a tile share what they fetch (`wgsl/splat_shared.wgsl`).
+    /// The invocations of a tile share what they fetch (`wgsl/project/splat_shared.wgsl`).
     Sharing,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,

@@ -81,7 +81,7 @@ impl Atlas {
     }
 
     /// The column and row of the cell that contains `place`. The twin of `cell_of` in
-    /// `wgsl/texture.wgsl`.
+    /// `wgsl/accumulate/texture.wgsl`.
     fn cell_of(&self, place: [f64; 2]) -> [f64; 2] {
         let last = f64::from(self.columns - 1);
         [0, 1].map(|k| ((place[k] - f64::from(self.corner[k])) / f64::from(self.cell)).floor().clamp(0.0, last))

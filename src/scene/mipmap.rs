@@ -35,7 +35,7 @@ impl Mipmap {
     ///
     /// `texels` is the area that a pixel covers, in texels of the full image. The result is
     /// interpolated between the levels with the next smaller and larger texels. The twin of
-    /// `seen_texture` in `wgsl/textures.wgsl`.
+    /// `seen_texture` in `wgsl/accumulate/textures.wgsl`.
     pub fn seen_at(&self, place: [f64; 2], texels: f64) -> [f64; 4] {
         let level = (0.5 * texels.max(1.0).log2()).min((self.levels.len() - 1) as f64);
         let (low, share) = (level.floor() as usize, level - level.floor());

@@ -69,7 +69,7 @@ impl Texture {
     ///
     /// Returns linear RGB premultiplied by alpha, and alpha. Outside [0, 1] the image repeats, or
     /// takes its edge texels if it [clamps](Self::clamped). Coordinates that are not finite count
-    /// as 0. The twin of `level_color` in `wgsl/textures.wgsl`.
+    /// as 0. The twin of `level_color` in `wgsl/accumulate/textures.wgsl`.
     pub fn premultiplied_at(&self, [u, v]: [f64; 2]) -> [f64; 4] {
         let place = |turns: f64, size: u32| {
             let turns = if turns.is_finite() { turns } else { 0.0 };
@@ -286,8 +286,8 @@ impl Textured {
     /// most 1.
     ///
     /// `ray` is the pixel's view ray, scaled to gain a depth of 1; it meets the plane at `depth`,
-    /// world units. The twin of `area_in_pixel` in `wgsl/camera_pinhole.wgsl` and
-    /// `wgsl/camera_orthographic.wgsl`.
+    /// world units. The twin of `area_in_pixel` in `wgsl/common/camera_pinhole.wgsl` and
+    /// `wgsl/common/camera_orthographic.wgsl`.
     pub fn part_in_pixel(&self, index: usize, camera: &Camera, ray: DVec3, depth: f64) -> f64 {
         let [u, v] = self.places[index].slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));
         // Its length is the area in the texture per unit of area in the plane.
@@ -327,7 +327,7 @@ impl Textured {
     /// premultiplied colour.
     ///
     /// It is the texture's where the coordinates agree, and the blended one elsewhere. The twin of
-    /// `textured` in `wgsl/texture.wgsl`.
+    /// `textured` in `wgsl/accumulate/texture.wgsl`.
     pub fn resolve(&self, means: [f64; 5], blended: [f64; 4]) -> [f64; 4] {
         let [u, v, squared, reach_2, part] = means;
         let share = (2.0 - (squared - u * u - v * v) / reach_2).clamp(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! The double-f32 arithmetic of `wgsl/double.wgsl` on the device, against f64.
+//! The double-f32 arithmetic of `wgsl/common/double.wgsl` on the device, against f64.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

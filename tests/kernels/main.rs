@@ -7,6 +7,7 @@ mod common;
 mod determinism;
 mod double;
 mod extremes;
+mod imports;
 mod index;
 mod layout;
 mod long_lists;

@@ -1,5 +1,5 @@
 //! The small levels of a branch, which one workgroup judges and spreads in one dispatch
-//! (`select_top` in `wgsl/select.wgsl`).
+//! (`select_top` in `wgsl/levels/select.wgsl`).
 
 use super::MOST_OF_LEAF;
 use super::row::{COUNT_MASK, Row};

@@ -1,5 +1,0 @@
-// No triangles: only splats show. Same interface as join.wgsl.
-
-fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
-    return splats;
-}

@@ -1,0 +1,453 @@
+// Stage 0 of scenes with levels of detail: chooses the cut that is drawn in place of all surfels
+// (Pajarola 2003, section 5.1, step 1). The branches of the tree are processed one after the other,
+// and each branch level by level from its roots down. The nodes that are reached in a level are a
+// range of `frontier`. They are judged, each workgroup counts what its nodes leave, and prefix sums
+// of these counts say where each node writes what it leaves. So the order of the cut, too, depends
+// only on the tree and the camera. One workgroup does all of the first levels, which are small.
+// Pages then draw the chosen surfels and nodes from where they lie in the branch. Cuts that fade
+// into each other (select_fades.wgsl) are all chosen at once.
+// Host side and twin: src/passes/select.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x737976e37d84fa2b
+// #import attributes::{attribute_word, attributes}
+// #import axes_*::{growth}
+// #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
+// #import camera_*::{axis_image, ball_sine, is_beside, ray_to}
+// #import layout::{Branch, Surfel, TreeNode, WORKGROUP, held, hold_view, linear_index, page}
+// #import low_part::{low_part}
+// #import project::{CULL_BACK, groups_of, rotate_plain, rows_of}
+// #import select_fades::{ALL_CUTS, CHOSEN_WORDS, choose, cuts_that_divide, cuts_that_reach}
+// #import select_fades::{set_cuts_that_reach}
+// #import vectors::{cross3, dot3, norm3}
+// #import words|words_long::{surfel_at}
+
+@group(0) @binding(72) var<uniform> branch: Branch;
+@group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
+// The indices of the reached nodes, level after level, and the fate of each. With fades, a second
+// half of `frontier` stores how many cuts reach each node (select_fades.wgsl).
+@group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
+@group(0) @binding(76) var<storage, read_write> fates: array<u32>;
+// For each invocation of a level: how many surfels to draw and how many children the invocations
+// before it in its workgroup leave.
+@group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
+// For each workgroup: how many of both its nodes leave; then where it starts to write them.
+@group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
+// The attributes of this branch; then, from branch.chosen on, the number of chosen surfels and
+// nodes, and their indices. They share a buffer so that the kernels that draw them need no further
+// one: core WebGPU grants eight.
+@group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
+// For each root of a branch: how many cuts reach it.
+@group(0) @binding(79) var<storage, read_write> reached: array<u32>;
+// The state of the cut, by the words below; `selected` is the same buffer, read-only.
+@group(0) @binding(80) var<storage, read_write> selection: array<u32>;
+@group(0) @binding(81) var<storage, read> selected: array<u32>;
+
+// The range of `frontier` that is the current level, and that of the next one.
+const LEVEL: u32 = 0u;
+const LEVEL_END: u32 = 1u;
+const NEXT: u32 = 2u;
+const NEXT_END: u32 = 3u;
+// Grids over the nodes of the level to judge and of the level to spread, with one invocation for
+// JUDGED nodes.
+const JUDGE_GRID: u32 = 4u;
+const SPREAD_GRID: u32 = 7u;
+
+// Surfels per run; a run is a number of whole batches.
+const RUN: u32 = 512u;
+
+// Kinds of nodes.
+const KIND_SHIFT: u32 = 30u;
+const COUNT_MASK: u32 = (1u << KIND_SHIFT) - 1u;
+const INNER: u32 = 0u;
+const LEAF: u32 = 1u;
+const OTHER_BRANCH: u32 = 2u;
+const PART_OF_LEAF: u32 = 3u;
+
+// Nodes that one invocation judges in sequence. Barriers are expensive on a CPU adapter, and one
+// costs the same for any number of nodes.
+const JUDGED: u32 = 8u;
+
+// The fate of a node: how many of the cuts that reach it divide it (the finest ones), or UNSEEN.
+const UNSEEN: u32 = 0x7fu;
+const CUTS_MASK: u32 = 0x7fu;
+// A flag beside that number: all children of the node are drawn without being judged.
+const CHILDREN_DRAWN: u32 = 0x80u;
+
+// If set, the size of a node is that of its bounding ball, as seen in the middle of the image; else
+// that of the image of its ellipse.
+override MEASURES_EXTENT: bool;
+
+const PI: f32 = 3.14159265;
+
+// Margins for rounding. BALL_ROUNDING: of a ball's position and radius, relative to its distance.
+// SINE_SLACK: of sines. BOUND_SLACK: of bounds on the balls of children. Such a ball is off by 2e-6
+// of its parent's distance, because it is less than twice as far away if both are past the near
+// depth; and its size errs by six roundings of 6e-8.
+const BALL_ROUNDING: f32 = 1e-6;
+const BOUND_SLACK: f32 = 1e-4;
+const SINE_SLACK: f32 = 1e-5;
+
+var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
+var<workgroup> eights: array<vec2<u32>, WORKGROUP / 8u>;
+var<workgroup> first_end: u32;
+
+// Maps a place of the page to an entry of the list of chosen surfels. Neighbours in a cut are
+// neighbours in the image, but surfels that are processed at the same time should not be: their
+// atomics would contend (src/passes/order.rs).
+fn drawn_at(place: u32) -> u32 {
+    let run = place / RUN;
+    // A page has fewer than 2^16 runs, so no product exceeds 2^32, and the f32 quotient errs by
+    // less than 2^16 * 6 * 2^-24 < 1: the remainder is right, or too small or too large by one
+    // multiple of `runs`. CPU adapters divide integers one lane at a time, so this avoids integer
+    // division.
+    let runs = max(page.runs, 1u);
+    let product = run * page.stride;
+    let rest = bitcast<i32>(product - u32(f32(product) / f32(runs)) * runs);
+    let turn = bitcast<u32>(rest + select(0, i32(runs), rest < 0) - select(0, i32(runs), rest >= i32(runs)));
+    // The incomplete last run stays in place.
+    return page.first + select(run, turn, run < page.runs) * RUN + place % RUN;
+}
+
+fn places_held() -> u32 {
+    return page.surfels;
+}
+
+// The surfel or node at a place of the page; any index past the end of the cut.
+fn surfel_of(place: u32) -> u32 {
+    return attributes[page.chosen + 1u + CHOSEN_WORDS * drawn_at(place)];
+}
+
+// Whether a place of the page has a surfel of the cut.
+fn is_filled(place: u32) -> bool {
+    return drawn_at(place) < attributes[page.chosen];
+}
+
+// The word of a surfel's attributes that holds its rank.
+override NUMBER_WORD: u32;
+
+// The rank of a surfel among all surfels of the tree; nodes have the ranks after them. Only present
+// where a render needs it.
+fn rank_of(index: u32) -> u32 {
+    return attribute_word(index, NUMBER_WORD);
+}
+
+fn kind_of(node: TreeNode) -> u32 {
+    return node.below >> KIND_SHIFT;
+}
+
+// Whether the node is never divided. A leaf of one surfel is drawn as that surfel: the node has its
+// ellipse, clip lines and cap (`settle` in src/scene/hierarchy.rs; src/passes/source.rs). A leaf of
+// no surfels stands for a subtree that was not loaded, because no picture reaches it.
+fn is_whole(node: TreeNode) -> bool {
+    return kind_of(node) == LEAF && (node.below & COUNT_MASK) <= 1u;
+}
+
+fn vector(parts: array<f32, 3>) -> vec3<f32> {
+    return vec3<f32>(parts[0], parts[1], parts[2]);
+}
+
+// The sine of the angle by which the node's plane faces away from the eye, and the sine past which
+// everything below the node faces away.
+fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32) -> vec2<f32> {
+    let normal = cross3(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
+    let turned = dot3(ray_to(relative), normal * inverseSqrt(max(dot3(normal, normal), 1e-38)));
+    // The sine of the sum of the cone's angle and the ball's half-angle, if that is less than a
+    // right angle; else 1, which is never exceeded.
+    let ball = ball_sine(radius, norm3(relative));
+    let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
+    let ball_cosine = sqrt(max(1.0 - ball * ball, 0.0));
+    let narrow = node.cone * ball_cosine - cone * ball > SINE_SLACK;
+    return vec2<f32>(turned, select(1.0, cone * ball_cosine + node.cone * ball, narrow) + SINE_SLACK);
+}
+
+// The area, in square pixels of the image, of a ball of this radius (device units) that is seen at
+// `depth` in the middle of the image.
+fn seen_disk(depth: f32, radius: f32) -> f32 {
+    let across = axis_image(vec3<f32>(0.0, 0.0, depth), vec3<f32>(radius, radius, 0.0)) * held.levels.yz;
+    let longest = max(across.x, across.y);
+    return PI * longest * longest;
+}
+
+// The area that a node covers, in square pixels of the image.
+fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
+    if (MEASURES_EXTENT) {
+        return seen_disk(center.z, node.radius * held.unit);
+    }
+    let s = axis_image(center, rotate_plain(vector(surfel.s) * held.unit)) * held.levels.yz;
+    let t = axis_image(center, rotate_plain(vector(surfel.t) * held.unit)) * held.levels.yz;
+    return PI * abs(s.x * t.y - s.y * t.x);
+}
+
+// Whether every cut that divides the node draws all its children, wherever they lie in its ball:
+// all are in view and past the near depth, and no cut divides any of them. This holds for most
+// nodes of a cut.
+fn draws_children(node: TreeNode, ball: Ball) -> bool {
+    let radius = node.children * held.unit * (1.0 + BOUND_SLACK);
+    let nearest = ball.nearest - BOUND_SLACK * norm3(ball.center);
+    let past = nearest - radius - growth(ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
+    // A ball of negative radius is beside the image unless that of the positive radius lies wholly
+    // within it.
+    let within = !is_beside(ball.center, -ball.radius, 0.0);
+    return node.children >= 0.0 && past && within && cuts_that_divide(seen_disk(nearest, radius)) == 0u;
+}
+
+// The fate of a node. `low` is the part of its centre that f32 leaves out, world units.
+fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
+    // A root of another branch is judged there, and a part of a leaf was judged with the whole
+    // leaf.
+    if (kind_of(node) == OTHER_BRANCH || kind_of(node) == PART_OF_LEAF) {
+        return ALL_CUTS;
+    }
+    // The leading parts cancel, so the result is as exact as the trailing parts.
+    let relative = (vector(node.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
+    // This length has ten roundings of f32.
+    let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * norm3(relative));
+    if (ball.farthest < held.near || is_beside(ball.center, ball.radius, FILTER_REACH + 2.0)) {
+        return UNSEEN;
+    }
+    var faces = true;
+    if (CULL_BACK) {
+        let away = turned_away(node, surfel, relative, ball.radius);
+        if (away.x > away.y) {
+            return UNSEEN;
+        }
+        // A plane that faces away would be culled, whatever is below it, so such a node is divided.
+        faces = away.x <= 0.0;
+    }
+    let divided = reaches_near(ball) || !faces;
+    let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, is_whole(node));
+    // Neither the image area of a child's ellipse nor its side follows from the node's own position
+    // and size.
+    let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
+    return cuts | select(0u, CHILDREN_DRAWN, unjudged);
+}
+
+// The number of cuts that divide the node, among those that reach it; or UNSEEN.
+fn cuts_of(fate: u32) -> u32 {
+    return fate & CUTS_MASK;
+}
+
+// Whether dividing the node draws what is below it, its surfels or its children.
+fn is_last(node: TreeNode, fate: u32) -> bool {
+    let kind = kind_of(node);
+    return kind == LEAF || kind == PART_OF_LEAF || (kind == INNER && (fate & CHILDREN_DRAWN) != 0u);
+}
+
+// How many surfels and nodes are drawn for a node that `reached_in` cuts reach, and how many
+// children it leaves for the next level.
+fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
+    let cuts = cuts_of(fate);
+    if (cuts == UNSEEN) {
+        return vec2<u32>(0u);
+    }
+    let below = select(0u, node.below & COUNT_MASK, cuts > 0u && kind_of(node) != OTHER_BRANCH);
+    let itself = select(0u, 1u, cuts < reached_in);
+    return select(vec2<u32>(itself, below), vec2<u32>(itself + below, 0u), is_last(node, fate));
+}
+
+// The sum of the counts of all invocations before this one in the workgroup: within its group of
+// eight, plus the groups before. It takes two barriers, because each is expensive on a CPU adapter.
+fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
+    counted[local] = counts;
+    workgroupBarrier();
+    if (local < WORKGROUP / 8u) {
+        var sum = vec2<u32>(0u);
+        for (var k = 8u * local; k < 8u * local + 8u; k++) {
+            let own = counted[k];
+            counted[k] = sum;
+            sum += own;
+        }
+        eights[local] = sum;
+    }
+    workgroupBarrier();
+    var before = counted[local];
+    for (var k = 0u; k < local / 8u; k++) {
+        before += eights[k];
+    }
+    return before;
+}
+
+// The number of invocations that judge so many nodes.
+fn judges_of(nodes: u32) -> u32 {
+    return (nodes + JUDGED - 1u) / JUDGED;
+}
+
+fn set_grid(at: u32, nodes: u32) {
+    let grid = rows_of(groups_of(judges_of(nodes)));
+    for (var k = 0u; k < 3u; k++) {
+        selection[at + k] = grid[k];
+    }
+}
+
+// The fate of a node that `reached_in` cuts reach.
+fn judged(node: TreeNode, index: u32, reached_in: u32) -> u32 {
+    let record = branch.surfels + index;
+    let fate = fate_of(node, surfel_at(record), low_part(record));
+    return select((fate & CHILDREN_DRAWN) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
+}
+
+// Judges the nodes of a range of the frontier, and returns how much they leave.
+fn judge_run(first: u32, end: u32) -> vec2<u32> {
+    var counts = vec2<u32>(0u);
+    for (var place = first; place < end; place++) {
+        let index = frontier[place];
+        let node = tree_nodes[index];
+        let cuts = cuts_that_reach(place);
+        let fate = judged(node, index, cuts);
+        counts += left_by(node, fate, cuts);
+        fates[place] = fate;
+    }
+    return counts;
+}
+
+// Writes what a node leaves, from `start` on, and returns how much that is.
+fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
+    let cuts = cuts_of(fate);
+    let node = tree_nodes[index];
+    let counts = left_by(node, fate, reached_in);
+    var at = start.x;
+    if (cuts < reached_in) {
+        choose(at, branch.surfels + index, cuts, reached_in);
+        at++;
+    }
+    if (cuts != UNSEEN && kind_of(node) == OTHER_BRANCH) {
+        reached[node.first] = cuts;
+    }
+    let below = node.first + select(0u, branch.surfels, kind_of(node) == INNER);
+    let drawn = start.x + counts.x - at;
+    for (var k = 0u; k < drawn; k++) {
+        choose(at + k, below + k, 0u, cuts);
+    }
+    for (var k = 0u; k < counts.y; k++) {
+        frontier[start.y + k] = node.first + k;
+        set_cuts_that_reach(start.y + k, cuts);
+    }
+    return counts;
+}
+
+// Writes what the nodes of a range leave, from `start` on.
+fn spread_run(first: u32, end: u32, start: vec2<u32>) {
+    var at = start;
+    for (var place = first; place < end; place++) {
+        at += spread(frontier[place], fates[place], cuts_that_reach(place), at);
+    }
+}
+
+// Makes the reached roots of a branch its first level, and returns their number.
+fn reach_roots() -> u32 {
+    var end = 0u;
+    for (var root = 0u; root < branch.roots; root++) {
+        var cuts = ALL_CUTS;
+        if (branch.whole == 0u) {
+            cuts = reached[branch.first_root + root];
+        }
+        if (cuts > 0u) {
+            frontier[end] = root;
+            set_cuts_that_reach(end, cuts);
+            end++;
+        }
+    }
+    return end;
+}
+
+// One workgroup: reaches the roots, and processes the small levels.
+@compute @workgroup_size(WORKGROUP)
+fn select_top(@builtin(local_invocation_index) local: u32) {
+    hold_view();
+    if (local == 0u) {
+        first_end = reach_roots();
+    }
+    storageBarrier();
+    var first = 0u;
+    var start = vec2<u32>(0u, workgroupUniformLoad(&first_end));
+    for (var level = 0u; level < branch.small_levels; level++) {
+        let end = start.y;
+        let own_first = first + local * JUDGED;
+        let own_end = min(own_first + JUDGED, end);
+        let before = sum_before(judge_run(own_first, own_end), local);
+        spread_run(own_first, own_end, start + before);
+        first = end;
+        for (var k = 0u; k < WORKGROUP / 8u; k++) {
+            start += eights[k];
+        }
+        // All invocations now see what was spread, and all have read the sums.
+        storageBarrier();
+        workgroupBarrier();
+    }
+    if (local == 0u) {
+        chosen[branch.chosen] = start.x;
+        selection[NEXT] = first;
+        selection[NEXT_END] = start.y;
+        set_grid(JUDGE_GRID, start.y - first);
+    }
+}
+
+// Judges the next level. One invocation for JUDGED consecutive nodes.
+@compute @workgroup_size(WORKGROUP)
+fn select_judge(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold_view();
+    let run = linear_index(workgroup, workgroups, local);
+    let first = selected[NEXT] + run * JUDGED;
+    let end = min(first + JUDGED, selected[NEXT_END]);
+    let counts = judge_run(first, end);
+    let before = sum_before(counts, local);
+    if (first < end) {
+        run_counts[run] = before;
+    }
+    if (local == WORKGROUP - 1u) {
+        group_counts[workgroup.y * workgroups.x + workgroup.x] = before + counts;
+    }
+}
+
+// One workgroup: turns the counts of workgroups into the places where they write their surfels and
+// children, and moves LEVEL and NEXT on by one level.
+@compute @workgroup_size(WORKGROUP)
+fn select_sum(@builtin(local_invocation_index) local: u32) {
+    let first = selection[NEXT];
+    let end = selection[NEXT_END];
+    let here = chosen[branch.chosen];
+    let groups = groups_of(judges_of(end - first));
+    let each = (groups + WORKGROUP - 1u) / WORKGROUP;
+    let stop = min((local + 1u) * each, groups);
+    var own = vec2<u32>(0u);
+    for (var group = local * each; group < stop; group++) {
+        own += group_counts[group];
+    }
+    let before = sum_before(own, local);
+    var start = before + vec2<u32>(here, end);
+    for (var group = local * each; group < stop; group++) {
+        let counts = group_counts[group];
+        group_counts[group] = start;
+        start += counts;
+    }
+    // All invocations have read the old words before the barriers above.
+    if (local == WORKGROUP - 1u) {
+        let all = before + own;
+        selection[LEVEL] = first;
+        selection[LEVEL_END] = end;
+        selection[NEXT] = end;
+        selection[NEXT_END] = end + all.y;
+        chosen[branch.chosen] = here + all.x;
+        set_grid(SPREAD_GRID, end - first);
+        set_grid(JUDGE_GRID, all.y);
+    }
+}
+
+// Spreads the level that was judged. One invocation for JUDGED consecutive nodes.
+@compute @workgroup_size(WORKGROUP)
+fn select_spread(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let run = linear_index(workgroup, workgroups, local);
+    let first = selected[LEVEL] + run * JUDGED;
+    let end = min(first + JUDGED, selected[LEVEL_END]);
+    if (first >= end) {
+        return;
+    }
+    spread_run(first, end, group_counts[workgroup.y * workgroups.x + workgroup.x] + run_counts[run]);
+}

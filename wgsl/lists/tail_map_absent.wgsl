@@ -1,0 +1,2 @@
+
+fn write_tail(out: u32, weight: f32) {}

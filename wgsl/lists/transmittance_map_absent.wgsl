@@ -1,0 +1,2 @@
+
+fn write_transmittance(out: u32, transmittance: f32) {}

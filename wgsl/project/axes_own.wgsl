@@ -1,0 +1,24 @@
+// The half-axes of a surfel in camera and world space, device units: its own. Same interface as
+// axes_facing.wgsl.
+// #import layout::{Surfel, held}
+// #import project::{rotate_plain}
+
+struct Axes {
+    s: vec3<f32>,
+    t: vec3<f32>,
+    s_world: vec3<f32>,
+    t_world: vec3<f32>,
+}
+
+// The most by which a surfel is drawn larger than it is, device units, at any depth up to `depth`.
+fn growth(depth: f32) -> f32 {
+    return 0.0;
+}
+
+fn half_axes(surfel: Surfel, depth: f32) -> Axes {
+    // Plain f32 suffices for most splats; the half-axes of thin ones are rotated again in doubled
+    // precision (rows.wgsl).
+    let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
+    let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
+    return Axes(rotate_plain(s_world), rotate_plain(t_world), s_world, t_world);
+}

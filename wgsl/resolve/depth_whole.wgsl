@@ -1,0 +1,16 @@
+// Sums of depths where the nearest depth is not known yet: as fractions of the farthest depth in
+// the scene, so that their error is that of the scene's depth, not of epsilon. Same interface as
+// depth.wgsl.
+// Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
+// #import *::{Term, add, sum_at, term}
+// #import layout::{held}
+
+override DEPTH_CHANNEL: u32;
+
+fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
+    add(pixel, DEPTH_CHANNEL, term(weight, depth / held.farthest));
+}
+
+fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
+    return sum_at(pixel, DEPTH_CHANNEL) / weight * held.farthest;
+}

@@ -1,0 +1,2 @@
+
+fn write_weight(out: u32, weight: f32) {}

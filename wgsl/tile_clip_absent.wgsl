@@ -1,3 +1,0 @@
-fn handed_clip(own: Clip, from_: u32) -> Clip {
-    return own;
-}

@@ -1,5 +1,0 @@
-// The fade of a splat that another invocation fetched (tile.wgsl).
-
-fn handed_fade(own: Fade, from_: u32) -> Fade {
-    return Fade(handed(own.first, from_), handed(own.end, from_));
-}

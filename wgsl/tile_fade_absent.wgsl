@@ -1,3 +1,0 @@
-fn handed_fade(own: Fade, from_: u32) -> Fade {
-    return own;
-}

@@ -1,9 +1,0 @@
-// The pixels or samples of a tile's column, for pictures whose inputs are kept separate. Same
-// interface as tile_pixels.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0x2644c463de12ae18
-
-fn resolve_column(column: Column, local: u32) {
-    for (var k = 0u; k < column.pixels; k++) {
-        keep_nearest_of(k, column.pixel + k * held.width, column.x, column.y + k);
-    }
-}

@@ -1,0 +1,5 @@
+// #import clip::{Clip}
+
+fn handed_clip(own: Clip, from_: u32) -> Clip {
+    return own;
+}

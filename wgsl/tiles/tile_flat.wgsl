@@ -1,0 +1,44 @@
+// Disks in tiles. Same interface as tile_curved.wgsl.
+// #import camera_*::{rim}
+// #import curved|facing|flat::{Bend, Cap}
+// #import filter|lowpass_none::{Filter}
+// #import footprint::{Rectangle}
+// #import layout::{Splat}
+// #import side::{SIDES}
+// #import splat_*::{handed}
+// #import tile_filter::{filter_misses}
+// #import tile_reach::{exceeds, span}
+
+// bounds_last, whose AWAY bit is_away() reads if a pixel shows one side.
+fn handed_side(own: u32, from_: u32) -> u32 {
+    var last = 0u;
+    if (SIDES) {
+        last = handed(own, from_);
+    }
+    return last;
+}
+
+fn handed_cap(own: Cap, from_: u32) -> Cap {
+    return own;
+}
+
+fn handed_bend(own: Bend, from_: u32) -> Bend {
+    return own;
+}
+
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: its ellipse may miss the
+// corners of these.
+fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
+    let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let disk = span(
+        vec2<f32>(splat.a[0] + splat.a_low[0], splat.b[0]),
+        vec2<f32>(splat.a[1] + splat.a_low[1], splat.b[1]),
+        vec2<f32>(splat.a[2] + splat.a_low[2], splat.b[2]),
+        low,
+        high,
+    );
+    let c = span(vec2<f32>(splat.c[0], 0.0), vec2<f32>(splat.c[1], 0.0), vec2<f32>(splat.c[2], 0.0), low, high);
+    let most = c.middle.x + abs(c.right.x) + abs(c.down.x) + c.slack;
+    return exceeds(disk, rim(most)) && filter_misses(filter_, low, high);
+}

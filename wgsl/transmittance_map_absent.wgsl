@@ -1,1 +1,0 @@
-fn write_transmittance(out: u32, transmittance: f32) {}

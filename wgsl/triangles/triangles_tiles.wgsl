@@ -1,0 +1,86 @@
+// The list of image tiles in which triangles show. Other pixels are not shaded, and not looked at
+// when splats and triangles are joined. Same interface as triangles_tiles_absent.wgsl.
+// Host side: src/passes/triangles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x5a024c5f69138886
+// #import covered::{TILE_ROWS}
+// #import footprint::{band_pixels}
+// #import join::{beside}
+// #import layout::{WORKGROUP, held, held_band, hold, linear_index}
+// #import project::{rows_of}
+// #import triangles_*::{nearest_triangle}
+// #import triangles_attributes::{triangle_pixels}
+
+// The number of listed tiles, a grid with one workgroup for each, and from TRIANGLE_TILES on the
+// tiles, 8 x 8 pixels each. After the pixels, triangle_pixels has a row for each tile of the band
+// that says whether the tile is listed.
+@group(0) @binding(70) var<storage, read_write> triangle_tiles: array<atomic<u32>>;
+@group(0) @binding(71) var<storage, read> tiles_of_triangles: array<u32>;
+
+const TRIANGLE_TILES: u32 = 8u;
+const TRIANGLE_TILE: u32 = 8u;
+
+fn triangle_tiles_across() -> u32 {
+    return (held.width + TRIANGLE_TILE - 1u) / TRIANGLE_TILE;
+}
+
+fn triangle_tiles_in_band() -> u32 {
+    return triangle_tiles_across() * ((held_band.rows + TRIANGLE_TILE - 1u) / TRIANGLE_TILE);
+}
+
+// One invocation per tile.
+@compute @workgroup_size(WORKGROUP)
+fn list_triangle_tiles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let tile = linear_index(workgroup, workgroups, local);
+    let first = vec2<u32>(tile % triangle_tiles_across(), tile / triangle_tiles_across()) * TRIANGLE_TILE;
+    var shows = 0u;
+    for (var k = 0u; k < TRIANGLE_TILE * TRIANGLE_TILE; k++) {
+        let at = first + vec2<u32>(k % TRIANGLE_TILE, k / TRIANGLE_TILE);
+        if (at.x < held.width && at.y < held_band.rows) {
+            shows |= nearest_triangle(at.y * held.width + at.x, at.x, at.y + held_band.first_row).y;
+        }
+    }
+    if (tile < triangle_tiles_in_band()) {
+        triangle_pixels[2u * band_pixels() + tile] = vec4<f32>(f32(shows));
+        if (shows != 0u) {
+            // The order of the list depends on the schedule, but tiles share no pixel.
+            atomicStore(&triangle_tiles[TRIANGLE_TILES + atomicAdd(&triangle_tiles[0], 1u)], tile);
+        }
+    }
+}
+
+@compute @workgroup_size(1)
+fn arrange_triangle_tiles() {
+    hold();
+    let grid = rows_of(atomicLoad(&triangle_tiles[0]));
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&triangle_tiles[1u + k], grid[k]);
+    }
+}
+
+// The tile at a place of the list; a number that is no tile past its end.
+fn triangle_tile(place: u32) -> u32 {
+    return select(0xffffffffu, tiles_of_triangles[TRIANGLE_TILES + place], place < tiles_of_triangles[0]);
+}
+
+fn tile_has_triangles(tile: u32) -> bool {
+    return beside[2u * band_pixels() + tile].x != 0.0;
+}
+
+// Whether triangles show in the tile of a pixel, at column `x` and row `row` of the band.
+fn shows_triangles(x: u32, row: u32) -> bool {
+    return tile_has_triangles(row / TRIANGLE_TILE * triangle_tiles_across() + x / TRIANGLE_TILE);
+}
+
+// Whether triangles show in a tile of covered.wgsl, which is one tile here, or two, one above the
+// other.
+fn has_triangles(tile: u32) -> bool {
+    let upper = tile / triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE) * triangle_tiles_across() + tile % triangle_tiles_across();
+    let below = upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u);
+    let lower = select(upper, below, below < triangle_tiles_in_band());
+    return tile_has_triangles(upper) || tile_has_triangles(lower);
+}

@@ -1,0 +1,18 @@
+// Every depth is accepted. Same interface as epsilon.wgsl.
+// #import layout::{held}
+
+fn radius_of(index: u32) -> f32 {
+    return 0.0;
+}
+
+fn deepest_accepted(front: f32) -> f32 {
+    return held.farthest;
+}
+
+fn farthest_accepted(front: f32, radius: f32) -> f32 {
+    return held.farthest;
+}
+
+fn farthest_shown(front: f32, radius: f32, image: vec2<f32>) -> f32 {
+    return held.farthest;
+}

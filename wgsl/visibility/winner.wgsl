@@ -1,0 +1,28 @@
+// Pictures in which only the nearest fragment shows: it has weight 1, and nothing is summed. Joined
+// in place of blend.wgsl, the weights of a kernel, an accumulator and the sums of colours.
+// Twin: src/passes/winner.rs.
+// #import *::{radius_of}
+// #import attributes::{attribute_word}
+// #import layout::{Splat}
+
+alias Term = u32;
+
+struct Attributes {
+    // The colour, as in the surfel's attributes.
+    word: u32,
+    radius: f32,
+}
+
+fn attributes_of(index: u32, splat: Splat) -> Attributes {
+    return Attributes(attribute_word(index, 0u), radius_of(index));
+}
+
+fn show(pixel: u32) {}
+
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    return 1.0;
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return 1.0;
+}

@@ -1,4 +1,4 @@
-//! Every way a run can fail, as one sentence that names the file, adapter or limit and says what to do.
+//! Failures of a run, each one sentence that names the file, adapter or limit and says what to do.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub enum Error {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file was read, but is not what its format says.
@@ -21,7 +21,7 @@ pub enum Error {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and where.
+        /// The fault, and its place.
         what: String,
     },
     /// An output file could not be written; nothing was left behind.
@@ -29,7 +29,7 @@ pub enum Error {
     Write {
         /// The file that was asked for.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// An argument that can never work, whatever the files and the machine (exit code 2).
@@ -56,11 +56,11 @@ pub enum Error {
         adapter: String,
         /// The limit as WebGPU names it.
         limit: &'static str,
-        /// What the adapter offers.
+        /// The adapter's limit.
         available: u64,
-        /// What the render asked for.
+        /// The size that the render needs.
         needed: u64,
-        /// What for, and what to change.
+        /// The use of that size, and what to change.
         what: String,
     },
     /// The graphics stack failed: out of memory, lost device, rejected shader.
@@ -68,7 +68,7 @@ pub enum Error {
     Gpu {
         /// The adapter's name.
         adapter: String,
-        /// What it reported.
+        /// The device's report.
         what: String,
     },
     /// One picture of many failed.
@@ -125,7 +125,8 @@ impl Error {
         Self::View { path: path.to_owned(), source: Box::new(self) }
     }
 
-    /// The exit code the command line gives this failure: 2 for unusable arguments, 1 for a failed run.
+    /// The exit code of this failure on the command line: 2 for unusable arguments, 1 for a failed
+    /// run.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use crate::scene::Camera;
 use crate::scene::maps::{Map, Maps};
 
-/// An image with its maps. Pixels without an accepted fragment are background: depth +inf, normal 0, weight 0.
+/// An image with its maps. Pixels without an accepted fragment are background: depth +inf, normal
+/// 0, weight 0.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Width in pixels.
@@ -98,10 +99,12 @@ impl Frame {
         self.map(map).filter(|_| map.row().numbers).map(bytemuck::cast_slice)
     }
 
-    /// Adds `colors` of pixels under those that there are, and as many zeros to each map. Returns the number of the first; rows are not counted.
+    /// Appends pixels with these `colors`, and zeros in each map. Returns the index of the first.
+    /// The height stays.
     pub(crate) fn extend(&mut self, colors: impl IndexedParallelIterator<Item = [f32; 4]>) -> usize {
         let first = self.color.len();
-        // They are written where they are to be: an image of zeros to write over takes as long as the rest of a card's frame.
+        // Colours are written once: filling an image with zeros first takes as long as the rest of
+        // a frame on a graphics card.
         self.color.par_extend(colors);
         self.maps.iter_mut().for_each(|(map, values)| values.resize(self.color.len() * map.width(), 0.0));
         first

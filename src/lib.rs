@@ -1,21 +1,25 @@
 //! Headless rendering of surfels and point clouds with compute kernels only.
 //!
-//! A surfel is an oriented elliptical disk. Rendering blends the disks that make up the nearest surface at each pixel
-//! (Pajarola et al. 2003, Botsch et al. 2005), in four stages, each a file of [`low_level::passes`] with a kernel and an f64 twin:
+//! A surfel is an oriented elliptical disk. Rendering blends the disks that make up the nearest
+//! surface at each pixel (Pajarola et al. 2003, Botsch et al. 2005), in four stages, each a file of
+//! [`low_level::passes`] with a kernel and an f64 twin:
 //!
 //! ```text
 //! splats = project(surfels, camera)             (u, v, 1)/z = [s t p]^-1 K^-1 (x, y, 1)
-//! depth  = visibility(splats)                   nearest(x, y) = min z over the disks, u^2 + v^2 <= 1
-//! sums   = accumulate(splats, depth, epsilon)   sum of w and of w a where z <= nearest + epsilon, w = exp(-a rho^n)
+//! depth  = visibility(splats)                   nearest(x, y) = min z over disks, u^2 + v^2 <= 1
+//! sums   = accumulate(splats, depth, epsilon)   sums of w and w a where z <= nearest + epsilon
 //! frame  = resolve(sums, lights)                attribute = (sum of w a) / (sum of w), shaded
 //! ```
 //!
 //! Four rules make it one design:
 //!
-//! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in any order.
-//! 2. Only what a scene needs exists: [`low_level::plan::SceneNeeds`] chooses the files that are joined into a kernel.
+//! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in
+//!    any order.
+//! 2. Kernels contain only what a scene needs: [`low_level::plan::SceneNeeds`] chooses the files that
+//!    are joined.
 //! 3. WGSL states a layout, [`low_level::gpu::layout`] mirrors it, a test decides.
-//! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend without an adapter.
+//! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend
+//!    without an adapter.
 //!
 //! ```
 //! use epsplat::{DeviceOptions, Map, Points, Renderer, RenderOptions, Scene, SceneOptions, View};

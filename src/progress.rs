@@ -1,6 +1,7 @@
-//! How long work tells how far it is.
+//! Progress of long work.
 
-/// Told about stages of work that may take seconds. Stages follow each other; `advance` may come from any thread.
+/// Receives the progress of work that may take seconds. Stages follow each other; `advance` may be
+/// called from any thread.
 pub trait Progress: Sync {
     /// A stage begins: `what` it does, and how many `units` it will take (0 if that is not known).
     fn begin(&self, what: &str, units: u64);

@@ -11,7 +11,7 @@ pub(crate) fn mixed(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// What the generator's state grows by.
+/// The step of the generator's state.
 pub(crate) const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Random {

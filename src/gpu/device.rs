@@ -32,9 +32,9 @@ pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu wit
 ///
 /// Validation adds a dispatch before each indirect one, which takes a fifth of the time of small
 /// cuts of levels of detail (1.9 ms instead of 1.5). No count here is too large. Most grids come
-/// from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than 2^30, so they have at most 65,535
-/// groups per row and 2^14 rows. The others have one row per batch of a page, and a page has at
-/// most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows it stays on: Direct3D 12
+/// from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than 2^30, so they have at most
+/// 65,535 groups per row and 2^14 rows. The others have one row per batch of a page, and a page has
+/// at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows it stays on: Direct3D 12
 /// passes these counts to kernels only if they are validated.
 fn counts_are_checked() -> bool {
     cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")

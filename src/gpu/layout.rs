@@ -1,7 +1,7 @@
 //! The structs and constants that host and device share, and nothing else.
 //!
-//! `wgsl/common/layout.wgsl` defines the layout; `tests/layout` compares it with this mirror field by
-//! field.
+//! `wgsl/common/layout.wgsl` defines the layout; `tests/kernels/layout` compares it with this mirror field
+//! by field.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -25,7 +25,8 @@ pub const QUEUE_LISTING: u32 = 5;
 pub const TILE_WIDTH: u32 = 8;
 
 /// Height of a tile, pixels, if its invocations share the splats that they fetch
-/// (`wgsl/project/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same splat.
+/// (`wgsl/project/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same
+/// splat.
 pub const TILE_ROWS_SHARED: u32 = 16;
 
 /// Height of a tile, pixels, if its invocations do not share splats.
@@ -65,13 +66,14 @@ pub const BATCH: u32 = 64;
 /// this gave the shortest frames on a software adapter.
 pub const RUN: u32 = 512;
 
-/// First word of the grid over the nodes to judge, in the state of a cut (`wgsl/levels/select.wgsl`).
+/// First word of the grid over the nodes to judge, in the state of a cut
+/// (`wgsl/levels/select.wgsl`).
 pub const JUDGE_GRID: u32 = 4;
 /// First word of the grid over the nodes to spread, the last in that state; see [`JUDGE_GRID`].
 pub const SPREAD_GRID: u32 = 7;
 
-/// Nodes that one invocation judges (`wgsl/levels/select.wgsl`). Of 1, 4, 8, 16 and 32 on a software
-/// adapter, 8 was fastest for cuts of 15,000 nodes and 16 for cuts of 330,000.
+/// Nodes that one invocation judges (`wgsl/levels/select.wgsl`). Of 1, 4, 8, 16 and 32 on a
+/// software adapter, 8 was fastest for cuts of 15,000 nodes and 16 for cuts of 330,000.
 pub const JUDGED: u32 = 8;
 
 /// Lowest bit of the node's kind in [`TreeNode::below`].

@@ -1,9 +1,9 @@
 //! Bounds how far a fragment of the device may lie from its f64 twin.
 //!
-//! The bounds follow, to first order, from the operations of `wgsl/camera_*.wgsl`, `wgsl/accumulate/rows.wgsl`
-//! and `wgsl/project/footprint.wgsl`. With e = 2^-24 (half a unit in the last place of 1), camera-space p,
-//! s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an orthographic camera
-//! `|(s x t).z| / (|s| |t|)`):
+//! The bounds follow, to first order, from the operations of `wgsl/common/camera_*.wgsl`,
+//! `wgsl/accumulate/rows.wgsl` and `wgsl/project/footprint.wgsl`. With e = 2^-24 (half a unit in
+//! the last place of 1), camera-space p, s, t, and `cosine = |p . (s x t)| / (|p| |s| |t|)` (for an
+//! orthographic camera `|(s x t).z| / (|s| |t|)`):
 //!
 //! - s and t are rotated by three products of rounded factors each, with an error of at most 6e of
 //!   their length. The rows `t x p`, `p x s`, `s x t` then err by 10e, 10e and 15e of the product

@@ -1,4 +1,4 @@
-//! What renders: the backend, its adapter and its limit of memory.
+//! The device: the backend, its adapter and its limit of memory.
 
 use std::str::FromStr;
 

@@ -3,13 +3,13 @@
 //!
 //! The twin of `wgsl/common/camera_pinhole.wgsl` and `wgsl/common/camera_orthographic.wgsl`.
 //!
-//! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies
-//! `(a, b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4).
-//! The rows of that matrix are `t x p`, `p x s` and `s x t`, divided by `p . (s x t)`. It is stored
+//! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies `(a,
+//! b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4). The
+//! rows of that matrix are `t x p`, `p x s` and `s x t`, divided by `p . (s x t)`. It is stored
 //! relative to the pixel that holds the splat's own centre: relative to the image's origin, a splat
 //! of two pixels at column 1000 would lose nine bits of its shape to cancellation. The kernel finds
-//! that centre in doubled f32 precision (`wgsl/common/double.wgsl`), so u and v err by a few units of
-//! 2^-24, divided by the cosine of the angle between view ray and normal.
+//! that centre in doubled f32 precision (`wgsl/common/double.wgsl`), so u and v err by a few units
+//! of 2^-24, divided by the cosine of the angle between view ray and normal.
 //!
 //! **Extent.** The lines x = k that are tangent to the disk's outline solve a quadratic in k. A
 //! disk that crosses the near depth is bounded by its part in front of it.

@@ -79,8 +79,8 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>
     )
 }
 
-/// The page of a cut (`wgsl/levels/select.wgsl`) that draws `surfels` chosen surfels from the `first` on,
-/// with their runs dealt out.
+/// The page of a cut (`wgsl/levels/select.wgsl`) that draws `surfels` chosen surfels from the
+/// `first` on, with their runs dealt out.
 ///
 /// The list of the chosen surfels starts at word `chosen`.
 pub(crate) fn dealt(surfels: u64, (chosen, first): (u32, u32)) -> Page {

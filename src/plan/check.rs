@@ -1,4 +1,5 @@
-//! What goes with what: one rule for the command line, for studies and for callers of the library.
+//! Options and scenes that go together: one rule for the command line, for studies and for callers
+//! of the library.
 
 mod adapter;
 
@@ -14,7 +15,8 @@ fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
 }
 
-/// Fails for options that go together on no adapter. What only a device chooses, the `reference` ignores.
+/// Fails for options that no adapter can combine. The `reference` ignores choices that only a
+/// device has.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -109,7 +111,8 @@ fn levels(options: &RenderOptions) -> Result<()> {
     }
 }
 
-/// Fails for options by which cuts of levels of detail do not fade into each other: they do in weighted sums of the nearest surface.
+/// Fails for options with which cuts cannot fade into each other. Fades need weighted sums of the
+/// nearest surface.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -146,7 +149,7 @@ fn facing(options: &RenderOptions) -> Result<()> {
     }
 }
 
-/// What shows through is drawn from lists of fragments, or of sums of all.
+/// Surfaces that show through are drawn from lists of fragments, or of sums of all.
 fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
     match options {
         _ if options.blend == Blend::Nearest => {
@@ -162,7 +165,7 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
     }
 }
 
-/// What is summed in any order is scattered, by weights that may be small.
+/// Fragments summed in any order are scattered, by weights that may be small.
 fn order_free(options: &RenderOptions, reference: bool) -> Result<()> {
     match options {
         _ if options.maps.has(Map::Layers) => {
@@ -205,9 +208,9 @@ fn outline(options: &RenderOptions) -> Result<()> {
     }
 }
 
-/// Of the nearest fragment alone there is a colour and a depth.
+/// The nearest fragment alone has a colour and a depth.
 fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
-    // Of the reference a fragment weighs 1 and counts as one.
+    // The reference's only fragment has weight 1 and count 1.
     let others = if reference { &[Map::Normal][..] } else { &[Map::Normal, Map::Weight, Map::Count, Map::Index] };
     let map = others.iter().map(|map| map.row()).find(|row| options.maps.has(row.map));
     let exact = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
@@ -228,7 +231,8 @@ fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
     }
 }
 
-/// Fails for options that a texture does not go with. What only a device chooses, the `reference` ignores.
+/// Fails for options that cannot be combined with a texture. The `reference` ignores choices that
+/// only a device has.
 ///
 /// # Errors
 /// [`Error::Usage`].

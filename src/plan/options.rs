@@ -1,4 +1,4 @@
-//! What a caller may choose about a render.
+//! The settings of a render.
 
 use std::str::FromStr;
 
@@ -10,7 +10,7 @@ use crate::scene::{
     OwnKernel, Samples, Shading, ShadingAt, Tail,
 };
 
-/// Who renders.
+/// The renderer of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BackendName {
     /// Compute kernels on an adapter.
@@ -44,7 +44,8 @@ impl FromStr for BackendName {
 /// How the compute kernels draw splats. The image is the same to the bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Organisation {
-    /// Small ones one by one, large ones by tiles of the image; on a software adapter tiles sum all, unless they are tiny.
+    /// Small splats one by one, large ones by tiles of the image. A software adapter sums all
+    /// splats by tiles, unless they are tiny.
     #[default]
     Auto,
     /// One by one, large ones by a workgroup each.
@@ -74,15 +75,17 @@ pub struct RenderOptions {
     pub epsilon: Epsilon,
     /// Which surfels are left out by the side that they show.
     pub cull: Cull,
-    /// The size of a node that is drawn in place of what is below it, of a scene with levels of detail.
+    /// The size of nodes that are drawn in place of all below them, in a scene with levels of
+    /// detail.
     pub detail: Detail,
     /// How that is measured.
     pub detail_measure: DetailMeasure,
     /// Nodes curve as what is below them does, in place of lying flat in their planes.
     pub detail_caps: bool,
-    /// Coarser and finer cuts fade into each other from view to view, in place of a switch from one to the next.
+    /// Coarser and finer cuts fade into each other from view to view, instead of switching.
     pub detail_fades: bool,
-    /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
+    /// Samples of a pixel's colour. Maps are taken at its centre, as a mean depth of two surfaces
+    /// belongs to neither.
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
     pub facing: Option<Facing>,
@@ -90,13 +93,13 @@ pub struct RenderOptions {
     pub outline: Option<Outline>,
     /// Whether fragments are blended.
     pub blend: Blend,
-    /// What shows of the surfaces behind the nearest one.
+    /// How surfaces behind the nearest one show.
     pub composite: Composite,
-    /// What all alphas are multiplied with, 0 to 1.
+    /// Factor of all alphas, 0 to 1.
     pub opacity: f32,
-    /// What becomes of the surfaces behind the last layer.
+    /// How surfaces behind the last layer are drawn.
     pub tail: Tail,
-    /// What shows where splats and triangles meet.
+    /// How splats and triangles join where they meet.
     pub join: Join,
     /// The surfels of different inputs do not blend, however near they are.
     pub separate: bool,
@@ -112,17 +115,19 @@ pub struct RenderOptions {
     pub raster: Option<Raster>,
     /// Shading model.
     pub shading: Shading,
-    /// What it lights.
+    /// Where light falls: on pixels or on splats.
     pub shading_at: ShadingAt,
-    /// Exponent of [`Shading::Phong`], in [`SHININESS_RANGE`](crate::scene::options::SHININESS_RANGE): the higher, the smaller a highlight is.
+    /// Exponent of [`Shading::Phong`], in
+    /// [`SHININESS_RANGE`](crate::scene::options::SHININESS_RANGE): the higher, the smaller a
+    /// highlight is.
     pub shininess: f32,
     /// Lights of the shading models; unlit pixels have none.
     pub lights: Vec<Light>,
-    /// What lies behind the scene: linear RGB and straight alpha.
+    /// Colour behind the scene: linear RGB and straight alpha.
     pub background: [f32; 4],
     /// Maps wanted beside the colour.
     pub maps: Maps,
-    /// What is left out that makes frames faster; none changes a bit of the image.
+    /// Optimisations that are left out; none changes a bit of the image.
     pub without: Vec<Optimisation>,
     /// Texts of a user in place of built-in WGSL files.
     pub sources: Vec<Replacement>,
@@ -132,22 +137,25 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Surfels that are the same are drawn once, unless tiles are asked for, in which each is listed.
+    /// Whether identical surfels are drawn once. Tiles list each of them.
     pub fn draws_copies_once(&self) -> bool {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
     }
 
-    /// Surfels that curve are drawn so: the rasteriser and the ellipse of `ewa` draw flat disks, and points have no plane.
+    /// Whether curved surfels are drawn curved. The rasteriser and the ellipse of `ewa` draw flat
+    /// disks, and points have no plane.
     pub fn draws_caps(&self) -> bool {
         self.low_pass != LowPass::Ewa && self.raster.is_none() && self.facing.is_none()
     }
 
-    /// Nodes that curve are drawn so.
+    /// Whether curved nodes are drawn curved.
     pub fn draws_node_caps(&self) -> bool {
         self.detail_caps && self.draws_caps()
     }
 
-    /// Light falls on splats, whose lit colours are blended, and not on pixels: there a mean of the normals of several surfaces is that of none.
+    /// Whether splats are lit and their lit colours blended. Otherwise pixels are lit, by the mean
+    /// of their normals; where fragments of several surfaces are summed, such a mean belongs to
+    /// none.
     pub fn lights_splats(&self) -> bool {
         let at_splats = self.shading_at == ShadingAt::Splat || self.composite.is_order_free();
         self.shading != Shading::Unlit && at_splats

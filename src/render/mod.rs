@@ -79,7 +79,7 @@ pub struct Renderer<S, B> {
     backend: B,
     /// The WGSL files of the kernels; unused by the reference.
     sources: Sources,
-    /// What is wrong with a kernel that the user wrote.
+    /// Faults of a kernel that the user wrote.
     faults: Option<KernelFaults>,
     /// The part that renders the colour.
     kept: Kept,

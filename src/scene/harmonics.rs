@@ -20,7 +20,8 @@ pub const fn terms_of(degree: u32) -> usize {
     ((degree + 1) * (degree + 1) - 1) as usize
 }
 
-/// The Y_lm of degrees 1 to 3 in a unit direction. The twin of `wgsl/accumulate/color_harmonics.wgsl`.
+/// The Y_lm of degrees 1 to 3 in a unit direction. The twin of
+/// `wgsl/accumulate/color_harmonics.wgsl`.
 pub fn basis(DVec3 { x, y, z }: DVec3) -> [f64; terms_of(MOST_DEGREE)] {
     let (xx, yy, zz) = (x * x, y * y, z * z);
     let root = |square: f64| (square / PI).sqrt();

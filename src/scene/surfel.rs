@@ -5,7 +5,8 @@ use glam::Vec3;
 /// An elliptical disk `p + u s + v t`, `u² + v² <= 1`, in world units relative to
 /// [`Scene::origin`](super::Scene::origin).
 ///
-/// The device reads the same record (`Surfel` in `wgsl/common/layout.wgsl`), so a scene is uploaded as is.
+/// The device reads the same record (`Surfel` in `wgsl/common/layout.wgsl`), so a scene is uploaded
+/// as is.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Surfel {

@@ -19,7 +19,7 @@ const MOST_NAMED: usize = 8;
 pub struct Files {
     paths: Vec<PathBuf>,
     options: InputOptions,
-    /// Those of `paths` that were found in folders.
+    /// Paths that were found in folders.
     of_folders: BTreeSet<PathBuf>,
 }
 
@@ -168,7 +168,7 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// Those of [`io::read`], and [`Error::Usage`] if standard input is named twice or opacities
+    /// The errors of [`io::read`], and [`Error::Usage`] if standard input is named twice or opacities
     /// are given for classes that no file has.
     pub fn read(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
         if self.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
@@ -189,7 +189,7 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// Those of [`Files::read`].
+    /// The errors of [`Files::read`].
     pub fn described(path: &Path, options: &InputOptions, progress: &dyn Progress) -> Result<Points> {
         let points = io::read_with(path, ReadOptions { describe: true, ..options.of_file() }, progress)?;
         check_classes(options, std::slice::from_ref(&points))?;

@@ -6,8 +6,8 @@ use crate::plan::RenderOptions as Settings;
 use crate::scene::{Camera, Composite};
 use crate::surfels::part::Taken;
 
-/// Buffer size limit with a limit of memory, bytes: that of the smallest devices. Images are rendered in
-/// bands that fit.
+/// Buffer size limit with a limit of memory, bytes: that of the smallest devices. Images are
+/// rendered in bands that fit.
 pub(super) const BUFFER: u64 = 128 << 20;
 
 /// Memory of the program, its driver and a band, bytes.

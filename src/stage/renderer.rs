@@ -163,7 +163,7 @@ impl Renderer {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
         let request = Request { scene: inputs, options, device, views: *views };
-        // Of many views none is described: that would be a line for each.
+        // Many views would give a line each.
         let tell = |view: &ViewReport| {
             if !*views {
                 progress.note(&view.sentence());

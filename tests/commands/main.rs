@@ -9,5 +9,6 @@ mod cli;
 mod common;
 mod examples;
 mod own_kernel;
+mod prose;
 mod readme;
 mod report;

@@ -15,8 +15,8 @@
 //!
 //! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in
 //!    any order.
-//! 2. Kernels contain only what a scene needs: [`low_level::plan::SceneNeeds`] chooses the files that
-//!    are joined.
+//! 2. Kernels contain only what a scene needs: [`low_level::plan::SceneNeeds`] chooses the files
+//!    that are joined.
 //! 3. WGSL states a layout, [`low_level::gpu::layout`] mirrors it, a test decides.
 //! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend
 //!    without an adapter.

@@ -1,6 +1,6 @@
 //! Describes the machine, date and command of a study, without paths of the local file system.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::render::Backend;
@@ -23,7 +23,27 @@ pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
         cores: std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX)),
         os,
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        commit: std::env::current_dir().ok().and_then(|folder| commit(&folder)).unwrap_or_default(),
     }
+}
+
+/// Returns the commit that is checked out in the Git clone around `folder`; None outside a clone.
+fn commit(folder: &Path) -> Option<String> {
+    let read = |path: PathBuf| std::fs::read_to_string(path).ok().map(|text| text.trim().to_owned());
+    let git = folder.ancestors().map(|folder| folder.join(".git")).find(|git| git.exists())?;
+    // In a further work tree `.git` is a file that names the folder; branches lie in the first.
+    let own = match read(git.clone()) {
+        Some(text) => PathBuf::from(text.strip_prefix("gitdir: ")?),
+        None => git,
+    };
+    let shared = read(own.join("commondir")).map_or_else(|| own.clone(), |common| own.join(common));
+    let head = read(own.join("HEAD"))?;
+    let Some(branch) = head.strip_prefix("ref: ") else { return Some(head) };
+    read(shared.join(branch)).or_else(|| {
+        let packed = read(shared.join("packed-refs"))?;
+        let mut rows = packed.lines().filter_map(|line| line.split_once(' '));
+        rows.find_map(|(hash, name)| (name == branch).then(|| hash.to_owned()))
+    })
 }
 
 /// Returns the value of the first line `KEY separator VALUE` in a system file.
@@ -97,6 +117,25 @@ mod tests {
         assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
         assert_eq!(at(1_735_689_599), "2024-12-31 23:59 UTC");
         assert_eq!(at(4_107_542_400), "2100-03-01 00:00 UTC");
+    }
+
+    #[test]
+    fn the_commit_is_that_of_the_clone() -> std::io::Result<()> {
+        let folder = std::env::temp_dir().join(format!("epsplat-commit-{}", std::process::id()));
+        let file = |name: &str, text: &str| {
+            let path = folder.join(name);
+            std::fs::create_dir_all(path.parent().unwrap_or(&folder))?;
+            std::fs::write(path, text)
+        };
+        file(".git/HEAD", "ref: refs/heads/main\n")?;
+        file(".git/packed-refs", "# pack-refs\n1234 refs/heads/main\n5678 refs/heads/other\n")?;
+        file("benches/x.toml", "")?;
+        assert_eq!(commit(&folder.join("benches")).as_deref(), Some("1234"));
+        file(".git/refs/heads/main", "abcd\n")?;
+        assert_eq!(commit(&folder).as_deref(), Some("abcd"));
+        file(".git/HEAD", "9999\n")?;
+        assert_eq!(commit(&folder).as_deref(), Some("9999"));
+        std::fs::remove_dir_all(&folder)
     }
 
     #[test]

@@ -276,6 +276,7 @@ impl<'a> Case<'a> {
             width,
             height,
             total_ms,
+            runs_ms: timed.total_ms.clone(),
             passes: passes.collect(),
             splats_per_second: per_second(self.surfels() as f64),
             fragments_per_second: Some(per_second(error.fragments)),

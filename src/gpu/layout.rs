@@ -1,7 +1,7 @@
 //! The structs and constants that host and device share, and nothing else.
 //!
-//! `wgsl/common/layout.wgsl` defines the layout; `tests/kernels/layout` compares it with this mirror field
-//! by field.
+//! `wgsl/common/layout.wgsl` defines the layout; `tests/kernels/layout` compares it with this
+//! mirror field by field.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -41,10 +41,10 @@
 //!   kernel files by itself. A file with loops names the proof that they end (`gpu/loops.rs`); else
 //!   its loops are counted at run time.
 //! - **A kernel function** of one's own needs no variant: `--source kernel_ellipse.wgsl=mine.wgsl`,
-//!   `sources` of a study, or a [`Replacement`](crate::gpu::Replacement) from Rust puts a text in the
-//!   place of a built-in file. A blending kernel's text is evaluated in f64 too, which is its twin;
-//!   its weights that are NaN, infinite, negative or above 1, and loops that do not end, are counted
-//!   in the report.
+//!   `sources` of a study, or a [`Replacement`](crate::gpu::Replacement) from Rust puts a text in
+//!   the place of a built-in file. A blending kernel's text is evaluated in f64 too, which is its
+//!   twin; its weights that are NaN, infinite, negative or above 1, and loops that do not end, are
+//!   counted in the report.
 
 pub mod accumulate;
 pub mod attributes;

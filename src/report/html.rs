@@ -44,7 +44,7 @@ fn header(study: &Study) -> String {
         ("driver", [&machine.api, &machine.driver].map(String::as_str).join(", ")),
         ("processor", format!("{}, {} cores", machine.cpu, machine.cores)),
         ("system", machine.os.clone()),
-        ("epsplat", machine.version.clone()),
+        ("epsplat", [&machine.version, &machine.commit].map(String::as_str).join(" ")),
         ("date", study.date.clone()),
         ("runs", format!("{} of each configuration", count(study.runs.into()))),
     ];

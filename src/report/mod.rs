@@ -41,6 +41,6 @@ pub fn write(dir: &Path, study: &Study) -> Result<()> {
     let mut json = serde_json::to_string_pretty(&study.measurements).map_err(|e| Error::write(dir, e.into()))?;
     json.push('\n');
     std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, e))?;
-    let texts = [csv::table(&study.measurements), json, page];
+    let texts = [csv::table(&study.measurements, &study.machine), json, page];
     write_together(FILES.iter().zip(&texts).map(|(name, text)| (dir.join(name), text.as_bytes())))
 }

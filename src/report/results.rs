@@ -44,6 +44,8 @@ pub struct Machine {
     pub os: String,
     /// Version of epsplat.
     pub version: String,
+    /// Commit of the clone in which the study ran; empty outside a clone.
+    pub commit: String,
 }
 
 /// The measurement of one configuration on one scene.
@@ -70,6 +72,8 @@ pub struct Measurement {
     pub height: u32,
     /// Time of a frame, milliseconds.
     pub total_ms: Summary,
+    /// Time of a frame in each run, milliseconds, in the order of the runs.
+    pub runs_ms: Vec<f64>,
     /// Time of each pass by its name, milliseconds.
     pub passes: BTreeMap<String, Summary>,
     /// Surfels of the scene per second of the median time. Hidden surfels count too, whether or not

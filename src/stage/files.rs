@@ -168,8 +168,8 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// The errors of [`io::read`], and [`Error::Usage`] if standard input is named twice or opacities
-    /// are given for classes that no file has.
+    /// The errors of [`io::read`], and [`Error::Usage`] if standard input is named twice, or if
+    /// opacities are given for classes that no file has.
     pub fn read(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
         if self.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read only once: give - once".into()));

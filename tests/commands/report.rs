@@ -113,6 +113,7 @@ fn study() -> Study {
             cores: 2,
             os: "Debian 12".into(),
             version: "0.1.0".into(),
+            commit: "0123abc".into(),
         },
         runs: 9,
         measurements,

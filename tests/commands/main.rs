@@ -11,4 +11,5 @@ mod examples;
 mod own_kernel;
 mod prose;
 mod readme;
+mod release;
 mod report;

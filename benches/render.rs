@@ -8,7 +8,7 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use epsplat::io::Points;
 use epsplat::low_level::gpu::Gpu;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Camera, Lens};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -37,7 +37,7 @@ fn frames(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(count));
         for (name, backend) in &backends {
             group.bench_function(BenchmarkId::new(*name, count), |b| {
-                b.iter(|| render(&scene, &camera, &RenderOptions::default(), backend, &()).unwrap());
+                b.iter(|| render(&scene, &camera, &Settings::default(), backend, &()).unwrap());
             });
         }
     }
@@ -66,7 +66,7 @@ fn stages(criterion: &mut Criterion) {
         return;
     };
     let backend = Backend::gpu(gpu);
-    let options = RenderOptions::default();
+    let options = Settings::default();
     for stage in ["project", "visibility", "accumulate", "resolve"] {
         let mut group = criterion.benchmark_group(stage);
         group.sample_size(10);

@@ -24,7 +24,7 @@ use epsplat::io::Points;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Gpu;
 use epsplat::low_level::metrics::compare;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, Renderer};
 use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Lens, Scene, Shading};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -101,13 +101,13 @@ struct Measured {
 fn measure(scene: &Scene, backend: &Backend, rounds: usize) -> Result<Measured> {
     // The plain program supports only this epsilon.
     let epsilon = Epsilon::Relative(0.01);
-    let options = RenderOptions { shading: Shading::Unlit, epsilon, ..RenderOptions::default() };
+    let options = Settings { shading: Shading::Unlit, epsilon, ..Settings::default() };
     let camera = Camera::framing((1024, 1024), Lens::Fov(45.0), scene, Camera::default_near(scene))?;
     let mut renderer = Renderer::new(scene, &options, backend)?;
     let (expected, _) = renderer.frame(&camera, &())?;
     let mut program = Program::new(scene, &camera);
     let kernel = Kernel::Ellipse { a: 6.0, n: 2.0, smooth: false };
-    let wrong = View::new(scene, &camera, &RenderOptions { kernel, ..options.clone() });
+    let wrong = View::new(scene, &camera, &Settings { kernel, ..options.clone() });
     let control = error(&program.frame(&camera, &wrong).0, &expected)?;
     let view = View::new(scene, &camera, &options);
     let found = error(&program.frame(&camera, &view).0, &expected)?;

@@ -23,7 +23,7 @@ use std::time::Instant;
 
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::passes::order::order;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::scene::color::SRGB8_TO_LINEAR;
 use epsplat::low_level::scene::{Camera, Colors, Scene, Surfel};
 use glam::{Mat3, Vec2, Vec3};
@@ -58,7 +58,7 @@ pub struct View {
 }
 
 impl View {
-    pub fn new(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn new(scene: &Scene, camera: &Camera, options: &Settings) -> Self {
         let focal = Vec2::new(camera.fx as f32, camera.fy as f32);
         let weight = |i: usize| options.kernel.weight(i as f64 / (WEIGHTS - 1) as f64) as f32;
         Self {

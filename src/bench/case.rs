@@ -6,7 +6,7 @@ use super::config::Config;
 use super::definition::{Definition, SceneEntry};
 use super::staging::Staged;
 use crate::frame::Frame;
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::render::{Backend, DeviceBytes};
 
 /// One scene of a study's sweep, with the backend of the configurations that need an adapter.
@@ -20,7 +20,7 @@ pub(super) struct Case<'a> {
 /// One configuration on a [`Case`], with its times and its last frames.
 pub(super) struct Timed<'a> {
     pub config: &'a Config,
-    pub options: &'a RenderOptions,
+    pub options: &'a Settings,
     /// Time per frame in ms, mean over the cameras; one value per run.
     pub total_ms: Vec<f64>,
     /// Time of each pass in ms, as in `total_ms`, by the pass's name.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::definition::named;
 use crate::options::{RenderOptions, Suggested};
-use crate::plan::{Accumulator, BackendName, RenderOptions as Settings};
+use crate::plan::{Accumulator, BackendName, Settings};
 use crate::scene::{Samples, Shading};
 
 /// A backend and its render options, under a name.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer};
 use super::config::Config;
 use crate::error::{Error, Result};
 use crate::io::ClassOpacities;
-use crate::plan::{BackendName, RenderOptions};
+use crate::plan::{BackendName, Settings};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
 use crate::surfels::sampling::Priority;
@@ -327,11 +327,11 @@ impl Definition {
     }
 
     /// Returns the render settings of `config` for the scene of `entry`.
-    pub fn settings(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
+    pub fn settings(&self, config: &Config, entry: &SceneEntry) -> Settings {
         let settings = config.settings(entry.shading);
         let opacity = config.options.transparency.opacity.or(entry.opacity).unwrap_or(settings.opacity);
         let background = self.background.or(config.options.look.background.map(|color| color.0));
-        RenderOptions { opacity, background: background.unwrap_or(settings.background), ..settings }
+        Settings { opacity, background: background.unwrap_or(settings.background), ..settings }
     }
 
     /// Whether any configuration needs an adapter.
@@ -347,7 +347,9 @@ impl Definition {
         };
         let files =
             self.scenes.iter().flat_map(|scene| scene.file.iter().chain(&scene.texture).cloned().chain(beside(scene)));
-        files.map(|file| self.path_of(&file)).collect()
+        let kernels = self.configs.iter().flat_map(|config| &config.options.research.sources);
+        let kernels = kernels.filter_map(|source| source.path().map(Path::to_owned));
+        files.map(|file| self.path_of(&file)).chain(kernels).collect()
     }
 
     /// Returns the path of a scene's file, which is relative to the definition's folder.

@@ -9,7 +9,7 @@ use super::view::{cameras, footprint};
 use crate::error::{Error, Result};
 use crate::io::Input;
 use crate::io::ply::Levels;
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::taken;
 use crate::surfels::part;
@@ -31,7 +31,7 @@ pub(super) fn stage(
         )
     })?;
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &part::nothing(&levels))?;
-    let options: Vec<RenderOptions> =
+    let options: Vec<Settings> =
         definition.configs_of(entry).map(|config| judged(definition.settings(config, entry))).collect();
     let views: Vec<_> =
         cameras.iter().flat_map(|camera| options.iter().map(move |options| (camera, options))).collect();
@@ -45,6 +45,6 @@ pub(super) fn stage(
 ///
 /// The reference may take one sample where the configuration takes several, and may draw back faces
 /// that the configuration culls.
-fn judged(options: RenderOptions) -> RenderOptions {
-    RenderOptions { maps: options.maps.and(&OF_REFERENCE), ..options }
+fn judged(options: Settings) -> Settings {
+    Settings { maps: options.maps.and(&OF_REFERENCE), ..options }
 }

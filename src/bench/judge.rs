@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::metrics::{Reconstruction, compare, joint, reconstruction};
 use crate::passes::peel;
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
@@ -46,9 +46,9 @@ fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> 
 ///
 /// Configurations that differ only in how sums are kept share one render of the reference.
 pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
-    let default = RenderOptions::default();
+    let default = Settings::default();
     let maps = Maps::of(&OF_REFERENCE);
-    let key = |timed: &Timed<'_>| RenderOptions {
+    let key = |timed: &Timed<'_>| Settings {
         accumulator: default.accumulator,
         // Peeled layers differ from those of fragment lists, so the rasteriser has a reference of
         // its own.
@@ -122,7 +122,7 @@ pub(super) fn against_truth(
             let normals = timed.options.facing.is_none() && timed.options.blend == Blend::Weighted;
             let wanted: &[Map] = if normals { &[Map::Depth, Map::Normal] } else { &[Map::Depth] };
             let maps = timed.options.maps.and(wanted);
-            let with_maps = RenderOptions { maps, ..timed.options.clone() };
+            let with_maps = Settings { maps, ..timed.options.clone() };
             let mut renderer = Renderer::new(&case.staged.scene, &with_maps, case.backend(timed.config))?;
             for (camera, truth) in case.staged.cameras.iter().zip(&truths) {
                 let (frame, _) = renderer.frame(camera, &())?;
@@ -190,8 +190,8 @@ fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<Strin
 }
 
 /// Returns options that show the unlit, opaque colours of the surfels.
-fn in_own_colors(options: &RenderOptions) -> RenderOptions {
-    RenderOptions {
+fn in_own_colors(options: &Settings) -> Settings {
+    Settings {
         shading: Shading::Unlit,
         shading_at: ShadingAt::Pixel,
         maps: Maps::NONE,

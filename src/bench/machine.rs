@@ -27,13 +27,16 @@ pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
     }
 }
 
-/// Returns the commit that is checked out in the Git clone around `folder`; None outside a clone.
+/// Returns the commit that is checked out in the clone of epsplat around `folder`; None elsewhere.
 fn commit(folder: &Path) -> Option<String> {
     let read = |path: PathBuf| std::fs::read_to_string(path).ok().map(|text| text.trim().to_owned());
-    let git = folder.ancestors().map(|folder| folder.join(".git")).find(|git| git.exists())?;
+    let root = folder.ancestors().find(|folder| folder.join(".git").exists())?;
+    let is_own =
+        read(root.join("Cargo.toml")).is_some_and(|text| text.lines().any(|line| line == "name = \"epsplat\""));
+    let git = Some(root.join(".git")).filter(|_| is_own)?;
     // In a further work tree `.git` is a file that names the folder; branches lie in the first.
     let own = match read(git.clone()) {
-        Some(text) => PathBuf::from(text.strip_prefix("gitdir: ")?),
+        Some(text) => root.join(text.strip_prefix("gitdir: ")?),
         None => git,
     };
     let shared = read(own.join("commondir")).map_or_else(|| own.clone(), |common| own.join(common));
@@ -130,6 +133,8 @@ mod tests {
         file(".git/HEAD", "ref: refs/heads/main\n")?;
         file(".git/packed-refs", "# pack-refs\n1234 refs/heads/main\n5678 refs/heads/other\n")?;
         file("benches/x.toml", "")?;
+        assert_eq!(commit(&folder), None, "another program's clone");
+        file("Cargo.toml", "[package]\nname = \"epsplat\"\n")?;
         assert_eq!(commit(&folder.join("benches")).as_deref(), Some("1234"));
         file(".git/refs/heads/main", "abcd\n")?;
         assert_eq!(commit(&folder).as_deref(), Some("abcd"));

@@ -293,7 +293,7 @@ mod tests {
         assert_eq!((study.size, study.runs), ([1024, 1024], 7));
         assert!(study.needs_gpu() && study.baseline.is_none());
         let options = study.configs[0].settings(None);
-        assert_eq!(options, crate::plan::RenderOptions::default());
+        assert_eq!(options, crate::plan::Settings::default());
         assert_eq!(study.configs[0].settings(Some(Shading::Unlit)).shading, Shading::Unlit);
         assert_eq!(study.path_of(Path::new("../a.obj")), Path::new("folder/../a.obj"));
     }

@@ -12,11 +12,11 @@ use super::staging::{Point, points, stage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::plan::BackendName;
-use crate::plan::{Facts, RenderOptions, SceneNeeds, check};
+use crate::plan::{Facts, SceneNeeds, Settings, check};
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer};
 use crate::report::{Measurement, Study, Summary};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, KernelFaults, Scene};
 
 /// The outcome of a study.
 #[derive(Debug)]
@@ -114,7 +114,7 @@ impl<'a> Case<'a> {
 
     fn run(&self, outcome: &mut Outcome, progress: &dyn Progress) -> Result<()> {
         let planned = |config| (config, self.definition.settings(config, self.entry));
-        let plans: Vec<(&Config, RenderOptions)> = self.definition.configs_of(self.entry).map(planned).collect();
+        let plans: Vec<(&Config, Settings)> = self.definition.configs_of(self.entry).map(planned).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;
         let errors = judge::against_reference(self, &timed, progress)?;
         let mut truths = judge::against_truth(self, &timed, progress)?;
@@ -149,7 +149,7 @@ impl<'a> Case<'a> {
     /// Renders a warm-up turn of each configuration, then the timed runs, in which they take turns.
     fn time<'p>(
         &self,
-        plans: &'p [(&'p Config, RenderOptions)],
+        plans: &'p [(&'p Config, Settings)],
         notes: &mut Vec<String>,
         progress: &dyn Progress,
     ) -> Result<Vec<Timed<'p>>> {
@@ -157,7 +157,9 @@ impl<'a> Case<'a> {
             .begin(&format!("timing {}", self.entry.name), plans.len() as u64 * u64::from(1 + self.definition.runs));
         let mut runners = Vec::new();
         for (config, options) in plans {
-            let renderer = Renderer::new(&self.staged.scene, options, self.backend(config)).map_err(Unfit::Adapter);
+            // A configuration that the adapter cannot draw is left out; a kernel file is mended.
+            let unfit = |error| if options.sources.is_empty() { Unfit::Adapter(error) } else { Unfit::Failed(error) };
+            let renderer = Renderer::new(&self.staged.scene, options, self.backend(config)).map_err(unfit);
             let warm_up = renderer.and_then(|mut renderer| {
                 self.check(config, options)?;
                 Ok((self.turn(&mut renderer)?, renderer))
@@ -171,6 +173,8 @@ impl<'a> Case<'a> {
                 }
                 Err(Unfit::Failed(error)) => return Err(self.failed(config, runners.len(), error)),
             };
+            let wrong = renderer.kernel_faults().and_then(KernelFaults::sentence);
+            notes.extend(wrong.map(|sentence| format!("{}: {sentence}", self.named(config))));
             if lap.overflows > 0 {
                 let count = lap.overflows;
                 notes.push(format!("{}: {count} sums overflowed, so frames were rendered twice", self.named(config)));
@@ -208,7 +212,7 @@ impl<'a> Case<'a> {
     }
 
     /// Fails if the adapter lacks a feature or limit that the configuration needs.
-    fn check(&self, config: &Config, options: &RenderOptions) -> Result<(), Unfit> {
+    fn check(&self, config: &Config, options: &Settings) -> Result<(), Unfit> {
         let Backend::Gpu { gpu, .. } = self.backend(config) else { return Ok(()) };
         let facts = Facts::of(&self.staged.scene);
         let outcome = self.staged.cameras.iter().try_for_each(|camera| {

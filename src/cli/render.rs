@@ -24,6 +24,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     check_format(arguments, format)?;
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
+    Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
     outputs::check(arguments.files(&files), [&arguments.output].into_iter().chain(&arguments.json))?;
     let view = View::new(&arguments.camera)?;
     let scene = Scene::of_files(files, &arguments.scene)?;

@@ -19,6 +19,11 @@ pub(super) struct Invalid {
 }
 
 impl Invalid {
+    /// The line and column of the fault, and the sentence.
+    pub fn parts(self) -> (Option<(u32, u32)>, String) {
+        (self.at.map(|at| (at.line_number, at.line_position)), self.sentence)
+    }
+
     /// The sentence, after the place that `place_of` gives for a line of the text.
     pub fn told<'a>(&self, place_of: impl Fn(u32) -> Option<(&'a str, u32)>) -> String {
         let at = self.at.as_ref();

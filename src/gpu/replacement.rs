@@ -18,13 +18,15 @@ pub struct Replacement {
 #[derive(Clone, Debug, PartialEq)]
 enum By {
     Path(PathBuf),
-    Text(Arc<str>),
+    /// A text, and its name in errors.
+    Text(Arc<str>, String),
 }
 
 impl Replacement {
     /// Puts `text` in the place of `file`.
     pub fn new(file: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
-        Self { file: file.into(), by: By::Text(text.into()) }
+        let file = file.into();
+        Self { by: By::Text(text.into(), file.clone()), file }
     }
 
     /// The name of the built-in file.
@@ -32,11 +34,27 @@ impl Replacement {
         &self.file
     }
 
+    /// The path of a text that is not read yet.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.by {
+            By::Path(path) => Some(path),
+            By::Text(..) => None,
+        }
+    }
+
+    /// The same with its text in memory, so that later changes of the file change nothing.
+    ///
+    /// # Errors
+    /// [`Error::Read`] for a file that cannot be read.
+    pub fn loaded(&self) -> Result<Self> {
+        Ok(Self { file: self.file.clone(), by: By::Text(self.text()?, self.shown()) })
+    }
+
     /// The name of the text in errors: its path, or the name of the built-in file.
     pub fn shown(&self) -> String {
         match &self.by {
             By::Path(path) => path.display().to_string(),
-            By::Text(_) => self.file.clone(),
+            By::Text(_, shown) => shown.clone(),
         }
     }
 
@@ -56,7 +74,7 @@ impl Replacement {
     /// [`Error::Read`] for a file that cannot be read.
     pub fn text(&self) -> Result<Arc<str>> {
         match &self.by {
-            By::Text(text) => Ok(text.clone()),
+            By::Text(text, _) => Ok(text.clone()),
             By::Path(path) => {
                 let text = std::fs::read_to_string(path).map_err(|error| Error::read(path, error))?;
                 Ok(text.into())

@@ -33,7 +33,7 @@ use super::precision::E as U;
 use crate::passes::project::reference_all;
 use crate::passes::splat::Splat;
 use crate::passes::visibility::Nearest;
-use crate::plan::{AccumulatorRow, Facts, RenderOptions, Sides};
+use crate::plan::{AccumulatorRow, Facts, Settings, Sides};
 use crate::scene::{Camera, Epsilon, Kernel, Scene};
 
 /// Relative error of a division: WGSL allows 2.5 units in the last place.
@@ -279,7 +279,7 @@ impl Depths {
 }
 
 /// Returns the error terms of each pixel of `scene` seen by `camera`.
-pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
+pub fn pixels(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<Pixel> {
     let splats = reference_all(scene, camera, options);
     let (relative, absolute, of_radius) = options.epsilon.parts();
     let view = (camera, Sides::of(&Facts::of(scene), camera, options));

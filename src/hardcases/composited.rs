@@ -20,7 +20,7 @@ use super::fragment_bounds::{Fragment, Surface, fragments, weight_error};
 use super::precision::E as U;
 use crate::passes::project::reference_all;
 use crate::passes::sorted::Rules;
-use crate::plan::{Accumulator, Facts, RenderOptions, Sides};
+use crate::plan::{Accumulator, Facts, Settings, Sides};
 use crate::scene::{Camera, Composite, Scene, Tail};
 
 /// The bound on a pixel's colour.
@@ -42,7 +42,7 @@ struct Listed {
 }
 
 /// Returns the bound of each pixel of `scene` seen by `camera`.
-pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Composited> {
+pub fn pixels(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<Composited> {
     let splats = reference_all(scene, camera, options);
     let view = (camera, Sides::of(&Facts::of(scene), camera, options));
     let mut lists: Vec<(bool, Vec<Listed>)> = vec![(false, Vec::new()); camera.pixels()];
@@ -101,7 +101,7 @@ impl Shown {
 
 /// Composites the fragments one by one, and returns whether the pixel is **open**. It is also open
 /// if it is undecided by the rules whether a fragment is listed, or whether it is the last.
-fn sorted(list: &[Listed], options: &RenderOptions) -> (bool, Shown) {
+fn sorted(list: &[Listed], options: &Settings) -> (bool, Shown) {
     let (mut open, mut shown) = (false, Shown::NOTHING);
     let (rules, opacity) = (Rules::of(options), f64::from(options.opacity));
     for pair in list.windows(2) {
@@ -133,7 +133,7 @@ fn sorted(list: &[Listed], options: &RenderOptions) -> (bool, Shown) {
     (open, shown)
 }
 
-fn layers(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool, Shown) {
+fn layers(list: &[Listed], options: &Settings, range: &ColorRange) -> (bool, Shown) {
     let Composite::Layers(most) = options.composite else { return (false, Shown::NOTHING) };
     let rounding = |depth: f64| 4.0 * U * depth.abs();
     let farthest = |f: &Listed, radius: f64| options.epsilon.farthest(f.fragment.depth, radius, 1.0);

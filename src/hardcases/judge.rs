@@ -354,7 +354,7 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
     use super::*;
     use crate::hardcases::cases;
-    use crate::plan::RenderOptions;
+    use crate::plan::Settings;
     use crate::render::{Backend, render};
     use crate::scene::Maps;
 
@@ -364,7 +364,7 @@ mod tests {
         let cases = cases().unwrap();
         let case = cases.iter().find(|case| case.name == "intersecting sheets").unwrap();
         let truth = case.truth().unwrap();
-        let options = RenderOptions { maps: Maps::ON_DEVICE, ..case.options.clone() };
+        let options = Settings { maps: Maps::ON_DEVICE, ..case.options.clone() };
         let (frame, report) = render(&case.scene, &case.camera, &options, &Backend::Reference, &()).unwrap();
         let (exact, one_word) = (Accumulator::Fixed.row(), Accumulator::Fixed32.row());
         let row = judge(case, &truth, exact, &frame, &report);

@@ -36,7 +36,7 @@ pub use judge::{MapError, Row, Verdict, compare_rmse, judge};
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions, check};
+use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, Settings, check};
 use crate::progress::Progress;
 use crate::render::{Backend, render};
 use crate::scene::{Camera, Composite, Map, Maps, Samples, Scene};
@@ -64,7 +64,7 @@ pub struct HardCase {
     /// The camera.
     pub camera: Camera,
     /// The options, except the accumulator.
-    pub options: RenderOptions,
+    pub options: Settings,
     /// Least and largest fraction of pixels that the reference covers.
     pub covered: (f64, f64),
     /// Largest fraction of pixels that may be excused.
@@ -117,7 +117,7 @@ impl HardCase {
 
     /// Renders the reference and derives the bounds.
     pub fn truth(&self) -> Result<Truth> {
-        let options = RenderOptions { maps: self.maps().and(&[Map::Decision]), ..self.options.clone() };
+        let options = Settings { maps: self.maps().and(&[Map::Decision]), ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
         let known = |camera: &Camera| bounds::pixels(&self.scene, camera, &self.options);
         let samples = match self.options.samples {
@@ -134,7 +134,7 @@ impl HardCase {
 
     /// Renders with `accumulator` on `backend`, and judges the image.
     pub fn judge(&self, truth: &Truth, accumulator: &'static AccumulatorRow, backend: &Backend) -> Result<Row> {
-        let options = RenderOptions { accumulator: accumulator.of, maps: self.maps(), ..self.options.clone() };
+        let options = Settings { accumulator: accumulator.of, maps: self.maps(), ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
         Ok(judge(self, truth, accumulator, &frame, &report))
     }

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 use super::{Expected, HardCase};
 use crate::error::Result;
-use crate::plan::{Accumulator, Optimisation, RenderOptions};
+use crate::plan::{Accumulator, Optimisation, Settings};
 use crate::scene::{Camera, Cap, Clip, Colors, Epsilon, Kernel, Lens, Outline, Projection, Scene, Shading, Surfel, Up};
 
 /// Returns the fractional part of the `k`th element of a sequence that fills [0, 1) evenly along
@@ -152,7 +152,7 @@ pub struct Filling {
     /// The curvature of each surfel; may be empty.
     pub caps: Vec<Cap>,
     /// The options, except the accumulator.
-    pub options: RenderOptions,
+    pub options: Settings,
     /// Least and largest fraction of pixels that the reference covers.
     pub covered: (f64, f64),
     /// Largest fraction of pixels that may be excused.
@@ -170,9 +170,9 @@ const BITS: &str = "one-word sums have only 24 fraction bits where hundreds of f
 /// Options of all cases: unlit, over an empty background. Duplicate disks are drawn too, because
 /// sums of many terms are judged. The tolerance does not depend on the disks' sizes, which differ
 /// by many powers of ten.
-pub fn options() -> RenderOptions {
+pub fn options() -> Settings {
     let (without, epsilon) = (vec![Optimisation::Copies], Epsilon::Relative(0.01));
-    RenderOptions { epsilon, shading: Shading::Unlit, lights: Vec::new(), without, ..RenderOptions::default() }
+    Settings { epsilon, shading: Shading::Unlit, lights: Vec::new(), without, ..Settings::default() }
 }
 
 impl Filling {

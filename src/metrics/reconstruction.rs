@@ -191,7 +191,7 @@ fn luma(color: &[f32; 4]) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::plan::RenderOptions;
+    use crate::plan::Settings;
     use crate::scene::{Camera, Lens, Up};
     use crate::surfels::analytic::Shape;
     use crate::truth::Surface;
@@ -204,7 +204,7 @@ mod tests {
         let (side, eye) = (SIDE as u32, DVec3::new(0.5, 1.0, 5.0));
         let camera = Camera::look_at((side, side), Lens::Fov(30.0), eye, DVec3::ZERO, None, Up::Y, 0.01).unwrap();
         // The background is opaque, so that alpha is 1 everywhere and does not tell coverage.
-        let options = RenderOptions { background: [0.1, 0.2, 0.3, 1.0], ..RenderOptions::default() };
+        let options = Settings { background: [0.1, 0.2, 0.3, 1.0], ..Settings::default() };
         Truth::cast(&Surface::Analytic(Shape::Sphere), &camera, &options, 4, &()).unwrap()
     }
 

@@ -2,7 +2,7 @@
 
 use super::RenderOptions;
 use crate::error::{Error, Result};
-use crate::plan::{Accumulator, BackendName, Organisation, RenderOptions as Settings, check};
+use crate::plan::{Accumulator, BackendName, Organisation, Settings, check};
 use crate::scene::composite::ALL_LAYERS;
 use crate::scene::{Blend, Composite, Shading, ShadingAt, Tail};
 

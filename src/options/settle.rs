@@ -2,7 +2,7 @@
 
 use super::RenderOptions;
 use super::values::{Diameters, Rgba, Switch};
-use crate::plan::{BackendName, Raster, RenderOptions as Settings, check};
+use crate::plan::{BackendName, Raster, Settings, check};
 use crate::scene::{
     Blend, Composite, Detail, Facing, Kernel, LowPass, Maps, NodeShape, PointSize, Samples, Shading, gaussian,
 };

@@ -52,7 +52,7 @@ use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner, wide_bits};
+use crate::plan::{Accumulator, Plan, SceneNeeds, Settings, Winner, wide_bits};
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Camera, Colors, Fade, Map, Scene};
 
@@ -190,7 +190,7 @@ pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat>,
     scene: &Scene,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     first_row: u32,
     nearest: &[Nearest],
 ) -> Vec<PixelSums> {

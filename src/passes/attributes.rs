@@ -7,7 +7,7 @@
 use super::lit;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, RenderOptions, Sides, SurfelLayout, color_channels};
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Settings, Sides, SurfelLayout, color_channels};
 use crate::scene::{Camera, Map, Scene};
 
 /// The pass's files and constants.
@@ -73,7 +73,7 @@ pub const PASS: Pass = Pass {
 
 /// The f64 twin: the premultiplied colour of a splat, as seen from the camera, and lit if splats
 /// are lit.
-pub fn color(scene: &Scene, splat: &Splat, camera: &Camera, options: &RenderOptions) -> [f64; 4] {
+pub fn color(scene: &Scene, splat: &Splat, camera: &Camera, options: &Settings) -> [f64; 4] {
     let surfel = splat.surfel as usize;
     let direction = camera.direction_to(scene.origin + scene.center(surfel));
     let [r, g, b, alpha] = scene.colors.seen(surfel, direction);

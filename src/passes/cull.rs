@@ -121,7 +121,7 @@ pub fn steps(band: usize, part: Part) -> Stage {
 mod tests {
     use super::*;
     use crate::passes::project;
-    use crate::plan::RenderOptions;
+    use crate::plan::Settings;
     use crate::scene::Lens;
     use glam::DMat3;
     use proptest::prelude::*;
@@ -159,7 +159,7 @@ mod tests {
                 })
                 .collect();
             let [x, y, z, radius] = ball(surfels.iter().map(|surfel| (Vec3::from_array(surfel.center).as_dvec3(), surfel, 0.0))).map(f64::from);
-            let design = Design::of(&RenderOptions { low_pass, ..RenderOptions::default() });
+            let design = Design::of(&Settings { low_pass, ..Settings::default() });
             if let Some(pixels) = reference(DVec3::new(x, y, z), radius, &camera, filter_reach(&design)) {
                 for surfel in &surfels {
                     prop_assert!(holds(pixels, surfel, &camera, &design), "{pixels:?} does not hold {surfel:?}");
@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn a_ball_too_small_does_not_hold_its_disk() {
         let (camera, center) = (camera(false), DVec3::new(0.5, 0.2, 2.0));
-        let design = Design::of(&RenderOptions::default());
+        let design = Design::of(&Settings::default());
         let disk = Surfel::disk(center.as_vec3(), Vec3::Z, 0.2);
         let of_radius = |radius| reference(center, radius, &camera, 0.0).unwrap();
         assert!(holds(of_radius(0.2), &disk, &camera, &design));

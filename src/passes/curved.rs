@@ -258,7 +258,7 @@ fn outside(curve: &Curve, camera: &Camera, at: &Intersection) -> f64 {
 mod tests {
     use super::*;
     use crate::passes::{footprint::footprint, lowpass::Design, project};
-    use crate::plan::RenderOptions;
+    use crate::plan::Settings;
     use crate::random::Random;
     use crate::scene::{Lens, LowPass, Surfel};
     use glam::{DMat3, Vec3};
@@ -269,7 +269,7 @@ mod tests {
     fn pixels_in_bounds(height: f64) -> u64 {
         let size = 48;
         let camera = Camera::posed((size, size), Lens::Fov(75.0), DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap();
-        let design = Design::of(&RenderOptions { low_pass: LowPass::None, ..RenderOptions::default() });
+        let design = Design::of(&Settings { low_pass: LowPass::None, ..Settings::default() });
         let mut random = Random::stream(5, 0);
         let mut within = 0;
         for _ in 0..2000 {

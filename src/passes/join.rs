@@ -8,7 +8,7 @@
 use super::resolve::Surface;
 use super::triangles::Shown;
 use crate::plan::pass::Pass;
-use crate::plan::{RenderOptions, bounds_of, in_view};
+use crate::plan::{Settings, bounds_of, in_view};
 use crate::scene::color::linear_to_srgb;
 use crate::scene::{Camera, Join, Scene};
 
@@ -26,7 +26,7 @@ pub struct Beside<'a> {
 }
 
 /// The f64 twin: the surface that a pixel shows, from its splats and its triangle.
-pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> Surface {
+pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &Settings) -> Surface {
     let (share, order) = share_of_splats(splats, triangle, beside, options);
     let decision = splats.decision.min(triangle.decision).min(order);
     if !triangle.depth.is_finite() || share == 1.0 {
@@ -68,14 +68,14 @@ fn mean(triangle: &Surface, splats: &Surface, share: f64) -> Surface {
 
 /// Whether the blended depth of a scene's splats decides what is visible in the view of `camera`:
 /// there are separate inputs, or triangles in view.
-pub(super) fn compares_depth(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool {
+pub(super) fn compares_depth(scene: &Scene, camera: &Camera, options: &Settings) -> bool {
     let apart = options.separate && scene.provenance.ranges(scene.surfels.len() as u64).nth(1).is_some();
     apart || (options.join != Join::Nearest && in_view(&bounds_of(&scene.triangles), scene.origin, camera))
 }
 
 /// The share of splats in a pixel beside a triangle, 0 to 1, and the relative distance to a
 /// decision.
-fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> (f64, f64) {
+fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &Settings) -> (f64, f64) {
     match (splats.exists(), triangle.depth.is_finite()) {
         (false, _) => return (0.0, f64::INFINITY),
         (true, false) => return (1.0, f64::INFINITY),

@@ -21,7 +21,7 @@ use super::fragments::{self, Fragment};
 use super::resolve::{over, set, surface};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
-use crate::plan::{Lists, RenderOptions};
+use crate::plan::{Lists, Settings};
 use crate::scene::composite::LEAST_TRANSMITTANCE;
 use crate::scene::maps::SURFACES;
 use crate::scene::{Composite, Map, Tail};
@@ -44,7 +44,7 @@ pub fn part(
     list: &[Fragment],
     (most, tail): (u32, Tail),
     parting: Parting,
-    (options, along): (&RenderOptions, f64),
+    (options, along): (&Settings, f64),
 ) -> (Vec<PixelSums>, f64) {
     let farthest = |depth: f64, radius: f64| options.epsilon.farthest(depth, radius, along);
     let (mut layers, mut decision) = (Vec::new(), f64::INFINITY);
@@ -150,7 +150,7 @@ impl Shown {
     }
 
     /// Writes the result, over the background, into a pixel of `frame`.
-    pub(super) fn write(&self, options: &RenderOptions, decision: f64, frame: &mut Frame, pixel: usize) {
+    pub(super) fn write(&self, options: &Settings, decision: f64, frame: &mut Frame, pixel: usize) {
         let [r, g, b, alpha] = self.color;
         let straight = [r, g, b].map(|c| if alpha > 0.0 { c / alpha } else { 0.0 });
         let color = over([straight[0], straight[1], straight[2], alpha], options.background.map(f64::from));

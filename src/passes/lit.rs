@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::resolve::shade;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
-use crate::plan::{RenderOptions, Sides};
+use crate::plan::{Settings, Sides};
 
 /// The pass's files and constants.
 pub const PASS: Pass = Pass {
@@ -23,7 +23,7 @@ pub const PASS: Pass = Pass {
 
 /// The f64 twin: the premultiplied colour of a splat, lit if splats are lit. `direction` points
 /// from the eye to its centre.
-pub fn reference(premultiplied: [f64; 4], splat: &Splat, direction: DVec3, options: &RenderOptions) -> [f64; 4] {
+pub fn reference(premultiplied: [f64; 4], splat: &Splat, direction: DVec3, options: &Settings) -> [f64; 4] {
     let [r, g, b, alpha] = premultiplied;
     if !options.lights_splats() || alpha <= 0.0 {
         return premultiplied;

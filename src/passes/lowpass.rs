@@ -21,7 +21,7 @@ use glam::DVec2;
 
 use super::facing::Faced;
 use super::splat::{Filter, Intersection, Splat};
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::plan::pass::Pass;
 use crate::scene::{Camera, Kernel, LowPass, Projection, gaussian};
 
@@ -36,15 +36,15 @@ pub const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
 
 /// The term that `ewa` adds to J J^T: `(pixel's sigma / kernel's sigma)^2`, pixels squared, but at
 /// least the square of [`RADIUS`].
-pub fn blur(kernel: Kernel) -> f64 {
-    let sigma_2 = match kernel {
-        Kernel::Gaussian { sigma } => sigma * sigma,
+pub fn blur(options: &Settings) -> f64 {
+    let sigma_2 = match options.kernel {
+        Kernel::Gaussian { sigma } if options.own_kernel.is_none() => sigma * sigma,
         // The variance along one axis, by the midpoint rule.
         _ => {
             let moment = |power: i32| {
                 let steps = 4096;
                 let at = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
-                (0..steps).map(|i| at(i).powi(power) * kernel.weight(at(i) * at(i))).sum::<f64>()
+                (0..steps).map(|i| at(i).powi(power) * options.weight(at(i) * at(i))).sum::<f64>()
             };
             0.5 * moment(3) / moment(1)
         }
@@ -66,7 +66,7 @@ pub const PASS: Pass = Pass {
     constants: |making| match making.needs.low_pass {
         LowPass::None => Vec::new(),
         LowPass::Max | LowPass::Gaussians => vec![("FILTER_RADIUS", Design::of(making.options).radius)],
-        LowPass::Ewa => vec![("FILTER_BLUR", blur(making.options.kernel))],
+        LowPass::Ewa => vec![("FILTER_BLUR", blur(making.options))],
     },
 };
 
@@ -86,8 +86,8 @@ pub struct Design {
 
 impl Design {
     /// The design that `options` ask for.
-    pub fn of(options: &RenderOptions) -> Self {
-        let blur = if options.low_pass == LowPass::Ewa { blur(options.kernel) } else { 0.0 };
+    pub fn of(options: &Settings) -> Self {
+        let blur = if options.low_pass == LowPass::Ewa { blur(options) } else { 0.0 };
         let radius = match (options.low_pass, options.kernel) {
             (LowPass::Gaussians, Kernel::Gaussian { sigma }) => gaussian::LOW_PASS_SIGMA / sigma,
             _ => RADIUS,
@@ -161,6 +161,7 @@ mod tests {
 
     #[test]
     fn the_blur_is_the_ratio_of_variances() {
+        let blur = |kernel| blur(&Settings { kernel, ..Settings::default() });
         assert!((blur(Kernel::Gaussian { sigma: 0.25 }) - 4.0 / 3.0).abs() < 1e-12);
         // A cone has variance 3/20 along each axis.
         assert!((blur(Kernel::Cone { power: 1.0 }) - 1.0 / (12.0 * 0.15)).abs() < 5e-3);
@@ -171,11 +172,11 @@ mod tests {
 
     #[test]
     fn ewa_adds_the_pixels_variance_and_keeps_the_volume() {
-        let options = RenderOptions {
+        let options = Settings {
             // With this sigma the blur is 1.
             kernel: Kernel::Gaussian { sigma: PIXEL_VARIANCE.sqrt() },
             low_pass: LowPass::Ewa,
-            ..RenderOptions::default()
+            ..Settings::default()
         };
         let (s, t) = (DVec2::new(3.0, 1.0), DVec2::new(-0.5, 2.0));
         let Some(f) = filter(&Design::of(&options), DVec2::ZERO, s, t, [1.0, 1.0]) else { unreachable!() };

@@ -86,7 +86,7 @@ pub mod winner;
 use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
 use crate::plan::steps::{Stage, Twin};
-use crate::plan::{Facts, Lists, Plan, RenderOptions, SceneNeeds, depths, farthest};
+use crate::plan::{Facts, Lists, Plan, SceneNeeds, Settings, depths, farthest};
 use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
 use triangles::Corner;
@@ -98,7 +98,7 @@ pub struct Strip<'a> {
     /// The camera of the whole image.
     pub camera: &'a Camera,
     /// How to render it.
-    pub options: &'a RenderOptions,
+    pub options: &'a Settings,
     /// The splats that may touch the strip's rows.
     pub splats: Vec<&'a Splat>,
     /// The corners of the scene's triangles, as the camera sees them.
@@ -121,7 +121,7 @@ pub struct Strip<'a> {
 
 impl<'a> Strip<'a> {
     /// A strip without rows and splats; `facts` are those of the scene.
-    pub fn of((scene, facts): (&'a Scene, &Facts), camera: &'a Camera, options: &'a RenderOptions) -> Self {
+    pub fn of((scene, facts): (&'a Scene, &Facts), camera: &'a Camera, options: &'a Settings) -> Self {
         Self {
             scene,
             camera,

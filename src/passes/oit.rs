@@ -31,7 +31,7 @@ use super::splat::{Intersection, Splat};
 use super::{Strip, attributes};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage};
-use crate::plan::{Oit, RenderOptions, SceneNeeds};
+use crate::plan::{Oit, SceneNeeds, Settings};
 use crate::scene::Composite;
 use crate::scene::kernel::LEAST_WEIGHT;
 
@@ -60,7 +60,7 @@ pub(super) struct Fragment {
 
 impl Fragment {
     /// The fragment's alpha: opacity times weight times the colour's alpha.
-    pub fn alpha(&self, options: &RenderOptions) -> f64 {
+    pub fn alpha(&self, options: &Settings) -> f64 {
         f64::from(options.opacity) * self.weight * self.color[3]
     }
 }

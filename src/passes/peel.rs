@@ -10,7 +10,7 @@
 
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step};
-use crate::plan::{Plan, RenderOptions};
+use crate::plan::{Plan, Settings};
 use crate::scene::Composite;
 
 /// The largest number of layers that can be peeled.
@@ -20,7 +20,7 @@ pub const MOST_LAYERS: u32 = 64;
 pub const PEELED_WORDS: u32 = 8;
 
 /// The number of layers that the rasteriser peels for `options`; `None` if it does not peel.
-pub fn layers(options: &RenderOptions) -> Option<u32> {
+pub fn layers(options: &Settings) -> Option<u32> {
     match options.composite {
         Composite::Layers(layers) if options.raster.is_some() => Some(layers),
         _ => None,

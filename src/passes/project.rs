@@ -14,7 +14,7 @@ use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Facts, RenderOptions, Sides, composited, culls_back};
+use crate::plan::{Facts, Settings, Sides, composited, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
@@ -108,7 +108,7 @@ pub(super) fn projected(
 /// All splats of a scene that may touch a pixel, in the order of the surfels.
 ///
 /// Identical copies of a surfel become one splat, if the scene has many.
-pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
+pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
     let eye = camera.eye - scene.origin;

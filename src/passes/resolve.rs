@@ -11,7 +11,7 @@ use super::{covered, individuals, join, long_lists};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
-use crate::plan::{Lists, PixelLayout, Plan, RenderOptions};
+use crate::plan::{Lists, PixelLayout, Plan, Settings};
 use crate::scene::maps::SURFACES;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
@@ -23,7 +23,7 @@ use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 pub fn surfaces(
     sums: &[PixelSums],
     nearest: &[Nearest],
-    (scene, camera, options): (&Scene, &Camera, &RenderOptions),
+    (scene, camera, options): (&Scene, &Camera, &Settings),
     first_row: u32,
 ) -> Vec<Surface> {
     let of = |(pixel, sum): (usize, &PixelSums)| {
@@ -45,7 +45,7 @@ pub fn surfaces(
 
 /// The f64 twin: writes `surfaces`, joined with triangles if there are any, to `frame`, which holds
 /// just their rows.
-pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &RenderOptions, frame: &mut Frame) {
+pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &Settings, frame: &mut Frame) {
     for (pixel, of_splats) in surfaces.iter().enumerate() {
         let surface = match beside.triangles.get(pixel) {
             None => *of_splats,
@@ -117,7 +117,7 @@ pub(super) fn surface(
     sum: &PixelSums,
     scene: &Scene,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     (x, y): (u32, u32),
 ) -> ([f64; 4], DVec3) {
     let blended = sum.color.map(|c| c / sum.weight);
@@ -142,7 +142,7 @@ pub(super) fn shaded(
     [r, g, b, alpha]: [f64; 4],
     normal: DVec3,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     (x, y): (u32, u32),
 ) -> [f64; 4] {
     let straight = DVec3::new(r, g, b) / if alpha > 0.0 { alpha } else { f64::INFINITY };
@@ -185,7 +185,7 @@ pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
 
 /// The linear colour that a surface of colour `straight` and unit `normal` sends in the unit
 /// direction `toward_eye`.
-pub(super) fn shade(straight: DVec3, normal: DVec3, toward_eye: DVec3, options: &RenderOptions) -> DVec3 {
+pub(super) fn shade(straight: DVec3, normal: DVec3, toward_eye: DVec3, options: &Settings) -> DVec3 {
     match options.shading {
         Shading::Unlit => straight,
         Shading::Lambert => {

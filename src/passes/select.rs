@@ -20,7 +20,7 @@ use glam::{DVec2, DVec3};
 
 use super::cull;
 use super::lowpass::Design;
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run};
 use crate::scene::cut::Fate;
@@ -87,10 +87,10 @@ pub struct Wanted {
 
 impl Wanted {
     /// The cut of a picture with `options`; `backs_out` says whether backs are left out.
-    pub fn of(options: &RenderOptions, backs_out: bool) -> Self {
+    pub fn of(options: &Settings, backs_out: bool) -> Self {
         let samples = DVec2::new(options.samples.across.into(), options.samples.down.into());
         let margin = (cull::filter_reach(&Design::of(options)) + 2.0) / samples;
-        let RenderOptions { detail, detail_measure: measure, detail_fades: fades, .. } = *options;
+        let Settings { detail, detail_measure: measure, detail_fades: fades, .. } = *options;
         Self { detail, measure, backs_out, fades, margin }
     }
 }
@@ -234,7 +234,7 @@ mod tests {
     }
 
     fn wanted(detail: Detail, measure: DetailMeasure, backs_out: bool) -> Wanted {
-        let options = RenderOptions { detail, detail_measure: measure, ..RenderOptions::default() };
+        let options = Settings { detail, detail_measure: measure, ..Settings::default() };
         Wanted::of(&options, backs_out)
     }
 
@@ -315,7 +315,7 @@ mod tests {
         let fading = [(1, 1), (10, 1), (300, 220), (2000, 1900), (8000, 8000), (9000, 8000)];
         let all = few.map(|case| (case, false)).into_iter().chain(fading.map(|case| (case, true)));
         for ((splats, least), detail_fades) in all {
-            let options = RenderOptions { detail: Detail::Splats(splats), detail_fades, ..RenderOptions::default() };
+            let options = Settings { detail: Detail::Splats(splats), detail_fades, ..Settings::default() };
             let wanted = Wanted::of(&options, false);
             let detail = sized(&tree, DVec3::ZERO, &camera, &wanted);
             let drawn = reference(&tree, DVec3::ZERO, &camera, &Wanted { detail, ..wanted }).len() as u64;

@@ -9,7 +9,7 @@ use super::layers::Shown;
 use super::resolve::shaded;
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
-use crate::plan::{Lists, RenderOptions};
+use crate::plan::{Lists, Settings};
 use crate::scene::composite::LEAST_TRANSMITTANCE;
 use crate::scene::{Composite, gaussian};
 
@@ -29,7 +29,7 @@ pub struct Rules {
 
 impl Rules {
     /// The rules for `options`.
-    pub fn of(options: &RenderOptions) -> Self {
+    pub fn of(options: &Settings) -> Self {
         match options.composite {
             Composite::Gaussians => Self {
                 least_alpha: gaussian::LEAST_ALPHA,

@@ -26,7 +26,7 @@ use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, TILE_ROWS_PLAIN, TILE_ROWS_SHARE
 use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
-use crate::plan::{Band, ColorNeed, Facts, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Band, ColorNeed, Facts, Plan, SceneNeeds, Settings};
 use crate::scene::{Camera, LowPass, Samples};
 
 /// The files and kernels that the tiles' module adds to those of every module.
@@ -80,7 +80,7 @@ pub fn rows(needs: &SceneNeeds) -> u32 {
 /// `camera`, estimated from the sample in `facts`.
 ///
 /// Infinite if the view shows no splat of the sample.
-pub fn touched(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
+pub fn touched(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     let design = Design::of(options);
     let eye = camera.eye - facts.origin;
     let splats = facts
@@ -199,7 +199,7 @@ mod tests {
             Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let lens = Lens::OrthographicHeight(1.0);
         let camera = Camera::posed((100, 100), lens, DVec3::new(0.0, 0.0, -5.0), DMat3::IDENTITY, 0.1).unwrap();
-        touched(&Facts::of(&scene), &camera, &RenderOptions::default()) >= tuning::GATHERED_TOUCHED_TILES
+        touched(&Facts::of(&scene), &camera, &Settings::default()) >= tuning::GATHERED_TOUCHED_TILES
     }
 
     #[test]

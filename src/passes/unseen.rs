@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::lowpass::Design;
 use super::project::{Missed, projected};
 use crate::frame::Frame;
-use crate::plan::{Facts, RenderOptions, culls_back};
+use crate::plan::{Facts, Settings, culls_back};
 use crate::scene::{Camera, Cut, Fade, Scene, Surfel};
 
 /// The surfels of a scene in a view that shows none of them, counted by reason.
@@ -28,7 +28,7 @@ pub struct Unseen {
 impl Unseen {
     /// Counts the surfels of `scene` in the view of `camera`. For a scene of which only a part is
     /// loaded, counts the surfels and nodes that are loaded.
-    pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn of(scene: &Scene, camera: &Camera, options: &Settings) -> Self {
         if let (Some(_), Some(tree)) = (&scene.part_of, &scene.hierarchy) {
             let nodes = (0..tree.nodes.len() as u32).filter(|&index| tree.nodes[index as usize].count == 0);
             let nodes = nodes.map(|index| (index, Fade::WHOLE)).collect();
@@ -79,7 +79,7 @@ impl Unseen {
 }
 
 /// Whether `frame` shows only the background, up to the rounding of encoding and decoding.
-pub fn is_empty(frame: &Frame, options: &RenderOptions) -> bool {
+pub fn is_empty(frame: &Frame, options: &Settings) -> bool {
     let near = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-6 * b.abs();
     frame.color.par_iter().all(|color| color.iter().zip(&options.background).all(near))
 }
@@ -107,7 +107,7 @@ mod tests {
         let scene =
             Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
-        let options = RenderOptions::default();
+        let options = Settings::default();
         let mut frame = Frame::new(&camera, options.maps);
         let unseen = Unseen::of(&scene, &camera, &options);
         assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, ..Unseen::default() });

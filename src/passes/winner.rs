@@ -13,7 +13,7 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Clear;
-use crate::plan::{Oit, Plan, RenderOptions, Winner};
+use crate::plan::{Oit, Plan, Settings, Winner};
 use crate::scene::color::{decoded, srgb8};
 use crate::scene::{Camera, Colors, Scene};
 
@@ -57,7 +57,7 @@ pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat> + Clone,
     scene: &Scene,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     (first_row, rows): (u32, u32),
 ) -> Vec<PixelSums> {
     let (low, high) = scene.color_range();

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
-use super::RenderOptions;
+use super::Settings;
 use crate::error::Error;
 use crate::gpu::layout::ONE;
 use crate::scene::kernel::LEAST_AT_RIM;
@@ -178,7 +178,7 @@ impl AccumulatorRow {
 /// reached only by their tails keeps its digits. Order-free composites ([`Oit`](super::Oit)) need
 /// the digits where only far fragments show, which weigh less; as all fragments of a pixel are
 /// summed, they always leave room for every surfel.
-pub fn wide_bits(options: &RenderOptions, surfels: u64) -> u32 {
+pub fn wide_bits(options: &Settings, surfels: u64) -> u32 {
     if options.composite.is_order_free() {
         surfels.leading_zeros().min(56)
     } else if options.kernel.floor() < LEAST_AT_RIM {
@@ -205,8 +205,8 @@ mod tests {
 
     #[test]
     fn wide_bits_leave_room_for_every_surfel_and_24_digits_to_the_least_weight_of_few() {
-        let of = |a: f64| RenderOptions { kernel: Kernel::Ellipse { a, n: 3.0, smooth: false }, ..Default::default() };
-        let far = RenderOptions { composite: Composite::Weighted, ..of(6.0) };
+        let of = |a: f64| Settings { kernel: Kernel::Ellipse { a, n: 3.0, smooth: false }, ..Default::default() };
+        let far = Settings { composite: Composite::Weighted, ..of(6.0) };
         for (surfels, bits) in
             [(0, 56), (255, 56), (256, 55), (65_535, 48), (1_000_000, 44), (1 << 24, 40), (u32::MAX.into(), 40)]
         {

@@ -4,7 +4,7 @@
 mod adapter;
 
 pub use self::adapter::{on_adapter, sums};
-use super::{Accumulator, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, RenderOptions, composited};
+use super::{Accumulator, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, Settings, composited};
 use crate::error::{Error, Result};
 use crate::passes::peel::MOST_LAYERS;
 use crate::scene::composite::ALL_LAYERS;
@@ -20,7 +20,7 @@ fn usage(what: impl Into<String>) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
+pub fn options(options: &Settings, reference: bool) -> Result<()> {
     let (least, most) = SHININESS_RANGE;
     if options.lights.len() > MAX_LIGHTS {
         return usage(format!("a render has at most {MAX_LIGHTS} lights, not {}", options.lights.len()));
@@ -79,7 +79,7 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn by_tiles(options: &RenderOptions) -> Result<()> {
+pub fn by_tiles(options: &Settings) -> Result<()> {
     match options {
         _ if options.organisation != Organisation::Tile || options.raster.is_some() => Ok(()),
         _ if options.composite != Composite::Opaque => {
@@ -94,7 +94,7 @@ pub fn by_tiles(options: &RenderOptions) -> Result<()> {
 }
 
 /// Nodes of levels of detail are disks, of all inputs together.
-fn levels(options: &RenderOptions) -> Result<()> {
+fn levels(options: &Settings) -> Result<()> {
     match options {
         _ if options.facing.is_some() => {
             usage("points that face the camera have a size each and no levels of detail: leave --lod and --splats out")
@@ -116,7 +116,7 @@ fn levels(options: &RenderOptions) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn fades(options: &RenderOptions) -> Result<()> {
+pub fn fades(options: &Settings) -> Result<()> {
     match options {
         _ if options.composite != Composite::Opaque => {
             usage("cuts fade into each other on the nearest surface alone: take --lod-fade off with --composite")
@@ -132,14 +132,14 @@ pub fn fades(options: &RenderOptions) -> Result<()> {
 }
 
 /// Points that face the camera have no normals, and no plane.
-fn facing(options: &RenderOptions) -> Result<()> {
+fn facing(options: &Settings) -> Result<()> {
     let normal = options.shading != Shading::Unlit || options.maps.has(Map::Normal);
     match options {
         _ if normal => usage("points that face the camera have no normals: take --shading unlit and no normal map"),
         _ if options.low_pass != LowPass::None => {
             usage("points that face the camera have no low-pass: each shows at its own pixel anyway")
         }
-        RenderOptions { raster: Some(raster), facing: Some(facing), .. }
+        Settings { raster: Some(raster), facing: Some(facing), .. }
             if facing.shape.rises() && raster.depth != RasterDepth::Exact =>
         {
             usage("the rasteriser tests the depths of flat points by itself, of others with raster-depth exact alone")
@@ -150,14 +150,14 @@ fn facing(options: &RenderOptions) -> Result<()> {
 }
 
 /// Surfaces that show through are drawn from lists of fragments, or of sums of all.
-fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
+fn composite(options: &Settings, reference: bool) -> Result<()> {
     match options {
         _ if options.blend == Blend::Nearest => {
             usage("--blend nearest shows one fragment, behind which nothing shows: leave --composite out")
         }
         _ if options.composite.is_order_free() => order_free(options, reference),
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(raster), .. } => peeled(options, raster.depth),
+        Settings { raster: Some(raster), .. } => peeled(options, raster.depth),
         _ if options.accumulator != Accumulator::Fixed => {
             usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
         }
@@ -166,16 +166,16 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
 }
 
 /// Fragments summed in any order are scattered, by weights that may be small.
-fn order_free(options: &RenderOptions, reference: bool) -> Result<()> {
+fn order_free(options: &Settings, reference: bool) -> Result<()> {
     match options {
         _ if options.maps.has(Map::Layers) => {
             usage("of what is summed in any order no layers are told: leave the map layers out")
         }
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(_), .. } => {
+        Settings { raster: Some(_), .. } => {
             usage("the rasteriser sums one surface: take --composite layers:L, or render by compute")
         }
-        RenderOptions { accumulator: Accumulator::Fixed32 | Accumulator::Packed64, .. } => usage(
+        Settings { accumulator: Accumulator::Fixed32 | Accumulator::Packed64, .. } => usage(
             "far fragments weigh too little for sums of 32 bits: take the accumulator fixed, fixed64, float or cas",
         ),
         _ => Ok(()),
@@ -183,7 +183,7 @@ fn order_free(options: &RenderOptions, reference: bool) -> Result<()> {
 }
 
 /// The rasteriser draws layers one after the other.
-fn peeled(options: &RenderOptions, depth: RasterDepth) -> Result<()> {
+fn peeled(options: &Settings, depth: RasterDepth) -> Result<()> {
     match options.composite {
         Composite::Layers(1..=MOST_LAYERS) if options.tail == Tail::None && depth == RasterDepth::Exact => Ok(()),
         Composite::Layers(1..=MOST_LAYERS) => usage(
@@ -198,7 +198,7 @@ fn peeled(options: &RenderOptions, depth: RasterDepth) -> Result<()> {
 }
 
 /// A polygon is part of a disk.
-fn outline(options: &RenderOptions) -> Result<()> {
+fn outline(options: &Settings) -> Result<()> {
     match options.facing {
         Some(_) => usage("points that face the camera have shapes of their own: leave --outline out"),
         None if options.low_pass != LowPass::None => {
@@ -209,7 +209,7 @@ fn outline(options: &RenderOptions) -> Result<()> {
 }
 
 /// The nearest fragment alone has a colour and a depth.
-fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
+fn nearest(options: &Settings, reference: bool) -> Result<()> {
     // The reference's only fragment has weight 1 and count 1.
     let others = if reference { &[Map::Normal][..] } else { &[Map::Normal, Map::Weight, Map::Count, Map::Index] };
     let map = others.iter().map(|map| map.row()).find(|row| options.maps.has(row.map));
@@ -236,7 +236,7 @@ fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
+pub fn textured(options: &Settings, reference: bool) -> Result<()> {
     if options.composite != Composite::Opaque {
         return usage("textures are drawn on the nearest surface alone: leave --composite out");
     }
@@ -255,7 +255,7 @@ pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<()> {
+pub fn scene(facts: &Facts, options: &Settings, reference: bool) -> Result<()> {
     if u32::try_from(facts.surfels).is_err() {
         return usage(format!("a scene has at most 2^32 - 1 surfels, not {}", facts.surfels));
     }
@@ -312,7 +312,7 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
     }
     if facts.colors == ColorNeed::Textured {
         // Opaque surfaces are drawn as if nothing was composited.
-        return textured(&RenderOptions { composite: composited(facts, options), ..options.clone() }, reference);
+        return textured(&Settings { composite: composited(facts, options), ..options.clone() }, reference);
     }
     match options.maps.has(Map::TexZ) {
         true => usage(
@@ -324,7 +324,7 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
 }
 
 /// Inputs are kept apart by what each blends to.
-fn separate(options: &RenderOptions, reference: bool) -> Result<()> {
+fn separate(options: &Settings, reference: bool) -> Result<()> {
     match options {
         _ if options.blend == Blend::Nearest => {
             usage("--blend nearest blends nothing, and so keeps all inputs apart: leave --separate out")
@@ -336,7 +336,7 @@ fn separate(options: &RenderOptions, reference: bool) -> Result<()> {
             usage("the map index names the strongest point of all inputs: leave it out, or --separate")
         }
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(_), .. } => {
+        Settings { raster: Some(_), .. } => {
             usage("the rasteriser blends all splats: leave --separate out, or render by compute")
         }
         _ => Ok(()),
@@ -344,7 +344,7 @@ fn separate(options: &RenderOptions, reference: bool) -> Result<()> {
 }
 
 /// Fails for options that triangles do not go with.
-fn triangles(options: &RenderOptions, reference: bool) -> Result<()> {
+fn triangles(options: &Settings, reference: bool) -> Result<()> {
     match options {
         _ if options.composite != Composite::Opaque => {
             usage("triangles are drawn on the nearest surface alone: leave --composite out, or the triangles")
@@ -354,7 +354,7 @@ fn triangles(options: &RenderOptions, reference: bool) -> Result<()> {
         }
         _ if options.maps.has(Map::Index) => usage("triangles have no points to name: leave the map index out"),
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(raster), .. }
+        Settings { raster: Some(raster), .. }
             if raster.depth != RasterDepth::Exact || options.blend == Blend::Nearest =>
         {
             usage(

@@ -1,12 +1,12 @@
 //! Decides whether surfaces show through each other, and how their fragments are then composited.
 
-use super::{Facts, RenderOptions};
+use super::{Facts, Settings};
 use crate::scene::{Composite, Map};
 
 /// Returns the effective composite of a picture of the scene that `facts` describe. Layers of
 /// opaque surfaces become [`Composite::Opaque`], because only the nearest shows, unless a map asks
 /// for the others.
-pub fn composited(facts: &Facts, options: &RenderOptions) -> Composite {
+pub fn composited(facts: &Facts, options: &Settings) -> Composite {
     let (low, _) = facts.color;
     match options.composite {
         Composite::Layers(_) if low[3] >= 1.0 && options.opacity >= 1.0 && !options.maps.has(Map::Surfaces) => {
@@ -39,7 +39,7 @@ pub enum Oit {
 
 impl Oit {
     /// Returns the order-free weight of a picture, if it has one.
-    pub(super) fn of(options: &RenderOptions) -> Option<Self> {
+    pub(super) fn of(options: &Settings) -> Option<Self> {
         match options.composite {
             Composite::Weighted => Some(Self::Weighted),
             Composite::Moments => Some(Self::Moments),
@@ -50,7 +50,7 @@ impl Oit {
 
 impl Lists {
     /// Returns how a picture composites fragment lists, if it has any; the same for all renderers.
-    pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
+    pub(super) fn of(facts: &Facts, options: &Settings) -> Option<Self> {
         match composited(facts, options) {
             Composite::Opaque | Composite::Weighted | Composite::Moments => None,
             Composite::Layers(_) => Some(Self::Layers),

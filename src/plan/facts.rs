@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{MeshFacts, RenderOptions};
+use super::{MeshFacts, Settings};
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Atlas, Bounds, Colors, LevelFacts, Scene, Surfel, has_copies};
 
@@ -80,17 +80,17 @@ pub struct Facts {
 
 impl Facts {
     /// The longest half-axis of what may be drawn, world units.
-    pub fn drawn_radius(&self, options: &RenderOptions) -> f32 {
+    pub fn drawn_radius(&self, options: &Settings) -> f32 {
         self.nodes_of(options).map_or(self.largest_radius, |nodes| nodes.largest_radius.max(self.largest_radius))
     }
 
     /// The largest shorter half-axis of what may be drawn, world units.
-    pub fn drawn_shorter(&self, options: &RenderOptions) -> f32 {
+    pub fn drawn_shorter(&self, options: &Settings) -> f32 {
         self.nodes_of(options).map_or(self.largest_shorter, |nodes| nodes.largest_shorter.max(self.largest_shorter))
     }
 
     /// Facts of the nodes that may be drawn; `None` if the options ask for the finest level.
-    pub fn nodes_of(&self, options: &RenderOptions) -> Option<LevelFacts> {
+    pub fn nodes_of(&self, options: &Settings) -> Option<LevelFacts> {
         self.levels.filter(|_| !options.detail.is_finest())
     }
 

@@ -11,10 +11,10 @@ pub mod known;
 mod mesh;
 mod needs;
 mod optimisation;
-mod options;
 pub mod pass;
 mod pixel;
 mod raster;
+mod settings;
 pub mod steps;
 mod surfel;
 pub mod tuning;
@@ -30,9 +30,9 @@ pub use mesh::{MeshFacts, MeshNeeds, texture_words};
 pub(crate) use mesh::{bounds_of, in_view};
 pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
-pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
+pub use settings::{BackendName, Organisation, Settings};
 pub use surfel::{SurfelLayout, splat_words};
 pub use view::{depths, device_unit, farthest};
 
@@ -121,7 +121,7 @@ fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
 }
 
 /// Whether tiles sum all splats of a page, if those that blend with each other share one.
-fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
+fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     let pays = match options.organisation {
         Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
         Organisation::Tile => true,
@@ -133,7 +133,7 @@ fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
 /// Whether batches that are hidden or out of view are culled. Batches of cuts are not: nodes out of
 /// view are not in the cut, and recomputing the bounds of their batches in each frame takes longer
 /// than drawing what is hidden, unless most of it is.
-fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
+fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &Settings) -> bool {
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
         && tuning::PIXELS_A_CULLED_SURFEL * drawn > camera.pixels() as u64
@@ -156,11 +156,11 @@ impl Plan {
         facts: &Facts,
         adapter: &AdapterDescription,
         camera: &Camera,
-        options: &RenderOptions,
+        options: &Settings,
         known: &Known,
     ) -> Result<Self> {
         let accumulator = if known.overflows > 0 { Accumulator::Fixed } else { options.accumulator };
-        let options = &RenderOptions { accumulator, ..options.clone() };
+        let options = &Settings { accumulator, ..options.clone() };
         let needs = SceneNeeds::of(facts, adapter, camera, options);
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
@@ -216,7 +216,7 @@ impl Plan {
     }
 
     /// Plans the frame of the f64 reference, in strips of sample rows; nothing is culled.
-    pub fn of_reference(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn of_reference(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let needs = SceneNeeds::of_picture(facts, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {

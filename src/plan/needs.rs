@@ -1,8 +1,8 @@
 //! The needs of a scene and its options, computed once: the only variant key of the kernels.
 
 use super::{
-    Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth,
-    RenderOptions, composited, in_view, tuning,
+    Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth, Settings,
+    composited, in_view, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::passes::peel;
@@ -150,7 +150,7 @@ pub enum Winner {
 
 /// Returns the needs of the scene's triangles, or `None` if the view shows none. Next to triangles,
 /// the depths of splats are weighted differently. Without splats there is nothing to join.
-fn mesh(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Option<MeshNeeds> {
+fn mesh(facts: &Facts, camera: &Camera, options: &Settings) -> Option<MeshNeeds> {
     let of = facts.mesh;
     let shows = of.triangles > 0 && in_view(&of.bounds, facts.origin, camera);
     let join = if facts.surfels > 0 { options.join } else { Join::Nearest };
@@ -169,16 +169,20 @@ fn mesh(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Option<MeshN
 /// fade into each other, terms of which only a 64th of a splat remains keep 17.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
-fn may_be_small(options: &RenderOptions) -> bool {
+fn may_be_small(options: &Settings) -> bool {
     // The corners of squares lie at sqrt(2) radii. The convolution of `ewa` with the pixel lowers
     // the weight of splats smaller than a pixel.
+    // A kernel that the user wrote may be small anywhere.
+    if options.own_kernel.is_some() {
+        return true;
+    }
     let square = options.facing.is_some_and(|facing| facing.shape == PointShape::Square);
     let farthest = if square { 2.0 } else { 1.0 };
     options.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
 }
 
 /// Whether surfels that face away are culled.
-pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bool {
+pub fn culls_back(facts: &Facts, camera: &Camera, options: &Settings) -> bool {
     match options.cull {
         _ if options.facing.is_some() => false,
         Cull::None => false,
@@ -209,7 +213,7 @@ pub enum Sides {
 
 impl Sides {
     /// Returns the visible sides in a picture.
-    pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn of(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
         let both = options.facing.is_none() && !culls_back(facts, camera, options);
         let of_one_surface = tells_nearest && Oit::of(options).is_none();
@@ -223,7 +227,7 @@ impl Sides {
 
 impl SceneNeeds {
     /// Returns the needs of a picture of the scene that `facts` describe, for any renderer.
-    pub fn of_picture(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn of_picture(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let (low, high) = facts.color;
         let lit = options.shading != Shading::Unlit;
         let blends = options.blend == Blend::Weighted;
@@ -290,7 +294,7 @@ impl SceneNeeds {
     }
 
     /// Returns the needs of a render on `adapter`, before the image is cut into bands.
-    pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &Settings) -> Self {
         let picture = Self::of_picture(facts, camera, options);
         let blends = picture.winner.is_none();
         // Lists are summed in registers.

@@ -1,7 +1,7 @@
 //! Describes a pass of the algorithm for the device: WGSL files, kernels and constants.
 
 use super::steps::Kernel;
-use super::{RenderOptions, SceneNeeds};
+use super::{SceneNeeds, Settings};
 
 /// Inputs that determine the constants of a module.
 #[derive(Clone, Copy, Debug)]
@@ -9,7 +9,7 @@ pub struct Making<'a> {
     /// The needs of scene and options.
     pub needs: &'a SceneNeeds,
     /// The options of the render.
-    pub options: &'a RenderOptions,
+    pub options: &'a Settings,
     /// Number of surfels in the scene.
     pub surfels: u64,
 }

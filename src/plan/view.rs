@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Facts, RenderOptions, composited};
+use super::{Facts, Settings, composited};
 use crate::gpu::layout::View;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::options::HIGHLIGHT;
@@ -44,7 +44,7 @@ const LARGEST_FRACTION: f64 = 1e9;
 
 impl View {
     /// The uniform for `camera` and the scene that `facts` describe.
-    pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+    pub fn new(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let Facts { bounds, body, core, color, .. } = facts;
         let [low, span] = mapped(lit_range([color.0, color.1], options), composited(facts, options));
         let eye_relative = camera.eye - facts.origin;
@@ -121,7 +121,7 @@ pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
 /// A depth beyond every surfel, with a margin for rounding, in world units. With an epsilon that
 /// accepts everything it keeps the interval in which depths are measured finite and no coarser than
 /// the scene.
-pub fn farthest(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
+pub fn farthest(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     let reach = f64::from(facts.drawn_radius(options));
     (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + reach) * 1.001
 }
@@ -143,7 +143,7 @@ fn nearest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
 }
 
 /// The range of premultiplied colours after lighting; `range` itself unless splats are lit.
-fn lit_range([low, high]: [[f32; 4]; 2], options: &RenderOptions) -> [[f32; 4]; 2] {
+fn lit_range([low, high]: [[f32; 4]; 2], options: &Settings) -> [[f32; 4]; 2] {
     if !options.lights_splats() {
         return [low, high];
     }
@@ -169,7 +169,7 @@ fn mapped([low, high]: [[f32; 4]; 2], composite: Composite) -> [[f32; 4]; 2] {
 
 /// The area of a drawn octree node in square pixels of the image, then the width and height of a
 /// sample as fractions of a pixel.
-fn levels(camera: &Camera, options: &RenderOptions) -> [f32; 4] {
+fn levels(camera: &Camera, options: &Settings) -> [f32; 4] {
     let Samples { across, down } = options.samples;
     let image = camera.pixels() as f64 / f64::from(across * down);
     [options.detail.pixels(image) as f32, 1.0 / across as f32, 1.0 / down as f32, 0.0]

@@ -5,11 +5,11 @@
 use rayon::prelude::*;
 
 use crate::frame::Frame;
-use crate::plan::{Facts, RenderOptions};
+use crate::plan::{Facts, Settings};
 use crate::scene::color::{linear_to_srgb, srgb_to_linear};
 
 /// Returns `options` with the background as an sRGB code if the scene's colours are codes.
-pub(super) fn of(facts: &Facts, options: &RenderOptions) -> RenderOptions {
+pub(super) fn of(facts: &Facts, options: &Settings) -> Settings {
     let mut options = options.clone();
     if facts.encoded {
         let [r, g, b, a] = options.background;

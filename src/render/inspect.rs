@@ -20,9 +20,7 @@ use crate::gpu::sources::Text;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
-use crate::plan::{
-    Accumulator, Facts, Known, Optimisation, Organisation, Plan, RenderOptions, SceneNeeds, splat_words,
-};
+use crate::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, SceneNeeds, Settings, splat_words};
 use crate::scene::{Camera, Composite, Scene};
 
 /// The results of project, visibility and accumulate.
@@ -50,7 +48,7 @@ impl Stages {
 /// # Errors
 /// [`Error::Usage`] for options whose stages cannot be read back, or if the image's sums need more
 /// than one buffer; and any error of a render.
-pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
+pub fn stages(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     if options.accumulator != Accumulator::Fixed {
         return Err(Error::Usage("sums can be read back only with the accumulator fixed: use it".into()));
     }
@@ -64,7 +62,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     // Each surfel needs a slot, and sums must be in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);
-    let options = &RenderOptions { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
+    let options = &Settings { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
     let facts = Facts::of(scene);
     super::sums::of_surfels_alone(&facts)?;
     let mut known = Known::default();

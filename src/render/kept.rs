@@ -18,14 +18,14 @@ use crate::passes::source::Source;
 use crate::passes::upload::upload;
 use crate::passes::{asks_for_order, finish, tiles};
 use crate::plan::known::MOST_TRIES;
-use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, tuning};
+use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, Settings, tuning};
 use crate::progress::Progress;
 use crate::scene::Camera;
 
 /// The facts of a scene, the sizes measured in its frames so far, and its kernels and buffers.
 pub(super) struct Kept {
     pub(super) facts: Facts,
-    pub(super) options: RenderOptions,
+    pub(super) options: Settings,
     known: Known,
     /// Width and height of the last frame, in samples.
     size: Option<(u32, u32)>,
@@ -35,7 +35,7 @@ pub(super) struct Kept {
 
 impl Kept {
     /// Creates the state of a scene with nothing on the device yet.
-    pub(super) fn new(facts: Facts, options: RenderOptions) -> Self {
+    pub(super) fn new(facts: Facts, options: Settings) -> Self {
         Self { facts, options, known: Known::default(), size: None, kernels: None, store: None }
     }
 

@@ -10,7 +10,7 @@ use crate::passes::select::CHOOSING;
 use crate::passes::{constants, modules, raster};
 use crate::plan::pass::{Making, Module};
 use crate::plan::steps::Kernel;
-use crate::plan::{Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Plan, SceneNeeds, Settings};
 
 /// The kernels of one plan, compiled on first use.
 pub struct Kernels {
@@ -23,7 +23,7 @@ pub struct Kernels {
 
 impl Kernels {
     /// Creates the kernels of `plan` without compiling any.
-    pub fn new(sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Self {
+    pub fn new(sources: &Sources, plan: &Plan, options: &Settings, surfels: u64) -> Self {
         let constants = constants(&Making { needs: &plan.needs, options, surfels });
         let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceLock::new())).collect();
         let made = (plan.needs, bits(&constants));
@@ -43,7 +43,7 @@ impl Kernels {
     }
 
     /// Returns whether these kernels serve `plan` too.
-    pub fn serve(&self, plan: &Plan, options: &RenderOptions, surfels: u64) -> bool {
+    pub fn serve(&self, plan: &Plan, options: &Settings, surfels: u64) -> bool {
         let making = Making { needs: &plan.needs, options, surfels };
         self.made.0 == plan.needs && self.made.1 == bits(&constants(&making))
     }

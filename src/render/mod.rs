@@ -26,9 +26,9 @@ use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
-use crate::plan::{Optimisation, RenderOptions, check, culls_back};
+use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
-use crate::scene::{Camera, Detail, KernelFaults, OwnKernel};
+use crate::scene::{Camera, Detail, KernelFaults};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 pub use taken::taken;
@@ -60,7 +60,7 @@ impl Backend {
 pub fn render(
     source: &dyn Source,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     backend: &Backend,
     progress: &dyn Progress,
 ) -> Result<(Frame, Report)> {
@@ -95,13 +95,13 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     ///
     /// # Errors
     /// [`Error::Usage`] if options, scene and backend do not go together.
-    pub fn new(source: S, options: &RenderOptions, backend: B) -> Result<Self> {
+    pub fn new(source: S, options: &Settings, backend: B) -> Result<Self> {
         let reference = matches!(backend.borrow(), Backend::Reference);
         check::options(options, reference)?;
         let facts = source.facts();
         check::scene(&facts, options, reference)?;
         let (sources, options) = own::settled(backend.borrow(), options)?;
-        let faults = options.own_kernel.as_ref().map(OwnKernel::faults);
+        let faults = own::faults(&options);
         let options = &encoded::of(&facts, &options);
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
@@ -144,7 +144,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// Returns the node size for the view of `camera`. It follows from the colour's part and holds
     /// for all parts.
     fn sized(&self, camera: &Camera) -> Detail {
-        let (facts, options) = (&self.kept.facts, RenderOptions { detail: self.detail, ..self.kept.options.clone() });
+        let (facts, options) = (&self.kept.facts, Settings { detail: self.detail, ..self.kept.options.clone() });
         let wanted = Wanted::of(&options, culls_back(facts, camera, &options));
         let tree = self.source.levels();
         tree.map_or(self.detail, |tree| select::sized(tree, facts.origin, camera, &wanted))
@@ -209,7 +209,7 @@ mod tests {
     fn counted(without: &[Optimisation]) -> Option<Vec<bool>> {
         let backend = Backend::gpu(opened()?);
         let case = cases().unwrap().swap_remove(0);
-        let options = RenderOptions { without: without.to_vec(), ..case.options };
+        let options = Settings { without: without.to_vec(), ..case.options };
         render(&case.scene, &case.camera, &options, &backend, &()).unwrap();
         let Backend::Gpu { gpu, .. } = &backend else { return None };
         Some(gpu.compiled.count_loops())
@@ -230,7 +230,7 @@ mod tests {
         let Some(gpu) = opened().filter(|gpu| gpu.adapter.api == "vulkan") else { return };
         let case = cases().unwrap().swap_remove(0);
         let after = |maps: &[Map]| {
-            let options = RenderOptions { maps: Maps::of(maps), ..case.options.clone() };
+            let options = Settings { maps: Maps::of(maps), ..case.options.clone() };
             render(&case.scene, &case.camera, &options, &Backend::gpu(gpu.clone()), &()).unwrap();
             gpu.compiled.count_pipelines()
         };

@@ -8,25 +8,25 @@
 use super::report::Report;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::plan::{Facts, RenderOptions, composited};
+use crate::plan::{Facts, Settings, composited};
 use crate::scene::{Composite, Map, Maps, Samples};
 
 /// Returns the options of each render of a frame: the colour's first, then those of the maps that
 /// the first render does not make.
-pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions> {
+pub(super) fn parts(facts: &Facts, options: &Settings) -> Vec<Settings> {
     // In an opaque picture the map of surfaces needs a render of its own, because it also draws the
     // back faces that the colour leaves out.
     let surfaces = options.maps.among(Maps::of(&[Map::Surfaces]));
-    let without = RenderOptions { maps: options.maps.beside(surfaces), ..options.clone() };
+    let without = Settings { maps: options.maps.beside(surfaces), ..options.clone() };
     let opaque = composited(facts, &without) == Composite::Opaque;
     if opaque && !surfaces.is_empty() {
         let mut all = parts(facts, &without);
-        all.push(RenderOptions { maps: surfaces, samples: Samples::ONE, ..options.clone() });
+        all.push(Settings { maps: surfaces, samples: Samples::ONE, ..options.clone() });
         return all;
     }
     let decision = options.maps.among(Maps::of(&[Map::Decision]));
     // The options of a render for maps, at one sample per pixel.
-    let with = |maps: Maps| RenderOptions { maps: maps.and_all(decision), samples: Samples::ONE, ..options.clone() };
+    let with = |maps: Maps| Settings { maps: maps.and_all(decision), samples: Samples::ONE, ..options.clone() };
     let (whole, nearest) = match opaque {
         true => (options.maps, Maps::NONE),
         false => (options.maps.among(Maps::COMPOSITED), options.maps.beside(Maps::COMPOSITED).beside(decision)),
@@ -35,10 +35,10 @@ pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions
     if options.samples == Samples::ONE {
         parts.push(with(whole));
     } else {
-        parts.push(RenderOptions { maps: decision, ..options.clone() });
+        parts.push(Settings { maps: decision, ..options.clone() });
         parts.extend((!whole.is_empty()).then(|| with(whole)));
     }
-    parts.extend((!nearest.is_empty()).then(|| RenderOptions { composite: Composite::Opaque, ..with(nearest) }));
+    parts.extend((!nearest.is_empty()).then(|| Settings { composite: Composite::Opaque, ..with(nearest) }));
     parts
 }
 
@@ -46,7 +46,7 @@ pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions
 ///
 /// # Errors
 /// [`Error::Usage`] otherwise.
-pub(super) fn one_alone(options: &RenderOptions) -> Result<()> {
+pub(super) fn one_alone(options: &Settings) -> Result<()> {
     if !options.detail.is_finest() {
         return Err(Error::Usage("sums can be read back only without levels of detail: leave them out".into()));
     }

@@ -20,7 +20,7 @@ use crate::passes::{
     MAP_PASSES, Strip, accumulate, individuals, layers, oit, project, resolve, sorted, triangles, visibility, winner,
 };
 use crate::plan::steps::{Step, Twin};
-use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, culls_back};
+use crate::plan::{Facts, Plan, SceneNeeds, Settings, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Blend, Camera, Cull, Samples, Scene};
 
@@ -29,7 +29,7 @@ pub(super) fn frame(
     scene: &Scene,
     facts: &Facts,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     progress: &dyn Progress,
 ) -> (Frame, Report) {
     let start = Instant::now();
@@ -83,18 +83,13 @@ pub(super) fn frame(
 /// Returns the cut of `scene` that `camera` draws, and its options; `None` if no cut is drawn.
 /// `camera` has the pixels of the image, not the samples. The whole scene decides whether back
 /// faces are culled.
-pub(super) fn cut(
-    scene: &Scene,
-    facts: &Facts,
-    camera: &Camera,
-    options: &RenderOptions,
-) -> Option<(Scene, RenderOptions)> {
+pub(super) fn cut(scene: &Scene, facts: &Facts, camera: &Camera, options: &Settings) -> Option<(Scene, Settings)> {
     facts.nodes_of(options)?;
     let tree = scene.hierarchy.as_deref()?;
     let backs_out = culls_back(facts, camera, options);
     let cut = select::reference(tree, scene.origin, camera, &Wanted::of(options, backs_out));
     let cull = if backs_out { Cull::Back } else { Cull::None };
-    Some((cut.scene(scene, tree, options.draws_node_caps()), RenderOptions { cull, ..options.clone() }))
+    Some((cut.scene(scene, tree, options.draws_node_caps()), Settings { cull, ..options.clone() }))
 }
 
 /// Lists the twins of the steps of `plan`: those that run once, and those of each band.
@@ -154,7 +149,7 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
 }
 
 /// The rank of each surfel in the order in which a device stores them.
-fn ranks(scene: &Scene, facts: &Facts, options: &RenderOptions) -> Vec<u32> {
+fn ranks(scene: &Scene, facts: &Facts, options: &Settings) -> Vec<u32> {
     if facts.nodes_of(options).is_some() {
         // A cut is stored in tree order.
         return (0..scene.surfels.len() as u32).collect();

@@ -15,7 +15,7 @@ use crate::passes::upload::{Uploaded, shared, upload};
 use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
-use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
+use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, Settings, check};
 use crate::scene::{Blend, Camera, Composite};
 
 /// The result of the attribute pass over an image, with the accumulator `fixed`.
@@ -104,7 +104,7 @@ pub(super) fn of_surfels_alone(facts: &Facts) -> Result<()> {
 }
 
 /// Checks that `options` allow sums to be read back, and returns them with gathering off.
-fn stored(options: &RenderOptions) -> Result<RenderOptions> {
+fn stored(options: &Settings) -> Result<Settings> {
     super::parts::one_alone(options)?;
     check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
@@ -128,7 +128,7 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     // Tiles that gather keep sums in registers and store none.
     let mut without = options.without.clone();
     without.push(Optimisation::Gathering);
-    Ok(RenderOptions { without, ..options.clone() })
+    Ok(Settings { without, ..options.clone() })
 }
 
 /// Renders what `source` holds and returns its sums.
@@ -136,13 +136,7 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
 /// # Errors
 /// [`Error::Usage`] for an accumulator other than `fixed` or options that leave no sums, and any
 /// error of a render.
-pub fn sums(
-    source: &dyn Source,
-    camera: &Camera,
-    options: &RenderOptions,
-    gpu: &Gpu,
-    sources: &Sources,
-) -> Result<Sums> {
+pub fn sums(source: &dyn Source, camera: &Camera, options: &Settings, gpu: &Gpu, sources: &Sources) -> Result<Sums> {
     let options = &stored(options)?;
     let facts = source.facts();
     of_surfels_alone(&facts)?;
@@ -183,7 +177,7 @@ pub fn resolve(
     sums: &Sums,
     source: &dyn Source,
     camera: &Camera,
-    options: &RenderOptions,
+    options: &Settings,
     gpu: &Gpu,
     sources: &Sources,
 ) -> Result<Frame> {

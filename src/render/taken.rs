@@ -4,7 +4,7 @@ use super::encoded;
 use super::parts::parts;
 use crate::io::ply::Levels;
 use crate::passes::select::{self, Wanted};
-use crate::plan::{Facts, RenderOptions, culls_back};
+use crate::plan::{Facts, Settings, culls_back};
 use crate::scene::{Camera, Detail, Hierarchy, Scene};
 use crate::surfels::part::{self, Taken};
 use crate::{Progress, Result};
@@ -18,7 +18,7 @@ use crate::{Progress, Result};
 /// file, and any error that `fits` returns for the part read so far.
 pub fn taken(
     levels: &Levels,
-    views: &[(&Camera, &RenderOptions)],
+    views: &[(&Camera, &Settings)],
     fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
 ) -> Result<(Scene, Taken)> {
@@ -27,7 +27,7 @@ pub fn taken(
     for &(camera, options) in views {
         // The node size for a number of splats depends on all nodes in view, so all are read.
         let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
-        let wanted = |part: &RenderOptions| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
+        let wanted = |part: &Settings| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
         // Renders for colour and maps may cull different back faces and filter at different sample
         // sizes.
         all.extend(parts(&facts, &encoded::of(&facts, options)).iter().map(|part| (camera, wanted(part))));

@@ -1,8 +1,8 @@
 //! Writes the measurements as a CSV table (RFC 4180): one row each, with CRLF line ends.
 //!
-//! The order of columns is fixed: the configuration, rates and memory, errors, the machine, the total
-//! time with every run, and last the columns that only some studies have, of passes and of measures against ground truth. A
-//! missing value is an empty field.
+//! The order of columns is fixed: the configuration, rates and memory, errors, the machine, the
+//! total time with every run, and last the columns that only some studies have, of passes and of
+//! measures against ground truth. A missing value is an empty field.
 
 use std::collections::BTreeSet;
 

@@ -2,7 +2,7 @@
 //!
 //! # Meaning of alpha
 //!
-//! A surfel's alpha a_i, times [`RenderOptions::opacity`](crate::plan::RenderOptions::opacity) A,
+//! A surfel's alpha a_i, times [`Settings::opacity`](crate::plan::Settings::opacity) A,
 //! means
 //!
 //! - in **layers** mode: the opacity of the *surface* that overlapping surfels form. The fragments

@@ -277,7 +277,7 @@ pub enum ShadingAt {
 /// default colour (`DEFAULT_COLOR`).
 pub const HIGHLIGHT: f64 = 0.3;
 
-/// The allowed range of [`RenderOptions::shininess`](crate::plan::RenderOptions::shininess): above
+/// The allowed range of [`Settings::shininess`](crate::plan::Settings::shininess): above
 /// it, the rounding of the cosine in f32 would be visible.
 pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-/// The distances from a disk's centre at which a kernel is tried: k / DISTANCES radii.
+/// Steps of the distance from a disk's centre at which a kernel is tried.
 const DISTANCES: u32 = 4096;
 
 /// A loop of a kernel did not end.
@@ -53,12 +53,16 @@ impl OwnKernel {
         (self.weight)(rho2).ok().filter(|weight| !weight.is_nan()).unwrap_or(0.0).clamp(0.0, 1.0)
     }
 
-    /// Tries the kernel at 4,097 distances from the disk's centre, and counts the weights that are
-    /// none: those between 0 and 1 are.
-    pub fn faults(&self) -> KernelFaults {
-        let mut faults = KernelFaults { kernel: self.name.clone(), tried: DISTANCES + 1, ..KernelFaults::default() };
+    /// Tries the kernel at 4,097 distances from the disk's centre to `farthest` radii, and counts the
+    /// weights that are none: those between 0 and 1 are. It stops at a loop that does not end.
+    pub fn faults(&self, farthest: f64) -> KernelFaults {
+        let mut faults = KernelFaults { kernel: self.name.clone(), ..KernelFaults::default() };
         for k in 0..=DISTANCES {
-            let rho = f64::from(k) / f64::from(DISTANCES);
+            if faults.endless > 0 {
+                break;
+            }
+            faults.tried += 1;
+            let rho = farthest * f64::from(k) / f64::from(DISTANCES);
             let count = match (self.weight)(rho * rho) {
                 Err(Endless) => &mut faults.endless,
                 Ok(weight) if weight.is_nan() => &mut faults.not_a_number,
@@ -130,17 +134,20 @@ mod tests {
     #[test]
     fn weights_that_are_none_are_counted_and_named() {
         let fine = OwnKernel::new("fine", |rho2| 1.0 - rho2);
-        assert_eq!(fine.faults().sentence(), None);
+        assert_eq!(fine.faults(1.0).sentence(), None);
         assert_eq!(fine.weight(0.25), 0.75);
         let root = OwnKernel::new("root", |rho2| (-1.0 - rho2).sqrt());
-        assert_eq!((root.faults().not_a_number, root.faults().first), (4097, Some(0.0)));
+        assert_eq!((root.faults(1.0).not_a_number, root.faults(1.0).first), (4097, Some(0.0)));
         assert_eq!(root.weight(0.5), 0.0);
-        let below = OwnKernel::new("below", |rho2| 0.5 - rho2).faults();
+        let below = OwnKernel::new("below", |rho2| 0.5 - rho2).faults(1.0);
         assert_eq!((below.negative, below.not_a_number), (1200, 0));
         let sentence = below.sentence().unwrap();
         assert!(sentence.contains("kernel below, 1200 are wrong, first at 0.7073 radii: 1200 negative"), "{sentence}");
-        assert_eq!(OwnKernel::new("high", |rho2| 2.0 * (1.0 - rho2)).faults().above_one, 2897);
+        assert_eq!(OwnKernel::new("high", |rho2| 2.0 * (1.0 - rho2)).faults(1.0).above_one, 2897);
         let endless = OwnKernel::fallible("endless", |rho2| if rho2 > 0.25 { Err(Endless) } else { Ok(1.0) });
-        assert_eq!((endless.faults().endless, endless.weight(0.5)), (2048, 0.0));
+        assert_eq!((endless.faults(1.0).endless, endless.faults(1.0).tried), (1, 2050));
+        assert_eq!(endless.weight(0.5), 0.0);
+        // Corners of squares lie at the root of 2.
+        assert!(OwnKernel::new("cone", |rho2| 1.0 - rho2.sqrt()).faults(2f64.sqrt()).negative > 1000);
     }
 }

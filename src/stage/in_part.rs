@@ -8,7 +8,7 @@ use super::octrees::Octrees;
 use super::tree::Tree;
 use super::whole::Made;
 use crate::error::{Error, Result};
-use crate::plan::RenderOptions as Settings;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene};
 

@@ -1,7 +1,7 @@
 //! Builds levels of detail for a scene that has none.
 
 use crate::error::{Error, Result};
-use crate::plan::RenderOptions as Settings;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::surfels::hierarchy;

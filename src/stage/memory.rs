@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::frame::pixel_bytes;
-use crate::plan::RenderOptions as Settings;
+use crate::plan::Settings;
 use crate::scene::{Camera, Composite};
 use crate::surfels::part::Taken;
 

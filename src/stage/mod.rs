@@ -19,6 +19,7 @@ mod view;
 mod whole;
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use self::files::Files;
@@ -49,6 +50,33 @@ struct Inputs {
     options: SceneOptions,
     /// The surfels and triangles that were made last.
     made: Mutex<Option<(Making, Arc<Whole>)>>,
+    /// Standard input is read, and at its end.
+    pipe_read: AtomicBool,
+}
+
+/// Passes progress on and keeps the notes.
+struct Noted<'a> {
+    progress: &'a dyn Progress,
+    notes: Mutex<Vec<String>>,
+}
+
+impl Progress for Noted<'_> {
+    fn begin(&self, what: &str, units: u64) {
+        self.progress.begin(what, units);
+    }
+
+    fn advance(&self, units: u64) {
+        self.progress.advance(units);
+    }
+
+    fn end(&self) {
+        self.progress.end();
+    }
+
+    fn note(&self, line: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(line.to_owned());
+        self.progress.note(line);
+    }
 }
 
 impl Scene {
@@ -76,7 +104,7 @@ impl Scene {
         Ok(Self(Arc::new(Inputs { files, options: options.clone(), ..Inputs::default() })))
     }
 
-    /// Makes a scene of points in memory.
+    /// Makes a scene of points in memory. They stay there, beside the surfels that are made of them.
     pub fn from_points(points: Vec<Points>, options: &SceneOptions) -> Self {
         Self(Arc::new(Inputs { given: points, options: options.clone(), ..Inputs::default() }))
     }
@@ -122,23 +150,43 @@ impl Request<'_> {
 
     /// Reads the points of all inputs.
     fn points(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
-        if self.files().paths().is_empty() { Ok(self.scene.given.clone()) } else { self.files().read(progress) }
+        if self.files().paths().is_empty() {
+            return Ok(self.scene.given.clone());
+        }
+        let pipe = self.files().paths().iter().any(|path| path.as_os_str() == "-");
+        if pipe && self.scene.pipe_read.swap(true, Ordering::Relaxed) {
+            return Err(Error::Usage("standard input was read before and cannot be read again: open a file".into()));
+        }
+        self.files().read(progress)
+    }
+
+    /// Fails for options of triangles if the scene has none.
+    fn check_triangles(&self, exist: bool) -> Result<()> {
+        if !exist && (self.options.surface.join.is_some() || self.triangles().texture.is_some()) {
+            let what = "--join and --triangle-texture need triangles, and there are none: name a mesh by --triangles";
+            return Err(Error::Usage(what.into()));
+        }
+        Ok(())
     }
 
     /// Returns the surfels and triangles of all inputs, as they were made before if the same are
-    /// needed.
+    /// needed. Other renderers of the scene wait meanwhile.
     fn whole(&self, progress: &dyn Progress) -> Result<Arc<Whole>> {
         let making = Making::of(self);
         let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((known, whole)) = &*made
             && *known == making
         {
+            self.check_triangles(!whole.scene.triangles.is_empty())?;
+            whole.notes.iter().for_each(|line| progress.note(line));
             return Ok(whole.clone());
         }
         // The memory of what was made before is needed for what is made now.
         *made = None;
-        let (scene, preparation) = whole::scene(self, progress)?;
-        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation });
+        let noted = Noted { progress, notes: Mutex::default() };
+        let (scene, preparation) = whole::scene(self, &noted)?;
+        let notes = noted.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes });
         *made = Some((making, whole.clone()));
         Ok(whole)
     }
@@ -147,11 +195,18 @@ impl Request<'_> {
     fn with_levels(&self, whole: Arc<Whole>, progress: &dyn Progress) -> Result<Arc<Whole>> {
         let making = Making::of(self);
         let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
+        // Another thread may have built them meanwhile.
+        if let Some((known, whole)) = &*made
+            && *known == making
+            && whole.scene.hierarchy.is_some()
+        {
+            return Ok(whole.clone());
+        }
         // Surfels that nobody else draws are not copied.
         *made = None;
-        let Whole { scene, preparation } = Arc::unwrap_or_clone(whole);
+        let Whole { scene, preparation, notes } = Arc::unwrap_or_clone(whole);
         let scene = levels::made(Arc::unwrap_or_clone(scene), progress)?;
-        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation });
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes });
         *made = Some((making, whole.clone()));
         Ok(whole)
     }

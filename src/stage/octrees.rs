@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::io::las::Copc;
 use crate::io::{ColorRules, Points};
 use crate::options::values::Switch;
-use crate::plan::RenderOptions as Settings;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::scene::octree::{PointOctree, Thinned, taken};
 use crate::scene::{Bounds, Camera, Detail, Scene};

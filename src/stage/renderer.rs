@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::in_part::{Part, Parts};
-use super::{Inputs, ReadReport, Request, Scene, View, ViewReport, levels, memory};
+use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, levels, memory};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::Gpu;
-use crate::options::{DeviceOptions, RenderOptions};
+use crate::gpu::{Gpu, Replacement};
+use crate::options::{DeviceOptions, RenderOptions, SceneOptions};
 use crate::passes::unseen::{Unseen, is_empty};
-use crate::plan::{BackendName, RenderOptions as Settings};
+use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
 use crate::scene::{self, Bounds, Camera, KernelFaults};
@@ -100,15 +100,32 @@ impl Renderer {
         views: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let (inputs, options, device) = (scene.0.clone(), options.clone(), device.clone());
+        let (inputs, mut options, device) = (scene.0.clone(), options.clone(), device.clone());
+        let sources = options.research.sources.iter().map(Replacement::loaded).collect::<Result<_>>()?;
+        options.research.sources = sources;
         let request = Request { scene: &inputs, options: &options, device: &device, views };
         let settings = request.settings()?;
+        if options.surface.separate && inputs.files.paths().len().max(inputs.given.len()) < 2 {
+            progress.note(
+                "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
+            );
+        }
         let backend = Arc::new(backend(&device, progress)?);
         let (settings, drawn) = match Parts::of(&request, &settings, progress)? {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
             None => whole(&request, settings, &backend, progress)?,
         };
         Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
+    }
+
+    /// Fails for options that do not go together, before any input is read.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`], as [`Renderer::new`].
+    pub fn check(files: &Files, scene: &SceneOptions, options: &RenderOptions, device: &DeviceOptions) -> Result<()> {
+        let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
+        Request { scene: &inputs, options, device, views: false }.settings().map(drop)
     }
 
     /// Sets how many frames the caller has in memory at once, which counts against a limit of
@@ -180,7 +197,8 @@ impl Renderer {
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read } =
                     parts.scene(&request, (&camera, *frames), settings, progress)?;
-                if !std::mem::replace(noted, true) {
+                let first = !std::mem::replace(noted, true);
+                if first {
                     preparation.notes().iter().for_each(|line| progress.note(line));
                 }
                 let view = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
@@ -189,6 +207,8 @@ impl Renderer {
                     progress.note(&read.sentence());
                 }
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
+                let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
+                wrong.iter().for_each(|line| progress.note(line));
                 Ok(picture(&scene, &settings, rendered, (camera, view), Some(read)))
             }
         }

@@ -3,7 +3,7 @@
 use super::Request;
 use crate::error::{Error, Result};
 use crate::options::Suggested;
-use crate::plan::{RenderOptions as Settings, check};
+use crate::plan::{Settings, check};
 use crate::progress::Progress;
 use crate::scene::{Blend, Colors, Composite, Scene};
 

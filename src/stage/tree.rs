@@ -6,7 +6,7 @@ use super::in_part::{Part, ReadReport};
 use super::memory::Memory;
 use crate::error::{Error, Result};
 use crate::io::ply::Levels;
-use crate::plan::RenderOptions as Settings;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::taken;
 use crate::scene::hierarchy::Node;

@@ -174,7 +174,7 @@ impl Given {
                 (&Pose::LookAt(*eye, center, *up), *up, By::Choice)
             }
             Place::Pose(pose @ Pose::LookAt(.., up)) => (pose, *up, By::Arguments),
-            Place::Pose(pose @ Pose::Rigid(..)) => (pose, None, By::File),
+            Place::Pose(pose @ Pose::Rigid(..)) => (pose, None, By::Pose),
         };
         let camera = self.posed(pose, scene.up, near)?;
         Ok(match *pose {
@@ -202,7 +202,7 @@ impl Seen {
     fn of_pose(camera: &Camera, scene: &Scene) -> Self {
         let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(camera.near);
         let target = camera.eye + camera.rotation.row(2) * distance;
-        Self { target, up: Some(-camera.rotation.row(1)), by: By::File }
+        Self { target, up: Some(-camera.rotation.row(1)), by: By::Pose }
     }
 }
 
@@ -213,8 +213,8 @@ enum By {
     Choice,
     /// Eye and target of the options or of a file.
     Arguments,
-    /// A rotation and eye of a file.
-    File,
+    /// A rotation and an eye.
+    Pose,
 }
 
 /// Angle between the line of sight and up, degrees, below which up barely fixes the picture's roll.
@@ -243,7 +243,7 @@ impl ViewReport {
     /// Describes `camera`, which looks at `seen`. `guessed` is true if the scene's up is a guess.
     pub(super) fn new(camera: &Camera, seen: &Seen, scene: &Scene, guessed: bool) -> Self {
         let because = match (seen.up, guessed, scene.up) {
-            (Some(_), ..) if seen.by == By::File => "as the file of the camera says",
+            (Some(_), ..) if seen.by == By::Pose => "as the camera says",
             (Some(_), ..) => "as asked for",
             (None, false, _) => "as the file or its format says",
             (None, true, Up::Z) => "a guess, as the points lie flat",
@@ -254,7 +254,7 @@ impl ViewReport {
         // A camera that looks along the scene's up uses the other axis as up.
         let is_along = seen.up.is_none() && forward.cross(given).length() <= 1e-3;
         let up = if is_along { scene.up.other() } else { given };
-        let turned = if is_along || seen.by == By::File { None } else { turned(camera, up, scene.up) };
+        let turned = if is_along || seen.by == By::Pose { None } else { turned(camera, up, scene.up) };
         Self { eye: camera.eye.into(), target: seen.target.into(), up: up.into(), because, turned }
     }
 

@@ -23,6 +23,8 @@ pub(super) struct Whole {
     pub scene: Arc<Scene>,
     /// Counts of how its points became surfels.
     pub preparation: Preparation,
+    /// Notes of reading and building.
+    pub notes: Vec<String>,
 }
 
 /// The choices of a picture on which its surfels depend.
@@ -35,6 +37,8 @@ pub(super) struct Making {
     /// How surfaces show through each other: [`seen_through`].
     composite: Composite,
     transparent: bool,
+    /// Levels of detail are needed: building them orders surfels anew.
+    levels: bool,
 }
 
 impl Making {
@@ -45,6 +49,7 @@ impl Making {
             facing: points.facing.map(|_| points.point_size.unwrap_or_default()),
             paints: paints(request),
             composite: settings.composite,
+            levels: !settings.detail.is_finest(),
             transparent: transparency.opacity.is_some_and(|opacity| opacity < 1.0) || maps.aov.contains(&Map::Surfaces),
         }
     }
@@ -61,11 +66,6 @@ pub(super) fn scene_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dy
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
     }
-    if request.options.surface.separate && inputs.len() < 2 {
-        progress.note(
-            "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
-        );
-    }
     // A file of `epsplat hybrid` names the mesh of its remaining triangles.
     let beside = inputs.iter().filter_map(|points| points.beside.clone());
     let mut paths: Vec<PathBuf> = request.triangles().meshes.iter().cloned().chain(beside).collect();
@@ -81,10 +81,7 @@ pub(super) fn scene_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dy
         None
     };
     if paths.is_empty() {
-        if request.options.surface.join.is_some() || request.triangles().texture.is_some() {
-            let what = "--join and --triangle-texture need triangles, and there are none: name a mesh by --triangles";
-            return Err(Error::Usage(what.into()));
-        }
+        request.check_triangles(false)?;
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
     let options = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
@@ -147,7 +144,10 @@ fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progres
             let unnamed = Path::new("the scene");
             return Err(Error::malformed(paths.clone().next().map_or(unnamed, PathBuf::as_path), what));
         }
-        let names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        let mut names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        if names.is_empty() {
+            names = "the scene".to_owned();
+        }
         progress.note(&format!(
             "{names}: no texture coordinates, so the points have their own colours in spite of --texture"
         ));

@@ -18,7 +18,7 @@ use crate::{Progress, Result};
 const RADIUS: f64 = 1.8;
 
 /// Builds one scene from the points of all inputs, to be drawn
-/// [facing](crate::plan::RenderOptions::facing) the camera.
+/// [facing](crate::plan::Settings::facing) the camera.
 ///
 /// The surfels are circles with the points' radii, or with the longer half-axes of points that have
 /// half-axes. Points with neither share one radius, which is computed from the mean spacing. `size`

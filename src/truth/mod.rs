@@ -21,7 +21,7 @@ pub use self::triangles::TriangleTree;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::{self, Mesh};
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::composite::LEAST_TRANSMITTANCE;
@@ -155,7 +155,7 @@ impl Truth {
     pub fn cast(
         surface: &Surface,
         camera: &Camera,
-        options: &RenderOptions,
+        options: &Settings,
         grid: u32,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -184,7 +184,7 @@ impl Truth {
     }
 }
 
-fn pixel(surface: &Surface, camera: &Camera, options: &RenderOptions, grid: u32, x: u32, y: u32) -> Pixel {
+fn pixel(surface: &Surface, camera: &Camera, options: &Settings, grid: u32, x: u32, y: u32) -> Pixel {
     let corner = DVec2::new(x.into(), y.into());
     let see = |at: DVec2, beyond: f64| surface.first_hit(camera.ray_start(at.x, at.y), camera.ray(at.x, at.y), beyond);
     let after = |hit: Hit| hit.distance + SAME_SURFACE * (hit.distance + surface.size());

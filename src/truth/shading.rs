@@ -3,7 +3,7 @@
 
 use glam::{DVec3, DVec4};
 
-use crate::plan::RenderOptions;
+use crate::plan::Settings;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Light, Shading};
 
@@ -14,7 +14,7 @@ use crate::scene::{Light, Shading};
 /// headlight, which is at the eye, `E = I |n . l|`. Lambert: `albedo E`. Phong: additionally
 /// [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
 /// `m = 2 (n . l) n - l` the mirrored light.
-pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &RenderOptions) -> DVec3 {
+pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &Settings) -> DVec3 {
     if options.shading == Shading::Unlit {
         return albedo;
     }

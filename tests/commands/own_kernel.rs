@@ -10,7 +10,7 @@ use crate::common;
 use common::command::Folder;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Replacement;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, Report, render};
 use epsplat::low_level::scene::{Kernel, OwnKernel, Scene};
 
@@ -29,14 +29,14 @@ fn ball() -> Scene {
 }
 
 /// A picture of [`ball`] by the ellipse kernel, or by `source` in its place.
-fn drawn(backend: &Backend, options: RenderOptions) -> Result<(Frame, Report), String> {
+fn drawn(backend: &Backend, options: Settings) -> Result<(Frame, Report), String> {
     let camera = sphere_camera(64, Projection::Pinhole);
     render(&ball(), &camera, &options, backend, &()).map_err(|error| error.to_string())
 }
 
-fn with(source: &str) -> RenderOptions {
+fn with(source: &str) -> Settings {
     let sources = vec![Replacement::new("kernel_ellipse.wgsl", source)];
-    RenderOptions { sources, ..RenderOptions::default() }
+    Settings { sources, ..Settings::default() }
 }
 
 /// The largest difference of colours.
@@ -58,10 +58,10 @@ fn the_reference_draws_the_same_kernel() {
         let rho = rho2.sqrt();
         (1.0 - rho).max(0.0).powi(4) * (4.0 * rho + 1.0)
     });
-    let by_closure = RenderOptions { own_kernel: Some(closure), ..RenderOptions::default() };
+    let by_closure = Settings { own_kernel: Some(closure), ..Settings::default() };
     assert!(apart(&drawn(&Backend::Reference, by_closure).unwrap().0, &reference) < 1e-7);
     // Control: the built-in kernel is another.
-    let (built_in, report) = drawn(&device, RenderOptions::default()).unwrap();
+    let (built_in, report) = drawn(&device, Settings::default()).unwrap();
     assert!(apart(&own, &built_in) > 1e-2);
     assert!(report.kernel.is_none());
 }
@@ -77,9 +77,10 @@ fn wrong_weights_are_counted_and_named() {
     assert!(root.sentence().unwrap().contains("4097 NaN"));
     assert!(faults("return 0.5 - rho2;").negative > 1000);
     assert!(faults("return 1.0 / (rho2 - rho2);").infinite > 0);
-    let endless = faults("var w = 1.0; loop { w = w * 0.5; if (w > 2.0) { break; } } return w;");
-    assert_eq!(endless.endless, endless.tried);
-    assert!(endless.sentence().unwrap().contains("a loop does not end"));
+    // On a card such a kernel would not end.
+    let endless = text("var w = 1.0; loop { w = w * 0.5; if (w > 2.0) { break; } } return w;");
+    let refusal = drawn(&device, with(&endless)).err().unwrap();
+    assert!(refusal.contains("has a loop that does not end"), "{refusal}");
 }
 
 #[test]
@@ -88,20 +89,23 @@ fn faults_of_a_text_are_refused_with_their_file_and_line() {
     let device = Backend::gpu(gpu);
     let refusal = |source: &str| drawn(&device, with(source)).err().unwrap();
     let unknown = refusal("// One.\nfn kernel_weight(rho2: f32) -> f32 {\n    return missing(rho2);\n}\n");
-    assert!(unknown.contains("missing"), "{unknown}");
+    assert!(unknown.contains("kernel_ellipse.wgsl:3:12: ") && unknown.contains("missing"), "{unknown}");
+    let arguments =
+        refusal("fn g(a: f32, b: f32) -> f32 { return a; }\nfn kernel_weight(rho2: f32) -> f32 { return g(rho2); }");
+    assert!(arguments.contains("kernel_ellipse.wgsl:2:"), "{arguments}");
     let vector = refusal(&text("return length(vec2<f32>(rho2, 0.0));"));
     assert!(vector.contains("cannot be evaluated in f64") && vector.contains("vectors"), "{vector}");
     // Another file than a kernel's is not evaluated: the compiler's error has its place.
     let sources = vec![Replacement::new("shade_lambert.wgsl", "fn shade() -> f32 {\n    return nothing;\n}\n")];
-    let options = RenderOptions { sources, ..RenderOptions::default() };
+    let options = Settings { sources, ..Settings::default() };
     let shade = drawn(&device, options).err().unwrap();
     assert!(shade.contains("shade_lambert.wgsl:2:12: ") && shade.contains("nothing"), "{shade}");
     let sources = vec![Replacement::new("kernel_cone.wgsl", WENDLAND)];
-    let other = RenderOptions { sources, kernel: Kernel::Constant, ..RenderOptions::default() };
+    let other = Settings { sources, kernel: Kernel::Constant, ..Settings::default() };
     let other = drawn(&device, other).err().unwrap();
     assert!(other.contains("kernel_constant.wgsl and not by kernel_cone.wgsl"), "{other}");
     let sources = vec![Replacement::new("kernel.wgsl", WENDLAND)];
-    let none = drawn(&device, RenderOptions { sources, ..RenderOptions::default() }).err().unwrap();
+    let none = drawn(&device, Settings { sources, ..Settings::default() }).err().unwrap();
     assert!(none.contains("there is no kernel file kernel.wgsl"), "{none}");
 }
 
@@ -118,6 +122,9 @@ fn the_command_line_and_studies_take_files() {
     let output = run(&[&render[..], &["kernel_ellipse.wgsl=nan.wgsl"]].concat());
     assert!(output.status.success(), "{}", said(&output));
     assert!(said(&output).contains("of 4097 weights of the kernel nan.wgsl, 4097 are wrong"), "{}", said(&output));
+    let own = ["kernel_ellipse.wgsl=nan.wgsl", "--json", "nan.wgsl"];
+    let output = run(&[&render[..], &own].concat());
+    assert_eq!(output.status.code(), Some(2), "the kernel would be overwritten: {}", said(&output));
     let output = run(&[&render[..], &["kernel_ellipse.wgsl=none.wgsl"]].concat());
     assert_eq!(output.status.code(), Some(1));
     assert!(said(&output).contains("none.wgsl"), "{}", said(&output));

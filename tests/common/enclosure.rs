@@ -7,7 +7,7 @@
 
 use epsplat::low_level::passes::footprint::footprint;
 use epsplat::low_level::passes::splat::Splat;
-use epsplat::low_level::plan::{Facts, RenderOptions, Sides};
+use epsplat::low_level::plan::{Facts, Settings, Sides};
 use epsplat::low_level::scene::{Camera, Epsilon, Kernel, LowPass, Scene};
 
 use super::UNIT;
@@ -106,7 +106,7 @@ struct Candidate {
 }
 
 /// Computes the enclosure of each pixel of an image.
-pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: &[Splat]) -> Vec<Pixel> {
+pub fn enclose(scene: &Scene, camera: &Camera, options: &Settings, splats: &[Splat]) -> Vec<Pixel> {
     let (width, height) = (camera.width, camera.height);
     let blank = Pixel {
         nearest: Interval { low: f64::INFINITY, high: f64::INFINITY },
@@ -166,7 +166,7 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
 
 fn accumulate(
     (scene, camera): (&Scene, &Camera),
-    options: &RenderOptions,
+    options: &Settings,
     splats: &[Splat],
     candidates: &[Candidate],
     open: &[bool],

@@ -1,7 +1,7 @@
 //! Judges a test's own scene pixel by pixel by the derived bounds of the hard cases.
 
 use epsplat::low_level::hardcases::{HardCase, Verdict};
-use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Settings};
 use epsplat::low_level::render::Backend;
 use epsplat::low_level::scene::{Camera, Scene, Shading};
 
@@ -10,7 +10,7 @@ use epsplat::low_level::scene::{Camera, Scene, Shading};
 pub fn judge(
     name: &str,
     (scene, camera): (&Scene, &Camera),
-    options: RenderOptions,
+    options: Settings,
     covered: (f64, f64),
     backend: &Backend,
 ) {
@@ -20,7 +20,7 @@ pub fn judge(
         bound: "",
         scene: scene.clone(),
         camera: camera.clone(),
-        options: RenderOptions { shading: Shading::Unlit, ..options },
+        options: Settings { shading: Shading::Unlit, ..options },
         covered,
         excused: 0.01,
         expected: Vec::new(),

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::passes::select::{self, Wanted};
 use epsplat::low_level::passes::source::{Page, Source};
-use epsplat::low_level::plan::{Facts, RenderOptions, SceneNeeds};
+use epsplat::low_level::plan::{Facts, SceneNeeds, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Cull, Detail, Hierarchy, Mipmap, Provenance, Scene};
 use epsplat::low_level::surfels::hierarchy;
@@ -48,7 +48,7 @@ pub fn tree(scene: &Scene) -> &Hierarchy {
 }
 
 /// Returns the cut that the twin selects, and the options to draw it with.
-pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
+pub fn cut(scene: &Scene, camera: &Camera, options: &Settings) -> (Cut, Settings) {
     let back = options.cull == Cull::Back;
     let cut = select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(
         scene,
@@ -70,9 +70,9 @@ pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, Ren
         caps,
         ..whole
     };
-    (Cut { scene: cut, facts }, RenderOptions { detail: Detail::FINEST, ..options.clone() })
+    (Cut { scene: cut, facts }, Settings { detail: Detail::FINEST, ..options.clone() })
 }
 
-pub fn frame(source: &dyn Source, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+pub fn frame(source: &dyn Source, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(source, camera, options, backend, &()).unwrap().0
 }

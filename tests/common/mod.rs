@@ -22,7 +22,7 @@ use epsplat::low_level::gpu::Gpu;
 use epsplat::low_level::gpu::layout::{ONE, View};
 use epsplat::low_level::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, MeshNeeds, Oit,
-    Raster, RasterDepth, RenderOptions, SceneNeeds, Sides, Winner, check,
+    Raster, RasterDepth, SceneNeeds, Settings, Sides, Winner, check,
 };
 use epsplat::low_level::scene::facing::POINT_SHAPES;
 use epsplat::low_level::scene::{Join, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
@@ -345,7 +345,7 @@ const SAMPLED: Samples = Samples { across: 2, down: 4 };
 
 fn base_needs() -> Vec<SceneNeeds> {
     let (scene, camera) = scenes::stack(1, 1.0);
-    let plain = SceneNeeds::of_picture(&Facts::of(&scene), &camera, &RenderOptions::default());
+    let plain = SceneNeeds::of_picture(&Facts::of(&scene), &camera, &Settings::default());
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use epsplat::io::ply::{self, Levels};
 use epsplat::io::{Input, Points};
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::taken;
 use epsplat::low_level::scene::{Camera, Colors, Detail, Lens, Shading};
 use epsplat::low_level::surfels::{build, hierarchy};
@@ -90,7 +90,7 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     ) else {
         return Ok(whole);
     };
-    let options = RenderOptions { detail: Detail::Pixels(3.0), ..render::shaded(Shading::Unlit) };
+    let options = Settings { detail: Detail::Pixels(3.0), ..render::shaded(Shading::Unlit) };
     match taken(&levels, &[(&camera, &options)], |_| Ok(()), &()) {
         Ok((scene, _)) if scene.surfels.len() < 2000 => render::draw(&scene, &camera, &options),
         Ok(_) => Ok(whole),

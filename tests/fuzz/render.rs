@@ -4,7 +4,7 @@ use super::Outcome;
 use super::session::sentence;
 use epsplat::io::{Points, ReadOptions};
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian};
 use epsplat::low_level::surfels::{LARGEST_COORDINATE, build};
@@ -92,13 +92,13 @@ fn check_lengths(points: &Points) -> Result<(), String> {
 }
 
 /// The default options with this shading.
-pub fn shaded(shading: Shading) -> RenderOptions {
-    RenderOptions { shading, ..RenderOptions::default() }
+pub fn shaded(shading: Shading) -> Settings {
+    Settings { shading, ..Settings::default() }
 }
 
 /// The options that Gaussians are drawn with.
-fn gaussians() -> RenderOptions {
-    RenderOptions {
+fn gaussians() -> Settings {
+    Settings {
         kernel: gaussian::KERNEL,
         low_pass: LowPass::Gaussians,
         composite: Composite::Gaussians,
@@ -107,9 +107,9 @@ fn gaussians() -> RenderOptions {
 }
 
 /// Draws `scene` with the reference and checks every pixel of every map.
-pub fn draw(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Outcome, String> {
+pub fn draw(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Outcome, String> {
     let maps = Maps::ON_DEVICE.and(&[Map::Decision]);
-    let options = RenderOptions { maps, ..options.clone() };
+    let options = Settings { maps, ..options.clone() };
     let (frame, _) = render(scene, camera, &options, &Backend::Reference, &())
         .map_err(|error| format!("the scene cannot be drawn: {error}"))?;
     check(&frame).map(|()| Outcome::Drawn)

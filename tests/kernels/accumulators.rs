@@ -15,7 +15,7 @@ use epsplat::low_level::gpu::layout::View;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::hardcases::precision::E;
 use epsplat::low_level::passes::project::reference_all;
-use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Facts, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Facts, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::{DVec3, Vec3};
@@ -30,7 +30,7 @@ struct Case {
     name: String,
     scene: Scene,
     camera: Camera,
-    options: RenderOptions,
+    options: Settings,
     reference: Frame,
     enclosure: Vec<Pixel>,
     view: View,
@@ -48,7 +48,7 @@ fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
         scene.surfels.push(Surfel::disk(back * (-1.3 - 0.02 * f32::from(k)), back + tilt, 4.0));
         codes.push([90 * k, 255 - 100 * k, 30, 255]);
     }
-    let options = RenderOptions {
+    let options = Settings {
         epsilon,
         kernel: kernel.parse().unwrap(),
         shading: Shading::Unlit,
@@ -140,7 +140,7 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
 
 /// Renders with the accumulator `row`, and fails if the frame fell back to another one.
 fn run(case: &Case, row: &AccumulatorRow, backend: &Backend) -> Findings {
-    let options = RenderOptions { accumulator: row.of, ..case.options.clone() };
+    let options = Settings { accumulator: row.of, ..case.options.clone() };
     let (frame, report) = render(&case.scene, &case.camera, &options, backend, &()).unwrap();
     assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{}", case.name);
     compare(case, row, &frame)
@@ -217,12 +217,8 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
     let Some(gpu) = common::gpu() else { return };
     let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
-    let with = |accumulator| RenderOptions {
-        kernel: Kernel::Constant,
-        maps: Maps::ON_DEVICE,
-        accumulator,
-        ..Default::default()
-    };
+    let with =
+        |accumulator| Settings { kernel: Kernel::Constant, maps: Maps::ON_DEVICE, accumulator, ..Default::default() };
     let exact = Accumulator::Fixed;
     // 255 full weights of 2^24 units fit in 32 bits, 256 do not.
     for (disks, fits) in [(200, true), (255, true), (256, false), (300, false), (100_000, false)] {
@@ -271,11 +267,11 @@ fn a_view_whose_sums_fit_is_rendered_as_asked_after_one_whose_do_not() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let (scene, camera) = stack(300, 0.3);
-    let options = RenderOptions {
+    let options = Settings {
         kernel: Kernel::Constant,
         maps: Maps::ON_DEVICE,
         accumulator: Accumulator::Fixed32,
-        ..RenderOptions::default()
+        ..Settings::default()
     };
     let aside = Camera { eye: DVec3::new(15.0, 0.0, 0.0), near: 10.0, ..camera.clone() };
     let (alone, _) = render(&scene, &aside, &options, &backend, &()).unwrap();
@@ -294,7 +290,7 @@ fn a_scene_without_surfels_is_its_background() {
     let (full, camera) = stack(1, 0.3);
     let empty = Scene { surfels: vec![], colors: Colors::Constant([1.0; 4]), ..full };
     for organisation in [Organisation::Auto, Organisation::Scatter, Organisation::Tile] {
-        let options = RenderOptions { organisation, background: [0.1, 0.2, 0.3, 1.0], ..RenderOptions::default() };
+        let options = Settings { organisation, background: [0.1, 0.2, 0.3, 1.0], ..Settings::default() };
         let (frame, report) = render(&empty, &camera, &options, &backend, &()).unwrap();
         assert!(frame.color.iter().all(|color| *color == options.background), "{organisation:?}");
         assert_eq!((report.surfels, report.splats_drawn), (0, 0));

@@ -12,7 +12,7 @@ use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::gpu::layout::Splat;
 use epsplat::low_level::hardcases::cases;
 use epsplat::low_level::inspect::stages;
-use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Optimisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow, Optimisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{
     Camera, Colors, Epsilon, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up,
@@ -22,8 +22,8 @@ use glam::{DVec3, Vec3};
 /// Half a unit in the last place of 1 in f32.
 const E: f64 = 1.0 / 16_777_216.0;
 
-fn options(accumulator: Accumulator) -> RenderOptions {
-    RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
+fn options(accumulator: Accumulator) -> Settings {
+    Settings { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
 }
 
 /// All scenes for `fixed`; for other accumulators the first (8-bit colours) and the last (f32
@@ -37,7 +37,7 @@ fn scenes(row: &AccumulatorRow) -> Vec<(Scene, Camera)> {
 }
 
 /// Renders, and fails if the frame fell back to another accumulator.
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
     assert_eq!((report.accumulator, report.overflows), (options.accumulator.name(), 0));
     frame
@@ -64,7 +64,7 @@ fn order_and_repetition_do_not_change_a_bit() {
             assert!(bits(&frame(&scene, &camera, &options, &backend)) == first, "{name}: a second run differs");
             // Without `Order` the device stores surfels in the scene's order; otherwise it sorts
             // them.
-            let given = RenderOptions { without: vec![Optimisation::Order], ..options.clone() };
+            let given = Settings { without: vec![Optimisation::Order], ..options.clone() };
             for (seed, options) in [(5, &given), (6, &given), (7, &options)] {
                 let other = frame(&shuffled(&scene, seed), &camera, options, &backend);
                 assert!(bits(&other) == first, "{name}: order {seed} differs");
@@ -118,7 +118,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let own = options(Accumulator::Fixed);
     let crowded = crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, own.clone()));
     let hard = cases().unwrap().into_iter().map(|case| {
-        let options = RenderOptions { maps: case.maps(), ..case.options };
+        let options = Settings { maps: case.maps(), ..case.options };
         (case.name, case.scene, case.camera, options)
     });
     let mut seen = [false; 2];
@@ -128,7 +128,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     });
     let mut noticed = [false; 2];
     for (name, scene, camera, options) in crowded.chain(hard) {
-        let options = RenderOptions { accumulator: own.accumulator, ..options };
+        let options = Settings { accumulator: own.accumulator, ..options };
         let [(one, report), (other, plain)] =
             [&with, &without].map(|backend| render(&scene, &camera, &options, backend, &()).unwrap());
         assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));
@@ -201,7 +201,7 @@ fn batches_left_out_do_not_change_a_bit() {
     ];
     for (gpu, low_passes) in runs {
         let mut backend = Backend::gpu(gpu);
-        let mut frame = |sources: Sources, scene: &Scene, camera: &Camera, options: &RenderOptions| {
+        let mut frame = |sources: Sources, scene: &Scene, camera: &Camera, options: &Settings| {
             if let Backend::Gpu { sources: kept, .. } = &mut backend {
                 *kept = sources;
             }
@@ -209,7 +209,7 @@ fn batches_left_out_do_not_change_a_bit() {
         };
         for low_pass in low_passes {
             for (name, camera, most) in &views {
-                let options = RenderOptions { low_pass, ..options(Accumulator::Fixed) };
+                let options = Settings { low_pass, ..options(Accumulator::Fixed) };
                 let (own, report) = frame(Sources::default(), &scene, camera, &options);
                 let (all, of_all) = frame(shown(&every), &scene, camera, &options);
                 assert!(bits(&own) == bits(&all), "{name}: skipping batches changes bits");
@@ -220,7 +220,7 @@ fn batches_left_out_do_not_change_a_bit() {
                 assert!(drawn[0] <= drawn[1], "{name}: {drawn:?}");
             }
             let (_, camera, _) = &views[0];
-            let options = RenderOptions { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(Accumulator::Fixed) };
+            let options = Settings { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(Accumulator::Fixed) };
             let (own, _) = frame(Sources::default(), &without_sides, camera, &options);
             let (less, _) = frame(wrong.clone(), &without_sides, camera, &options);
             assert!(bits(&own) != bits(&less), "wrongly skipped batches are not noticed");
@@ -292,7 +292,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
     let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
     let (scene, camera) = pile();
-    let with = |accumulator| RenderOptions {
+    let with = |accumulator| Settings {
         shading: Shading::Unlit,
         epsilon: Epsilon::Absolute(100.0),
         kernel: Kernel::Gaussian { sigma: 0.5 },

@@ -6,7 +6,7 @@ use crate::common;
 
 use common::judged::judge;
 use epsplat::io::Points;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Epsilon, Lens, Scene, Up};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -34,7 +34,7 @@ fn view(scale: f64, shift: DVec3) -> Camera {
 
 fn check(name: &str, scene: &Scene, camera: &Camera, epsilon: Epsilon) {
     let Some(gpu) = common::gpu() else { return };
-    let options = RenderOptions { epsilon, ..RenderOptions::default() };
+    let options = Settings { epsilon, ..Settings::default() };
     judge(name, (scene, camera), options, (0.3, 1.0), &Backend::gpu(gpu));
 }
 
@@ -111,7 +111,7 @@ fn disks_larger_than_the_box_of_their_centres_are_the_scene() {
         let (scene, preparation) = of(width, 1.0).unwrap();
         assert_eq!((scene.largest_radius(), preparation.limited_radii), (1.0, 0), "{width}");
         let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
-        let (frame, _) = render(&scene, &camera, &RenderOptions::default(), &Backend::Reference, &()).unwrap();
+        let (frame, _) = render(&scene, &camera, &Settings::default(), &Backend::Reference, &()).unwrap();
         let covered = |pixel: usize| frame.color[pixel][3] > 0.0;
         assert!((0..64).all(|k| !covered(k) && !covered(63 * 64 + k) && !covered(64 * k) && !covered(64 * k + 63)));
         assert!((0..64 * 64).filter(|pixel| covered(*pixel)).count() > 500, "{width}");

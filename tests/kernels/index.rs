@@ -13,7 +13,7 @@ use epsplat::io::{self, Points};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::passes::index::NOTHING;
-use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Colors, Kernel, LowPass, Map, Maps, Projection, Scene};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -21,8 +21,8 @@ use epsplat::low_level::surfels::build;
 
 const WANTED: Maps = Maps::of(&[Map::Index, Map::Depth]);
 
-fn options() -> RenderOptions {
-    RenderOptions { maps: WANTED, ..RenderOptions::default() }
+fn options() -> Settings {
+    Settings { maps: WANTED, ..Settings::default() }
 }
 
 /// Points on a sphere, each with its own colour, with radii that reach several neighbours.
@@ -54,7 +54,7 @@ fn scene(points: &Points) -> Scene {
     build(vec![points.clone()], &()).unwrap().0
 }
 
-fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, options: &Settings, backend: &Backend) -> Frame {
     render(scene, &sphere_camera(96, Projection::Pinhole), options, backend, &()).unwrap().0
 }
 
@@ -76,7 +76,7 @@ fn the_device_names_whom_the_twin_names() {
     for (count, low_pass) in [(300, LowPass::None), (3000, LowPass::None), (3000, LowPass::Ewa), (30_000, LowPass::Max)]
     {
         let scene = scene(&points(count));
-        let options = RenderOptions { low_pass, ..options() };
+        let options = Settings { low_pass, ..options() };
         let twin = frame(&scene, &options, &Backend::Reference);
         let device = frame(&scene, &options, &backend);
         let (differ, covered) = different(&device, &twin);
@@ -110,10 +110,10 @@ fn every_organisation_page_and_band_names_the_same() {
     let all = |gpu: Gpu| -> Vec<Frame> {
         let backend = Backend::gpu(gpu);
         let organisations = [Organisation::Auto, Organisation::Scatter, Organisation::Tile];
-        let organised = organisations.map(|organisation| RenderOptions { organisation, ..options() });
+        let organised = organisations.map(|organisation| Settings { organisation, ..options() });
         let without = [Optimisation::Culling, Optimisation::Order, Optimisation::Gathering];
-        let without = without.map(|left_out| RenderOptions { without: vec![left_out], ..options() });
-        let background = RenderOptions { background: [0.1, 0.2, 0.3, 1.0], ..options() };
+        let without = without.map(|left_out| Settings { without: vec![left_out], ..options() });
+        let background = Settings { background: [0.1, 0.2, 0.3, 1.0], ..options() };
         let all = organised.into_iter().chain(without).chain([background]);
         all.map(|options| frame(&scene, &options, &backend)).collect()
     };
@@ -129,7 +129,7 @@ fn ties_go_by_what_surfels_are_and_not_by_where_they_stood() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     // With this kernel every weight is 1, so every pixel is a tie.
-    let options = RenderOptions { kernel: Kernel::Constant, ..options() };
+    let options = Settings { kernel: Kernel::Constant, ..options() };
     let given = points(3000);
     let mut order: Vec<usize> = (0..3000).collect();
     let first = frame(&scene(&given), &options, &backend);

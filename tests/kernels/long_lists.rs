@@ -12,7 +12,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::metrics::DECISION_MARGIN;
 use epsplat::low_level::passes::long_lists::most_at_once;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
@@ -33,20 +33,20 @@ fn pile(deep: usize) -> Scene {
     Scene { colors: Colors::Linear((0..deep).map(color).collect()), surfels, oriented: true, ..Scene::default() }
 }
 
-fn of(composite: Composite) -> RenderOptions {
+fn of(composite: Composite) -> Settings {
     let maps = [Map::Transmittance, Map::Layers, Map::Surfaces, Map::Tail];
     let maps = if composite == Composite::Layers(3) { &maps[..] } else { &maps[..3] };
-    RenderOptions {
+    Settings {
         composite,
         shading: Shading::Unlit,
         opacity: 0.002,
         epsilon: Epsilon::Absolute(0.01),
         maps: Maps::of(maps),
-        ..RenderOptions::default()
+        ..Settings::default()
     }
 }
 
-fn in_rounds(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
+fn in_rounds(scene: &Scene, options: &Settings, backend: &Backend) -> Frame {
     let (frame, report) = render(scene, &front(8), options, backend, &()).unwrap();
     let on_device = matches!(backend, Backend::Gpu { .. });
     assert_eq!(report.needs.contains(&"long-lists"), on_device, "{:?}", report.needs);
@@ -82,9 +82,8 @@ fn the_twin_composites_alike() {
     for composite in WAYS {
         for samples in [Samples::ONE, "4".parse().unwrap()] {
             let one = samples == Samples::ONE;
-            let own =
-                RenderOptions { samples, maps: if one { of(composite).maps } else { Maps::NONE }, ..of(composite) };
-            let decisions = RenderOptions { maps: Maps::of(&[Map::Decision]), ..own.clone() };
+            let own = Settings { samples, maps: if one { of(composite).maps } else { Maps::NONE }, ..of(composite) };
+            let decisions = Settings { maps: Maps::of(&[Map::Decision]), ..own.clone() };
             let decided = in_rounds(&scene, &decisions, &Backend::Reference);
             let decided = decided.map(Map::Decision).unwrap();
             let [device, twin] = [&backend, &Backend::Reference].map(|backend| in_rounds(&scene, &own, backend));

@@ -8,7 +8,7 @@ use epsplat::io::Points;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::metrics::{Reconstruction, compare, reconstruction};
 use epsplat::low_level::passes::lowpass::RADIUS;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -30,12 +30,12 @@ fn surfels(shape: Shape, count: u64, radius: f32) -> Scene {
     build(vec![points], &()).unwrap().0
 }
 
-fn options(low_pass: LowPass) -> RenderOptions {
-    RenderOptions { low_pass, shading: Shading::Unlit, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
+fn options(low_pass: LowPass) -> Settings {
+    Settings { low_pass, shading: Shading::Unlit, maps: Maps::ON_DEVICE, ..Settings::default() }
 }
 
 /// The error of the reference's image against 16 rays per pixel.
-fn against_rays(shape: Shape, scene: &Scene, camera: &Camera, options: &RenderOptions) -> Reconstruction {
+fn against_rays(shape: Shape, scene: &Scene, camera: &Camera, options: &Settings) -> Reconstruction {
     let (frame, _) = render(scene, camera, options, &Backend::Reference, &()).unwrap();
     let truth = Truth::cast(&Surface::Analytic(shape), camera, options, DEFAULT_GRID, &()).unwrap();
     reconstruction(&frame, &truth).unwrap()
@@ -46,12 +46,12 @@ fn against_rays(shape: Shape, scene: &Scene, camera: &Camera, options: &RenderOp
 fn a_surface_of_small_disks_has_no_holes() {
     let scene = surfels(Shape::Sphere, 20_000, 0.4);
     let camera = Camera::framing((96, 96), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
-    let holes = |options: &RenderOptions| against_rays(Shape::Sphere, &scene, &camera, options).hole_rate.unwrap();
+    let holes = |options: &Settings| against_rays(Shape::Sphere, &scene, &camera, options).hole_rate.unwrap();
     assert!(holes(&options(LowPass::None)) > 0.1, "{}", holes(&options(LowPass::None)));
     for kernel in ["ellipse:6,3", "gaussian", "hat", "constant"] {
         for low_pass in [LowPass::Max, LowPass::Ewa] {
             let kernel: Kernel = kernel.parse().unwrap();
-            let filtered = RenderOptions { kernel, ..options(low_pass) };
+            let filtered = Settings { kernel, ..options(low_pass) };
             assert_eq!(holes(&filtered), 0.0, "{kernel:?}, {low_pass:?}");
         }
     }
@@ -140,7 +140,7 @@ fn the_device_filters_as_the_reference_does() {
             for lens in [Lens::Fov(45.0), Lens::OrthographicHeight(3.0)] {
                 let near = Camera::default_near(scene);
                 let camera = Camera::framing((120, 90), lens, scene, near).unwrap();
-                let with_decision = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..options(low_pass) };
+                let with_decision = Settings { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..options(low_pass) };
                 let (reference, _) = render(scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
                 let (frame, _) = render(scene, &camera, &options(low_pass), backend, &()).unwrap();
                 let comparison = compare(&frame, &reference).unwrap();

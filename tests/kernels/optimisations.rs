@@ -9,12 +9,12 @@ use common::bits;
 use common::scenes::{crowded, sphere, sphere_camera};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Optimisation, RenderOptions};
+use epsplat::low_level::plan::{Optimisation, Settings};
 use epsplat::low_level::render::{Backend, Report, render};
 use epsplat::low_level::scene::{Camera, Epsilon, Maps, Projection, Scene};
 
-fn options(without: &[Optimisation]) -> RenderOptions {
-    RenderOptions {
+fn options(without: &[Optimisation]) -> Settings {
+    Settings {
         maps: Maps::ON_DEVICE,
         epsilon: Epsilon::Relative(0.02),
         without: without.to_vec(),

@@ -11,7 +11,7 @@ use epsplat::low_level::passes::fragments;
 use epsplat::low_level::plan::known::Listed;
 use epsplat::low_level::plan::steps::{Look, Over, Stage, Step};
 use epsplat::low_level::plan::{
-    Accumulator, Band, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels,
+    Accumulator, Band, Facts, Known, Optimisation, Organisation, Plan, Raster, Settings, page_surfels,
 };
 use epsplat::low_level::render::sequence::steps;
 use epsplat::low_level::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
@@ -27,7 +27,7 @@ fn software() -> AdapterDescription {
     }
 }
 
-fn planned(scene: &Scene, size: u32, adapter: &AdapterDescription, options: &RenderOptions, known: &Known) -> Plan {
+fn planned(scene: &Scene, size: u32, adapter: &AdapterDescription, options: &Settings, known: &Known) -> Plan {
     Plan::of(&Facts::of(scene), adapter, &camera(size), options, known).unwrap()
 }
 
@@ -90,7 +90,7 @@ fn scattered() -> [&'static str; 8] {
 #[test]
 fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
     let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
-    let first = planned(&scene, 256, &core, &RenderOptions::default(), &Known::default());
+    let first = planned(&scene, 256, &core, &Settings::default(), &Known::default());
     assert_eq!(
         lines(&first),
         [
@@ -108,10 +108,10 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
     );
     // The first frame found no large splats.
     let known = Known { large: Some(false), ..Known::default() };
-    assert_eq!(lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known)), scattered());
+    assert_eq!(lines(&planned(&scene, 256, &core, &Settings::default(), &known)), scattered());
     // The first frame found some, and the lists have room for 100 entries.
     let known = Known { large: Some(true), entries: [Some(100), None], ..Known::default() };
-    let second = lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known));
+    let second = lines(&planned(&scene, 256, &core, &Settings::default(), &known));
     let listed: Vec<_> = second.iter().filter(|line| line.contains("tile_") || line.starts_with("bin")).collect();
     assert_eq!((listed.len(), second.len()), (3, 9), "{second:?}");
     assert!(!second.iter().any(|line| line.contains("look") || line.contains("_large/Large")), "{second:?}");
@@ -121,9 +121,9 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
 fn other_accumulators_and_scatter_have_no_tiles() {
     let (scene, software) = (sphere(1000, 1.5), software());
     let options = [
-        RenderOptions { accumulator: Accumulator::Fixed32, ..RenderOptions::default() },
-        RenderOptions { accumulator: Accumulator::Fixed64, ..RenderOptions::default() },
-        RenderOptions { organisation: Organisation::Scatter, low_pass: LowPass::Ewa, ..RenderOptions::default() },
+        Settings { accumulator: Accumulator::Fixed32, ..Settings::default() },
+        Settings { accumulator: Accumulator::Fixed64, ..Settings::default() },
+        Settings { organisation: Organisation::Scatter, low_pass: LowPass::Ewa, ..Settings::default() },
     ];
     for options in options {
         assert_eq!(lines(&planned(&scene, 256, &software, &options, &Known::default())), scattered());
@@ -133,7 +133,7 @@ fn other_accumulators_and_scatter_have_no_tiles() {
 #[test]
 fn many_surfels_are_drawn_near_ones_first() {
     let (scene, core) = (sphere(20_000, 1.5), AdapterDescription::core());
-    let options = RenderOptions { organisation: Organisation::Scatter, ..RenderOptions::default() };
+    let options = Settings { organisation: Organisation::Scatter, ..Settings::default() };
     let culled = planned(&scene, 128, &core, &options, &Known::default());
     assert_eq!(
         lines(&culled)[..11],
@@ -155,13 +155,13 @@ fn many_surfels_are_drawn_near_ones_first() {
     assert!(!lines(&planned(&scene, 128, &core, &options, &known)).iter().any(|line| line.starts_with("look")));
     // Culling does not pay with more than six pixels per surfel.
     assert!(!planned(&scene, 512, &core, &options, &Known::default()).needs.cull);
-    let without = RenderOptions { without: vec![Optimisation::Culling], ..options };
+    let without = Settings { without: vec![Optimisation::Culling], ..options };
     assert_eq!(lines(&planned(&scene, 128, &core, &without, &Known::default())), scattered());
 }
 
 #[test]
 fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
-    let (scene, options) = (sphere(1000, 1.5), RenderOptions::default());
+    let (scene, options) = (sphere(1000, 1.5), Settings::default());
     let known = Known { touched_tiles: 3.0, ..Known::default() };
     let gathered = planned(&scene, 256, &software(), &options, &known);
     assert!(gathered.needs.gather && gathered.sum_words == 0);
@@ -182,7 +182,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
     assert!(!planned(&scene, 256, &software(), &options, &tiny).needs.gather);
     assert!(!planned(&scene, 256, &software(), &options, &crowded).needs.gather);
     assert!(!planned(&scene, 256, &card, &options, &known).needs.gather);
-    let tile = RenderOptions { organisation: Organisation::Tile, ..options };
+    let tile = Settings { organisation: Organisation::Tile, ..options };
     assert!(planned(&scene, 256, &card, &tile, &tiny).needs.gather);
 }
 
@@ -190,8 +190,8 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
 fn small_buffers_make_bands_and_pages() {
     let scene = sphere(3000, 1.5);
     let small = AdapterDescription { max_storage_buffer_binding_size: 100_000, ..AdapterDescription::core() };
-    let culled = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Count]), ..Default::default() };
-    let options = RenderOptions { without: vec![Optimisation::Culling], ..culled.clone() };
+    let culled = Settings { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Count]), ..Default::default() };
+    let options = Settings { without: vec![Optimisation::Culling], ..culled.clone() };
     let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
     let plan = planned(&scene, 64, &small, &options, &known);
     assert_eq!((plan.bands.len(), plan.pages), (4, 3000_u64.div_ceil(page_surfels(&small, &plan.needs)) as usize));
@@ -213,9 +213,7 @@ fn small_buffers_make_bands_and_pages() {
     let large = AdapterDescription { max_buffer_size: 1 << 30, ..large };
     let bands_of = |kind| {
         let adapter = AdapterDescription { kind, ..large.clone() };
-        planned(&scene, 4096, &adapter, &RenderOptions { shading: Shading::Unlit, ..Default::default() }, &known)
-            .bands
-            .len()
+        planned(&scene, 4096, &adapter, &Settings { shading: Shading::Unlit, ..Default::default() }, &known).bands.len()
     };
     assert_eq!((bands_of("discrete"), bands_of("software")), (1, 2));
     // One row exceeds a buffer.
@@ -229,10 +227,10 @@ fn copies_are_drawn_once_and_without_tiles() {
     let mut scene = sphere(10, 1.5);
     scene.surfels = vec![scene.surfels[0]; 5000];
     scene.colors = Colors::Constant([1.0; 4]);
-    let plan = planned(&scene, 64, &software(), &RenderOptions::default(), &Known::default());
+    let plan = planned(&scene, 64, &software(), &Settings::default(), &Known::default());
     assert!(plan.needs.copies && !plan.needs.tiles && !plan.needs.cull && !plan.needs.atomics_u64);
     assert_eq!(lines(&plan), scattered());
-    let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
+    let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
     assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.copies);
 }
 
@@ -240,7 +238,7 @@ fn copies_are_drawn_once_and_without_tiles() {
 #[test]
 fn what_shows_through_is_listed() {
     let scene = sphere(1000, 1.5);
-    let options = RenderOptions { composite: "layers".parse().unwrap(), opacity: 0.5, ..RenderOptions::default() };
+    let options = Settings { composite: "layers".parse().unwrap(), opacity: 0.5, ..Settings::default() };
     let plan = planned(&scene, 64, &software(), &options, &Known::default());
     assert_eq!(
         lines(&plan),
@@ -261,8 +259,8 @@ fn what_shows_through_is_listed() {
     let cuts = vec![Band::of(64, 0, 40), Band::of(64, 40, 24)];
     let cut = planned(&scene, 64, &software(), &options, &Known { cuts: Some(cuts.clone()), ..Known::default() });
     assert_eq!((cut.bands, cut.pages), (cuts, 1));
-    let opaque = RenderOptions { opacity: 1.0, ..options };
-    let plain = RenderOptions::default();
+    let opaque = Settings { opacity: 1.0, ..options };
+    let plain = Settings::default();
     let [opaque, plain] = [opaque, plain].map(|options| planned(&scene, 64, &software(), &options, &Known::default()));
     assert_eq!(opaque.needs, plain.needs);
 }
@@ -270,7 +268,7 @@ fn what_shows_through_is_listed() {
 /// A band with too many fragments is cut before the row that would exceed the limit.
 #[test]
 fn bands_are_cut_by_their_fragments() {
-    let options = RenderOptions { composite: "sorted".parse().unwrap(), opacity: 0.5, ..RenderOptions::default() };
+    let options = Settings { composite: "sorted".parse().unwrap(), opacity: 0.5, ..Settings::default() };
     let plan = planned(&sphere(1000, 1.5), 8, &software(), &options, &Known::default());
     let of = |rows: [u64; 8], most| {
         let starts: Vec<u64> = (0..=8).map(|row| rows[..row].iter().sum()).collect();
@@ -284,7 +282,7 @@ fn bands_are_cut_by_their_fragments() {
     assert_eq!(of([0, 5, 0, 0, 5, 5, 0, 1], 5), Some(vec![(0, 4), (4, 1), (5, 2), (7, 1)]));
     assert_eq!(of([0, 0, 0, 6, 0, 0, 0, 0], 5), None, "a band has at least one row");
     // Bands contain whole pixels of 2 x 2 samples.
-    let options = RenderOptions { samples: "4".parse().unwrap(), ..options };
+    let options = Settings { samples: "4".parse().unwrap(), ..options };
     let plan = planned(&sphere(1000, 1.5), 8, &software(), &options, &Known::default());
     let bands = fragments::cut(&plan, 0, &[0, 1, 2, 3, 4, 5, 6, 7, 8], 3).unwrap();
     assert!(bands.iter().all(|band| band.rows == 2), "{bands:?}");
@@ -293,7 +291,7 @@ fn bands_are_cut_by_their_fragments() {
 #[test]
 fn the_rasteriser_projects_draws_and_resolves() {
     let scene = sphere(1000, 1.5);
-    let options = RenderOptions { raster: Some(Raster::default()), ..RenderOptions::default() };
+    let options = Settings { raster: Some(Raster::default()), ..Settings::default() };
     let plan = planned(&scene, 64, &AdapterDescription::core(), &options, &Known::default());
     assert_eq!(lines(&plan), [PROJECT, "draw", RESOLVE, "read back 0"]);
     assert!(plan.needs.triangles && plan.sum_words == 0);
@@ -301,7 +299,7 @@ fn the_rasteriser_projects_draws_and_resolves() {
 
 #[test]
 fn sums_that_wrapped_are_fixed_from_then_on() {
-    let options = RenderOptions { accumulator: Accumulator::Fixed32, ..RenderOptions::default() };
+    let options = Settings { accumulator: Accumulator::Fixed32, ..Settings::default() };
     let of = |known: &Known| planned(&sphere(1000, 1.5), 64, &software(), &options, known).needs;
     assert_eq!(of(&Known::default()).accumulator, Accumulator::Fixed32);
     let known = Known { overflows: 3, ..Known::default() };
@@ -311,29 +309,29 @@ fn sums_that_wrapped_are_fixed_from_then_on() {
 #[test]
 fn what_does_not_go_together_is_refused_by_one_rule() {
     let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
-    let refused = |options: RenderOptions| {
+    let refused = |options: Settings| {
         let known = Known::default();
         let facts = Facts::of(&scene);
         let error = Plan::of(&facts, &core, &camera(64), &options, &known).unwrap_err();
         error.to_string()
     };
     for (accumulator, what) in [(Accumulator::Packed64, "64-bit atomics"), (Accumulator::Float, "f32 atomic add")] {
-        assert!(refused(RenderOptions { accumulator, ..RenderOptions::default() }).contains(what));
+        assert!(refused(Settings { accumulator, ..Settings::default() }).contains(what));
     }
     let raster = Raster { format: "rgba32float".parse().unwrap(), ..Raster::default() };
-    assert!(refused(RenderOptions { raster: Some(raster), ..RenderOptions::default() }).contains("32-bit floats"));
+    assert!(refused(Settings { raster: Some(raster), ..Settings::default() }).contains("32-bit floats"));
     let check =
-        |options: RenderOptions| epsplat::low_level::plan::check::options(&options, false).map_err(|e| e.to_string());
-    assert_eq!(check(RenderOptions::default()), Ok(()));
-    let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
+        |options: Settings| epsplat::low_level::plan::check::options(&options, false).map_err(|e| e.to_string());
+    assert_eq!(check(Settings::default()), Ok(()));
+    let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
     assert_eq!(check(tile.clone()), Ok(()));
-    let other = RenderOptions { accumulator: Accumulator::Cas, ..tile };
+    let other = Settings { accumulator: Accumulator::Cas, ..tile };
     let of_study = epsplat::low_level::plan::check::by_tiles(&other).unwrap_err().to_string();
     assert!(check(other) == Ok(()) && of_study.contains("accumulator fixed"), "{of_study}");
-    let phong = RenderOptions { shading: Shading::Phong, shininess: 1e6, ..RenderOptions::default() };
+    let phong = Settings { shading: Shading::Phong, shininess: 1e6, ..Settings::default() };
     assert!(check(phong).unwrap_err().contains("shininess"));
     let maps = Maps::of(&[Map::Decision]);
-    assert!(check(RenderOptions { maps, ..RenderOptions::default() }).unwrap_err().contains("reference"));
+    assert!(check(Settings { maps, ..Settings::default() }).unwrap_err().contains("reference"));
 }
 
 #[test]

@@ -15,8 +15,7 @@ use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::passes;
 use epsplat::low_level::plan::pass::Making;
 use epsplat::low_level::plan::{
-    Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, RenderOptions, SceneNeeds, Winner,
-    color_channels,
+    Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, SceneNeeds, Settings, Winner, color_channels,
 };
 use epsplat::low_level::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
 use naga::AddressSpace;
@@ -408,7 +407,7 @@ fn host_and_kernels_agree_about_overrides() {
         assert_eq!(kernel.shape(), needs.kernel);
         let facing = needs.facing.map(|shape| Facing { shape, pixels: Facing::LIMITS });
         let outline = needs.outline.then(|| Outline::of_sides(5).unwrap());
-        let options = RenderOptions { kernel, facing, outline, ..RenderOptions::default() };
+        let options = Settings { kernel, facing, outline, ..Settings::default() };
         let constants = passes::constants(&Making { needs, options: &options, surfels: 1000 });
         assert!(constants.iter().all(|(_, value)| value.is_finite()));
         let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();

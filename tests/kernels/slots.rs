@@ -8,7 +8,7 @@ use crate::common;
 use common::bits;
 use common::scenes::sphere;
 use epsplat::low_level::gpu::Sources;
-use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Camera, Epsilon, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::DVec3;
@@ -46,19 +46,19 @@ fn views() -> Vec<Camera> {
     ]
 }
 
-fn options() -> Vec<RenderOptions> {
+fn options() -> Vec<Settings> {
     // An epsilon that is independent of the large disk; otherwise all surfels would be visible.
-    let plain = RenderOptions { epsilon: Epsilon::Relative(0.01), ..RenderOptions::default() };
-    let lit = RenderOptions { maps: Maps::ON_DEVICE, ..plain.clone() };
+    let plain = Settings { epsilon: Epsilon::Relative(0.01), ..Settings::default() };
+    let lit = Settings { maps: Maps::ON_DEVICE, ..plain.clone() };
     vec![
-        RenderOptions { shading: Shading::Unlit, ..plain },
-        RenderOptions { low_pass: LowPass::Ewa, organisation: Organisation::Scatter, ..lit.clone() },
-        RenderOptions { organisation: Organisation::Tile, ..lit },
+        Settings { shading: Shading::Unlit, ..plain },
+        Settings { low_pass: LowPass::Ewa, organisation: Organisation::Scatter, ..lit.clone() },
+        Settings { organisation: Organisation::Tile, ..lit },
     ]
 }
 
-fn without_culling(options: &RenderOptions) -> RenderOptions {
-    RenderOptions { without: vec![Optimisation::Culling], ..options.clone() }
+fn without_culling(options: &Settings) -> Settings {
+    Settings { without: vec![Optimisation::Culling], ..options.clone() }
 }
 
 /// The first view has too few slots for the second, which is rendered again; later views reuse the
@@ -87,7 +87,7 @@ fn what_is_left_out_takes_no_room() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, backend) = (scene(), Backend::gpu(gpu));
     for options in options() {
-        let room = |options: &RenderOptions, view: &Camera| {
+        let room = |options: &Settings, view: &Camera| {
             let mut renderer = Renderer::new(&scene, options, &backend).unwrap();
             let (_, report) = renderer.frame(view, &()).unwrap();
             (renderer.device_bytes().splats as f64, report.splats_drawn as f64 / scene.surfels.len() as f64)
@@ -111,7 +111,7 @@ fn wrong_slots_are_noticed() {
     // In the third view some far batches are visible.
     let (scene, views) = (scene(), &views()[1..3]);
     let mut backend = Backend::gpu(gpu);
-    let mut image = |sources: Sources, options: &RenderOptions| {
+    let mut image = |sources: Sources, options: &Settings| {
         if let Backend::Gpu { sources: kept, .. } = &mut backend {
             *kept = sources;
         }

@@ -12,7 +12,7 @@ use common::bits;
 use common::scenes::{sphere, sphere_camera};
 use epsplat::low_level::passes::index::NOTHING;
 use epsplat::low_level::passes::source::{Page, Source};
-use epsplat::low_level::plan::{Facts, Optimisation, RenderOptions, SceneNeeds};
+use epsplat::low_level::plan::{Facts, Optimisation, SceneNeeds, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
 
@@ -90,12 +90,12 @@ fn pages_that_are_made_when_they_are_asked_for_draw_what_a_scene_does() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = (sphere(COUNT, 1.5), sphere_camera(96, Projection::Pinhole));
     let made = Made { facts: Facts::of(&scene), one };
-    let options = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Index]), ..RenderOptions::default() };
+    let options = Settings { maps: Maps::ON_DEVICE.and(&[Map::Index]), ..Settings::default() };
     let backend = Backend::gpu(gpu);
     let (expected, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
     for (limit, without) in [(1 << 27, vec![]), (40_000, vec![Optimisation::Culling]), (100_000, vec![])] {
         let small = Backend::gpu(common::gpu().unwrap().with_buffer_limit(limit));
-        let options = RenderOptions { without, ..options.clone() };
+        let options = Settings { without, ..options.clone() };
         let mut renderer = Renderer::new(&made, &options, &small).unwrap();
         for _ in 0..2 {
             let (frame, report) = renderer.frame(&camera, &()).unwrap();
@@ -114,6 +114,6 @@ fn pages_that_are_made_when_they_are_asked_for_draw_what_a_scene_does() {
 fn the_reference_asks_for_a_scene() {
     let made = Made { facts: Facts::of(&sphere(COUNT, 1.5)), one };
     let camera = sphere_camera(8, Projection::Pinhole);
-    let error = render(&made, &camera, &RenderOptions::default(), &Backend::Reference, &()).unwrap_err();
+    let error = render(&made, &camera, &Settings::default(), &Backend::Reference, &()).unwrap_err();
     assert!(error.to_string().contains("in memory"), "{error}");
 }

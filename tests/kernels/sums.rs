@@ -7,22 +7,22 @@ use crate::common;
 use common::bits;
 use common::scenes::{cases, shuffled, sphere, sphere_camera};
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Accumulator, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Optimisation, Organisation, Settings};
 use epsplat::low_level::render::sums::{Sums, resolve, sums};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Epsilon, Light, LowPass, Map, Maps, Projection, Scene, Shading};
 
-fn of(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Sums {
+fn of(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Sums {
     sums(scene, camera, options, gpu, &Sources::default()).unwrap()
 }
 
 /// The default options, and some that store sums differently.
-fn options() -> Vec<RenderOptions> {
-    let plain = RenderOptions { maps: Maps::ON_DEVICE, ..RenderOptions::default() };
+fn options() -> Vec<Settings> {
+    let plain = Settings { maps: Maps::ON_DEVICE, ..Settings::default() };
     vec![
-        RenderOptions { low_pass: LowPass::Ewa, background: [0.2, 0.1, 0.4, 1.0], ..plain.clone() },
-        RenderOptions { organisation: Organisation::Scatter, shading: Shading::Phong, ..plain.clone() },
-        RenderOptions { organisation: Organisation::Tile, maps: Maps::NONE, ..plain.clone() },
+        Settings { low_pass: LowPass::Ewa, background: [0.2, 0.1, 0.4, 1.0], ..plain.clone() },
+        Settings { organisation: Organisation::Scatter, shading: Shading::Phong, ..plain.clone() },
+        Settings { organisation: Organisation::Tile, maps: Maps::NONE, ..plain.clone() },
         plain,
     ]
 }
@@ -82,8 +82,7 @@ fn sums_of_two_parts_add_to_those_of_the_whole() {
         colors: Colors::Srgb8(codes.iter().chain(codes).copied().collect()),
         ..one.clone()
     };
-    let options =
-        RenderOptions { without: vec![Optimisation::Copies], maps: Maps::ON_DEVICE, ..RenderOptions::default() };
+    let options = Settings { without: vec![Optimisation::Copies], maps: Maps::ON_DEVICE, ..Settings::default() };
     let (part, whole) = (of(&one, &camera, &options, &gpu), of(&twice, &camera, &options, &gpu));
     let added = Sums { sums: part.sums.iter().map(|sum| 2 * sum).collect(), ..part.clone() };
     assert!(added == whole && part != whole);
@@ -95,27 +94,26 @@ fn sums_of_two_parts_add_to_those_of_the_whole() {
 fn a_changed_sum_shows_and_sums_of_another_render_are_refused() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = (sphere(2000, 1.5), sphere_camera(96, Projection::Pinhole));
-    let options = RenderOptions::default();
+    let options = Settings::default();
     let taken = of(&scene, &camera, &options, &gpu);
-    let picture =
-        |sums: &Sums, options: &RenderOptions| resolve(sums, &scene, &camera, options, &gpu, &Sources::default());
+    let picture = |sums: &Sums, options: &Settings| resolve(sums, &scene, &camera, options, &gpu, &Sources::default());
     let mut changed = taken.clone();
     let at = changed.sums.iter().position(|sum| *sum > 0).unwrap();
     changed.sums[at] *= 2;
     assert!(bits(&picture(&changed, &options).unwrap()) != bits(&picture(&taken, &options).unwrap()));
     let others = [
-        RenderOptions { low_pass: LowPass::Ewa, ..options.clone() },
-        RenderOptions { maps: Maps::ON_DEVICE, ..options.clone() },
-        RenderOptions { accumulator: Accumulator::Fixed32, ..options.clone() },
-        RenderOptions { maps: Maps::of(&[Map::Index]), ..options.clone() },
-        RenderOptions { epsilon: Epsilon::Absolute(0.5), ..options.clone() },
+        Settings { low_pass: LowPass::Ewa, ..options.clone() },
+        Settings { maps: Maps::ON_DEVICE, ..options.clone() },
+        Settings { accumulator: Accumulator::Fixed32, ..options.clone() },
+        Settings { maps: Maps::of(&[Map::Index]), ..options.clone() },
+        Settings { epsilon: Epsilon::Absolute(0.5), ..options.clone() },
     ];
     for other in others {
         let error = picture(&taken, &other).unwrap_err().to_string();
         assert!(error.contains("sums"), "{error}");
     }
     // Lights affect the picture, not the sums.
-    let dark = RenderOptions { lights: vec![Light::Headlight { intensity: 0.5 }], ..options.clone() };
+    let dark = Settings { lights: vec![Light::Headlight { intensity: 0.5 }], ..options.clone() };
     let [lit, dim] = [&options, &dark].map(|options| picture(&taken, options).unwrap());
     let expected = render(&scene, &camera, &dark, &Backend::gpu(common::gpu().unwrap()), &()).unwrap().0;
     assert!(bits(&dim) == bits(&expected) && bits(&dim) != bits(&lit));

@@ -9,7 +9,7 @@ use common::bits;
 use common::scenes::{cases, crowded, front, painted, sphere, stack};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, Report, render};
 use epsplat::low_level::scene::{
     Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Scene, Shading, Surfel, Up,
@@ -25,15 +25,15 @@ fn on(gpu: Gpu, sources: Sources) -> Backend {
     Backend::Gpu { gpu: Box::new(gpu), sources }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> (Frame, Report) {
     let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
     assert!(report.needs.contains(&"tiles"));
     (frame, report)
 }
 
 /// Scenes with splats of all sizes, and options that cover each variant of the kernels.
-fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
-    let plain = RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() };
+fn drawn() -> Vec<(&'static str, Scene, Camera, Settings)> {
+    let plain = Settings { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() };
     let mut all = Vec::new();
     let (scene, camera) = crowded().swap_remove(1);
     all.push(("crowded", scene, camera, plain.clone()));
@@ -44,14 +44,14 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     all.push(("unlit", globe.clone(), camera.clone(), unlit.clone()));
     let constant = Scene { colors: Colors::Constant([0.2, 0.4, 0.6, 1.0]), ..globe.clone() };
     all.push(("constant", constant, camera.clone(), unlit));
-    all.push(("max", globe.clone(), camera.clone(), RenderOptions { low_pass: LowPass::Max, ..plain.clone() }));
-    all.push(("ewa", globe.clone(), camera.clone(), RenderOptions { low_pass: LowPass::Ewa, ..plain.clone() }));
-    let of_radius = RenderOptions { epsilon: Epsilon::Radius(0.5), ..plain.clone() };
+    all.push(("max", globe.clone(), camera.clone(), Settings { low_pass: LowPass::Max, ..plain.clone() }));
+    all.push(("ewa", globe.clone(), camera.clone(), Settings { low_pass: LowPass::Ewa, ..plain.clone() }));
+    let of_radius = Settings { epsilon: Epsilon::Radius(0.5), ..plain.clone() };
     all.push(("radius", globe.clone(), camera.clone(), of_radius));
     // A narrow Gaussian has tiny weights, which require wide sums.
-    let wide = RenderOptions { kernel: Kernel::Gaussian { sigma: 0.2 }, ..plain.clone() };
+    let wide = Settings { kernel: Kernel::Gaussian { sigma: 0.2 }, ..plain.clone() };
     all.push(("wide", globe, camera.clone(), wide));
-    let placed = RenderOptions { maps: plain.maps.and(&[Map::TexZ]), ..plain.clone() };
+    let placed = Settings { maps: plain.maps.and(&[Map::TexZ]), ..plain.clone() };
     all.push(("painted", painted(1), camera.clone(), placed.clone()));
     all.push(("pictures", painted(2), camera, placed));
     for case in cases().into_iter().filter(|case| case.name.contains("near depth")) {
@@ -70,13 +70,13 @@ fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
     let Some(scatter) = backend(u32::MAX) else { return };
     let others: Vec<_> = thresholds.iter().filter_map(|&pixels| Some((pixels, backend(pixels)?))).collect();
     for (name, scene, camera, options) in drawn().into_iter().filter(|(name, ..)| names.contains(name)) {
-        let by_scatter = RenderOptions { organisation: Organisation::Scatter, ..options.clone() };
+        let by_scatter = Settings { organisation: Organisation::Scatter, ..options.clone() };
         let (expected, report) = render(&scene, &camera, &by_scatter, &scatter, &()).unwrap();
         assert!(!report.needs.contains(&"tiles"));
         for (pixels, backend) in &others {
             let (tiled, _) = frame(&scene, &camera, &options, backend);
             assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels upward change bits");
-            let all = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
+            let all = Settings { organisation: Organisation::Tile, ..options.clone() };
             let (gathered, report) = frame(&scene, &camera, &all, backend);
             assert!(report.needs.contains(&"gather"));
             assert!(bits(&gathered) == bits(&expected), "{name}: gathering from {pixels} pixels on changes bits");
@@ -111,14 +111,14 @@ fn bands_and_pages_of_tiles_do_not_show() {
     let (name, scene, camera, options) = drawn().swap_remove(1);
     let one = frame(&scene, &camera, &options, &whole);
     // Each band skips batches by its own rows.
-    let hidden = |options: &RenderOptions, bytes| {
+    let hidden = |options: &Settings, bytes| {
         let many = frame(&scene, &camera, options, &in_pieces(bytes, large_from(30)));
         assert!(bits(&one.0) == bits(&many.0), "{name}: buffers of {bytes} bytes, {options:?}");
         assert!(one.1.needs.contains(&"cull") && many.1.needs.contains(&"cull"), "{name}: {:?}", many.1.needs);
         many.1.needs.contains(&"gather")
     };
     assert!(!hidden(&options, 40_000), "tiles must not gather several pages");
-    let tiles = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
+    let tiles = Settings { organisation: Organisation::Tile, ..options.clone() };
     assert!(hidden(&tiles, 70_000), "tiles must gather in every band");
     // The control: a band that skips what is visible in its first rows is noticed.
     let above = large_from(30).replace("cull.wgsl", "vec2<f32>(0.0, top));", "vec2<f32>(0.0, top + 40.0));").unwrap();
@@ -164,7 +164,7 @@ fn a_wrong_tile_is_noticed() {
             }
             let gpu = if gathers { gpu } else { gpu.with_buffer_limit(70_000) };
             let without = if gathers { Vec::new() } else { vec![Optimisation::Gathering] };
-            let options = RenderOptions { without, ..options.clone() };
+            let options = Settings { without, ..options.clone() };
             let (frame, report) = frame(&scene, &camera, &options, &on(gpu, sources));
             assert_eq!(report.needs.contains(&"gather"), gathers);
             Some(bits(&frame))
@@ -189,7 +189,7 @@ fn a_view_that_needs_more_room_gets_it() {
     let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
     // `Auto` scatters the far view, whose splats are tiny, so the two ways of summing alternate.
     for organisation in [Organisation::Tile, Organisation::Auto] {
-        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        let options = Settings { organisation, ..Settings::default() };
         let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
         renderer.frame(&far, &()).unwrap();
         let small = renderer.device_bytes().pixels;
@@ -217,7 +217,7 @@ fn bands_that_need_different_room_get_it() {
     // The sphere is in the first band, in the last, and with only a sliver of it in view.
     let [up, down, sliver] = [-60.0, 60.0, 140.0].map(|moved| Camera { cy: near.cy + moved, ..near.clone() });
     for organisation in [Organisation::Auto, Organisation::Tile] {
-        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        let options = Settings { organisation, ..Settings::default() };
         let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
         for view in [&far, &up, &down, &sliver, &far, &near, &up, &sliver, &down] {
             let (kept, report) = renderer.frame(view, &()).unwrap();
@@ -242,7 +242,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
         let colors = Colors::Constant([1.0; 4]);
         let scene =
             Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
-        let options = RenderOptions {
+        let options = Settings {
             kernel: Kernel::Constant,
             shading: Shading::Unlit,
             maps: Maps::ON_DEVICE,
@@ -266,7 +266,7 @@ fn long_lists_are_drawn_to_their_end() {
     let backend = on(gpu, large_from(0));
     let (scene, _) = stack(30_000, 1.0);
     let camera = front(4);
-    let options = RenderOptions {
+    let options = Settings {
         kernel: Kernel::Constant,
         shading: Shading::Unlit,
         maps: Maps::ON_DEVICE,
@@ -276,7 +276,7 @@ fn long_lists_are_drawn_to_their_end() {
         ..Default::default()
     };
     for organisation in [Organisation::Auto, Organisation::Tile] {
-        let options = RenderOptions { organisation, ..options.clone() };
+        let options = Settings { organisation, ..options.clone() };
         let (frame, report) = frame(&scene, &camera, &options, &backend);
         assert!(!report.needs.contains(&"gather"));
         let counts = frame.map(Map::Count).unwrap();

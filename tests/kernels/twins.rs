@@ -17,21 +17,21 @@ use epsplat::low_level::passes::footprint::footprint;
 use epsplat::low_level::passes::project::reference_all;
 use epsplat::low_level::passes::splat::Splat;
 use epsplat::low_level::passes::{accumulate, visibility};
-use epsplat::low_level::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, COLOR_CHANNEL, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::options::HIGHLIGHT;
 use epsplat::low_level::scene::{Epsilon, Kernel, Light, LowPass, Map, Maps, Projection, Shading, ShadingAt};
 use glam::Vec3;
 
-fn options(kernel: Kernel) -> RenderOptions {
-    RenderOptions { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
+fn options(kernel: Kernel) -> Settings {
+    Settings { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
 }
 
 const WEIGHT_CHANNEL: u32 = 0;
 
 const DEFAULT_KERNEL: Kernel = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false };
 
-fn run(case: &Case, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Stages {
+fn run(case: &Case, options: &Settings, gpu: &Gpu, sources: &Sources) -> Stages {
     stages(&case.scene, &case.camera, options, gpu, sources).unwrap_or_else(|e| panic!("{}: {e}", case.name))
 }
 
@@ -188,7 +188,7 @@ fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
 ///
 /// Nearly all pixels must be decided, and the intervals of depth and weight only a few digits wider
 /// than f32 precision.
-fn check_enclosure(case: &Case, options: &RenderOptions, twins: &[Splat], enclosure: &[Pixel]) {
+fn check_enclosure(case: &Case, options: &Settings, twins: &[Splat], enclosure: &[Pixel]) {
     let height = case.camera.height;
     let nearest = visibility::reference(twins.iter(), &case.camera, LowPass::None, 0, height);
     let sums = accumulate::reference(twins.iter(), &case.scene, &case.camera, options, 0, &nearest);
@@ -226,7 +226,7 @@ fn scenes_hold_what_they_claim() {
     // The widest range of cosines and the edge-on disks hit some pixels; otherwise the bounds would
     // not be exercised.
     let case = &cases()[0];
-    let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
+    let twins = reference_all(&case.scene, &case.camera, &Settings::default());
     let mut hit_below = [0usize; 6];
     for twin in &twins {
         let precision = Precision::of(twin, &case.scene, &case.camera);
@@ -247,7 +247,7 @@ fn project_matches_its_twin() {
     let Some(gpu) = common::gpu() else { return };
     let options = options(DEFAULT_KERNEL);
     for case in cases() {
-        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
+        let twins = reference_all(&case.scene, &case.camera, &Settings::default());
         let device = run(&case, &options, &gpu, &Sources::default());
         compare_splats(&case, &twins, &device).expect_none(case.name, 5000);
     }
@@ -259,7 +259,7 @@ fn a_broken_projection_is_noticed() {
     let options = options(DEFAULT_KERNEL);
     let all = cases();
     let noticed = |case: &Case, sources: Sources, name: &str| {
-        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
+        let twins = reference_all(&case.scene, &case.camera, &Settings::default());
         compare_splats(case, &twins, &run(case, &options, &gpu, &sources)).expect_noticed(name);
     };
     let camera = "camera_pinhole.wgsl";
@@ -290,7 +290,7 @@ fn visibility_and_accumulate_match_their_twins() {
         // Each variant of the kernel's power is compiled separately.
         let n = [3.0, 2.0, 4.0, 1.7][index % 4];
         let options = options(Kernel::Ellipse { a: 6.0, n, smooth: false });
-        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
+        let twins = reference_all(&case.scene, &case.camera, &Settings::default());
         let enclosure = enclose(&case.scene, &case.camera, &options, &twins);
         check_enclosure(&case, &options, &twins, &enclosure);
         let device = run(&case, &options, &gpu, &Sources::default());
@@ -304,7 +304,7 @@ fn a_broken_footprint_or_sum_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let options = options(DEFAULT_KERNEL);
     let case = &cases()[0];
-    let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
+    let twins = reference_all(&case.scene, &case.camera, &Settings::default());
     let enclosure = enclose(&case.scene, &case.camera, &options, &twins);
     let sums = |file, from, to| compare_sums(case, &enclosure, &run(case, &options, &gpu, &broken(file, from, to)));
     let depths =
@@ -341,7 +341,7 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
             (Shading::Phong, ShadingAt::Splat),
         ] {
             let (scene, camera) = (sphere(3000, 1.5), sphere_camera(256, projection));
-            let mut options = RenderOptions { shading, shading_at, lights: lights.clone(), ..options(DEFAULT_KERNEL) };
+            let mut options = Settings { shading, shading_at, lights: lights.clone(), ..options(DEFAULT_KERNEL) };
             let (device, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
             options.maps = options.maps.and(&[Map::Decision]);
             let (twin, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();

@@ -14,7 +14,7 @@ use epsplat::low_level::gpu::layout::View;
 use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::inspect::evaluate;
-use epsplat::low_level::plan::{Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::plan::{Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Epsilon, Lens, Map, Maps, Projection, Samples, Scene,
@@ -30,13 +30,13 @@ fn small() -> Gpu {
 
 const MAPS: Maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]);
 
-fn at(pixels: f64) -> RenderOptions {
-    RenderOptions { detail: Detail::Pixels(pixels), cull: Cull::None, maps: MAPS, ..RenderOptions::default() }
+fn at(pixels: f64) -> Settings {
+    Settings { detail: Detail::Pixels(pixels), cull: Cull::None, maps: MAPS, ..Settings::default() }
 }
 
 /// The same options with fading cuts.
-fn fading(options: &RenderOptions) -> RenderOptions {
-    RenderOptions { detail_fades: true, ..options.clone() }
+fn fading(options: &Settings) -> Settings {
+    Settings { detail_fades: true, ..options.clone() }
 }
 
 /// Spheres with every kind of surfel attribute, and one with a distant part.
@@ -77,11 +77,11 @@ fn a_device_makes_the_cut_of_its_twin() {
         let scene = levels(scene);
         let options = [
             (Projection::Pinhole, at(250.0)),
-            (Projection::Pinhole, RenderOptions { detail_measure: DetailMeasure::Area, ..at(100.0) }),
+            (Projection::Pinhole, Settings { detail_measure: DetailMeasure::Area, ..at(100.0) }),
             (Projection::Orthographic, at(400.0)),
             (
                 Projection::Pinhole,
-                RenderOptions {
+                Settings {
                     detail: Detail::Share(0.02),
                     maps: Maps::NONE,
                     samples: Samples { across: 2, down: 1 },
@@ -133,7 +133,7 @@ fn a_device_leaves_out_what_its_twin_does() {
     for camera in views {
         for detail in [Detail::Pixels(1e-6), Detail::Pixels(300.0)] {
             for cull in [Cull::Back, Cull::None] {
-                let options = RenderOptions { detail, cull, ..at(0.0) };
+                let options = Settings { detail, cull, ..at(0.0) };
                 let (twins, flat) = cut(&scene, &camera, &options);
                 left_out += usize::from(twins.scene.surfels.len() < 3000 && detail == Detail::Pixels(1e-6));
                 for backend in &backends {
@@ -157,7 +157,7 @@ fn cuts_are_composited_and_rasterised() {
     let scene = levels(sphere(4000, 1.7));
     let camera = sphere_camera(64, Projection::Pinhole);
     for composite in [Composite::Layers(2), Composite::Sorted, Composite::Weighted, Composite::Moments] {
-        let options = RenderOptions { composite, opacity: 0.5, maps: Maps::NONE, ..at(100.0) };
+        let options = Settings { composite, opacity: 0.5, maps: Maps::NONE, ..at(100.0) };
         let expected = bits(&frame(&scene, &camera, &options, &own));
         assert!(expected == bits(&frame(&scene, &camera, &options, &small)), "{composite:?}");
         let (twins, flat) = cut(&scene, &camera, &options);
@@ -171,15 +171,15 @@ fn cuts_are_composited_and_rasterised() {
         let alone = differ(&frame(&twins, &camera, &flat, &own), &frame(&twins, &camera, &flat, &Backend::Reference));
         assert!(wrong < 5 + alone && alone < 10, "{composite:?}: {wrong} {alone}");
     }
-    let raster = RenderOptions { raster: Some(Default::default()), maps: Maps::of(&[Map::Depth]), ..at(100.0) };
+    let raster = Settings { raster: Some(Default::default()), maps: Maps::of(&[Map::Depth]), ..at(100.0) };
     // The rasteriser draws flat disks.
-    let disks = RenderOptions { raster: None, detail_caps: false, ..raster.clone() };
+    let disks = Settings { raster: None, detail_caps: false, ..raster.clone() };
     let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
     // With its own depths, offset by each surfel's radius, it draws the cut like a scene that
     // consists of it.
     let moved = Raster { depth: RasterDepth::Offset, ..Raster::default() };
-    let moved = RenderOptions { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
+    let moved = Settings { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
     let (twins, flat) = cut(&scene, &camera, &moved);
     let alone = frame(&twins, &camera, &flat, &own);
     let by_slots = Sources::default().replace("raster_offset.wgsl", "surfel_of(index)", "index").unwrap();
@@ -238,7 +238,7 @@ fn crowded_leaves_are_drawn_whole() {
     assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 40_000));
     let camera = sphere_camera(90, Projection::Pinhole);
     // Otherwise the copies would be drawn as one surfel.
-    let options = RenderOptions { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
+    let options = Settings { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
     assert_eq!(twins.scene.surfels.len(), 42_000);
     for backend in [Backend::gpu(gpu), Backend::gpu(common::gpu().unwrap().with_buffer_limit(200_000))] {
@@ -247,14 +247,14 @@ fn crowded_leaves_are_drawn_whole() {
         assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
         // Some of the fading cuts divide the leaf and others do not.
         let both =
-            (7..12).map(|k| fading(&RenderOptions { detail: Detail::Pixels(f64::from(k).exp2()), ..options.clone() }));
+            (7..12).map(|k| fading(&Settings { detail: Detail::Pixels(f64::from(k).exp2()), ..options.clone() }));
         for options in both {
             let (twins, flat) = cut(&scene, &camera, &options);
             let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             assert_eq!(report.cut, Some(twins.scene.surfels.len() as u64), "{options:?}");
             assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)), "{options:?}");
         }
-        let coarse = RenderOptions { detail: Detail::Pixels(1e7), ..options.clone() };
+        let coarse = Settings { detail: Detail::Pixels(1e7), ..options.clone() };
         let few = cut(&scene, &camera, &coarse).0.scene.surfels.len() as u64;
         assert_eq!(render(&scene, &camera, &coarse, &backend, &()).unwrap().1.cut, Some(few));
         // With nodes as large as the sphere, the leaf is drawn as one node.
@@ -275,7 +275,7 @@ fn crowds_at_several_depths_are_drawn_whole() {
     let scene = levels(Scene { surfels, colors, ..Scene::default() });
     let (lens, eye) = (Lens::OrthographicHeight(2.2), DVec3::new(0.4, 0.0, 3.0));
     let camera = Camera::look_at((60, 60), lens, eye, DVec3::X * 0.4, None, Up::Y, 1e-3).unwrap();
-    let options = RenderOptions { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
+    let options = Settings { without: vec![epsplat::low_level::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
     let backend = Backend::gpu(gpu);
     let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
@@ -311,7 +311,7 @@ fn odd_views_have_the_cut_of_the_twin() {
         let scene = &scenes[scene];
         for cull in [Cull::None, Cull::Back] {
             for detail in [Detail::Pixels(1e-6), Detail::Pixels(500.0), Detail::Splats(200)] {
-                let options = RenderOptions { detail, cull, samples, maps: Maps::NONE, ..at(0.0) };
+                let options = Settings { detail, cull, samples, maps: Maps::NONE, ..at(0.0) };
                 let (shown, report) = render(scene, camera, &options, &backend, &()).unwrap();
                 let (reference, of_twin) = render(scene, camera, &options, &Backend::Reference, &()).unwrap();
                 assert_eq!(report.cut, of_twin.cut, "{camera:?} {options:?}");
@@ -322,7 +322,7 @@ fn odd_views_have_the_cut_of_the_twin() {
                 assert!(detail != Detail::Splats(200) || (least..=200).contains(&drawn), "{drawn} {options:?}");
                 assert!(differ(&shown, &reference) < 3, "{camera:?} {options:?}");
                 // Culled surfels do not change the picture.
-                let whole = RenderOptions { detail: Detail::FINEST, ..options.clone() };
+                let whole = Settings { detail: Detail::FINEST, ..options.clone() };
                 let all = frame(scene, camera, &whole, &backend);
                 assert!(detail != Detail::Pixels(1e-6) || differ(&shown, &all) == 0, "{camera:?} {cull:?}");
             }
@@ -337,7 +337,7 @@ fn broken_kernels_are_noticed() {
     let scene = levels(sphere(6000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
     // The second of these has several branches and pages.
-    let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(1e-6) }];
+    let ways = [Settings { cull: Cull::None, ..at(60.0) }, Settings { cull: Cull::Back, ..at(1e-6) }];
     let whole = [Backend::gpu(gpu), Backend::gpu(small())];
     let right = [0, 1].map(|way| {
         let (shown, report) = render(&scene, &camera, &ways[way], &whole[way], &()).unwrap();
@@ -381,7 +381,7 @@ fn large_levels_are_summed() {
     let scene = levels(sphere(400_000, 1.7));
     let camera = sphere_camera(90, Projection::Pinhole);
     // With the area measure every node is tested.
-    let options = RenderOptions { detail_measure: DetailMeasure::Area, maps: Maps::NONE, ..at(1e-3) };
+    let options = Settings { detail_measure: DetailMeasure::Area, maps: Maps::NONE, ..at(1e-3) };
     let (twins, _) = cut(&scene, &camera, &options);
     let right = Some(twins.scene.surfels.len() as u64);
     let of = |backend: &Backend| {

@@ -13,7 +13,7 @@ use common::levels::{frame, levels};
 use common::scenes::{shuffled, sphere, sphere_camera};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
-use epsplat::low_level::plan::{ACCUMULATORS, Organisation, RenderOptions};
+use epsplat::low_level::plan::{ACCUMULATORS, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Cull, Detail, Fade, Lens, LowPass, Map, Maps, Projection, Samples, Scene,
@@ -23,8 +23,8 @@ use epsplat::low_level::surfels::analytic::{Shape, generate};
 use glam::{DVec3, Vec3};
 
 /// Options with fading, for nodes of up to `pixels` square pixels.
-fn fading(pixels: f64) -> RenderOptions {
-    RenderOptions { detail: Detail::Pixels(pixels), detail_fades: true, cull: Cull::None, ..RenderOptions::default() }
+fn fading(pixels: f64) -> Settings {
+    Settings { detail: Detail::Pixels(pixels), detail_fades: true, cull: Cull::None, ..Settings::default() }
 }
 
 /// A pixel is covered exactly where the cut of its number covers it. The 64 cuts have node sizes
@@ -35,7 +35,7 @@ fn a_sample_shows_the_cut_of_its_number() {
     let backend = Backend::gpu(gpu);
     let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
     // Flat nodes, as the outlines of caps hardly depend on their size.
-    let options = RenderOptions { detail_caps: false, ..fading(400.0) };
+    let options = Settings { detail_caps: false, ..fading(400.0) };
     let [device, reference] =
         [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
     let covers = |pixels: &[[f32; 4]]| pixels.iter().map(|color| color[3] == 1.0).collect::<Vec<bool>>();
@@ -43,7 +43,7 @@ fn a_sample_shows_the_cut_of_its_number() {
     let (mut some, mut others) = (0, 0);
     for number in 0..64 {
         let size = 400.0 * (0.5 + f64::from(number) / 128.0);
-        let plain = RenderOptions { detail: Detail::Pixels(size), detail_fades: false, ..options.clone() };
+        let plain = Settings { detail: Detail::Pixels(size), detail_fades: false, ..options.clone() };
         let expected = covers(&frame(&scene, &camera, &plain, &backend).color);
         for (index, expected) in expected.iter().enumerate() {
             let of_cut = Fade::threshold(index as u32 % 96, index as u32 / 96) == number;
@@ -73,9 +73,9 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
     let flat = sphere(6000, 1.7);
     let (scene, camera) = (levels(flat.clone()), sphere_camera(100, Projection::Pinhole));
     for low_pass in [LowPass::None, LowPass::Max, LowPass::Ewa] {
-        let options = RenderOptions { low_pass, samples: Samples { across: 2, down: 2 }, ..fading(200.0) };
+        let options = Settings { low_pass, samples: Samples { across: 2, down: 2 }, ..fading(200.0) };
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
-        let by = |organisation| RenderOptions { organisation, ..options.clone() };
+        let by = |organisation| Settings { organisation, ..options.clone() };
         let all = [Organisation::Auto, Organisation::Scatter, Organisation::Tile].map(|organisation| {
             let (shown, report) = render(&scene, &camera, &by(organisation), &backend, &()).unwrap();
             assert!(report.needs.contains(&"fades"));
@@ -86,17 +86,17 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
         let wrong = differ(&all[0], &reference);
         assert!(wrong < 4, "{low_pass:?}: {wrong}");
         // A node size that is 1 % larger gives other fades.
-        let other = RenderOptions { detail: Detail::Pixels(202.0), ..options.clone() };
+        let other = Settings { detail: Detail::Pixels(202.0), ..options.clone() };
         let others = differ(&frame(&scene, &camera, &other, &backend), &reference);
         assert!(others > 100, "{low_pass:?}: {others}");
     }
-    let maps = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]), ..fading(250.0) };
+    let maps = Settings { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]), ..fading(250.0) };
     let reference = frame(&scene, &camera, &maps, &Backend::Reference);
     let counted = |shown: &Frame| shown.map(Map::Count).unwrap().to_vec();
     let mut sums = 0;
     for row in ACCUMULATORS {
         // Not every adapter supports all accumulators.
-        let options = RenderOptions { accumulator: row.of, ..maps.clone() };
+        let options = Settings { accumulator: row.of, ..maps.clone() };
         let Ok((shown, _)) = render(&scene, &camera, &options, &backend, &()) else { continue };
         sums += 1;
         let counts = counted(&shown).iter().zip(&counted(&reference)).filter(|(a, b)| a != b).count();
@@ -164,15 +164,15 @@ fn nothing_pops_along_a_dolly() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let scene = levels(squares(250_000));
-    let options = RenderOptions { samples: Samples { across: 2, down: 2 }, ..fading(16.0) };
+    let options = Settings { samples: Samples { across: 2, down: 2 }, ..fading(16.0) };
     let views = dolly(128, 120);
-    let along = |options: &RenderOptions| {
+    let along = |options: &Settings| {
         let mut renderer = Renderer::new(&scene, options, &backend).unwrap();
         views.iter().map(|camera| renderer.frame(camera, &()).unwrap()).unzip()
     };
-    let (full, _): (Vec<Frame>, Vec<_>) = along(&RenderOptions { detail: Detail::FINEST, ..options.clone() });
+    let (full, _): (Vec<Frame>, Vec<_>) = along(&Settings { detail: Detail::FINEST, ..options.clone() });
     let (fading, reports) = along(&options);
-    let (popping, _) = along(&RenderOptions { detail_fades: false, ..options.clone() });
+    let (popping, _) = along(&Settings { detail_fades: false, ..options.clone() });
     let coarse = reports.iter().filter(|report| report.cut.unwrap() < 60_000).count();
     assert!(coarse > 100, "{coarse}");
     let [of_all, none] = changes(&full, &full);
@@ -189,7 +189,7 @@ fn broken_fades_are_noticed() {
     let small = || common::gpu().unwrap().with_buffer_limit(70_000);
     let (scene, camera) = (levels(sphere(6000, 1.7)), sphere_camera(100, Projection::Pinhole));
     // Tiles draw all splats, or only large ones, or none.
-    let by = |organisation| RenderOptions { organisation, ..fading(800.0) };
+    let by = |organisation| Settings { organisation, ..fading(800.0) };
     // With these sizes, only some of the cuts reach the root of a branch.
     let above = (12..18).map(|k| fading(f64::from(k).exp2()));
     let ways: Vec<_> =
@@ -225,10 +225,10 @@ fn broken_fades_are_noticed() {
 #[test]
 fn what_does_not_fade_is_refused() {
     for options in [
-        RenderOptions { composite: Composite::Layers(2), ..fading(9.0) },
-        RenderOptions { composite: Composite::Weighted, ..fading(9.0) },
-        RenderOptions { blend: Blend::Nearest, shading: Shading::Unlit, ..fading(9.0) },
-        RenderOptions { raster: Some(Default::default()), ..fading(9.0) },
+        Settings { composite: Composite::Layers(2), ..fading(9.0) },
+        Settings { composite: Composite::Weighted, ..fading(9.0) },
+        Settings { blend: Blend::Nearest, shading: Shading::Unlit, ..fading(9.0) },
+        Settings { raster: Some(Default::default()), ..fading(9.0) },
     ] {
         let refused = render(
             &levels(sphere(100, 1.7)),

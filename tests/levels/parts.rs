@@ -13,7 +13,7 @@ use common::scenes::sphere;
 use epsplat::io::ply::{self, Levels};
 use epsplat::io::{self, Input};
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render, taken};
 use epsplat::low_level::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Lens, LowPass, Map, Maps, Samples, Scene, Surfel, Up,
@@ -38,7 +38,7 @@ fn whole(path: &Path) -> Scene {
     surfels::build(vec![io::read(path, &()).unwrap()], &()).unwrap().0
 }
 
-fn part(path: &Path, camera: &Camera, options: &RenderOptions) -> Result<(Scene, Taken)> {
+fn part(path: &Path, camera: &Camera, options: &Settings) -> Result<(Scene, Taken)> {
     taken(&opened(path), &[(camera, options)], |_| Ok(()), &())
 }
 
@@ -107,25 +107,25 @@ fn views(scene: &Scene) -> Vec<(&'static str, Camera)> {
     ]
 }
 
-fn ways() -> Vec<RenderOptions> {
+fn ways() -> Vec<Settings> {
     let maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]);
-    let at = |pixels: f64| RenderOptions { detail: Detail::Pixels(pixels), maps, ..RenderOptions::default() };
+    let at = |pixels: f64| Settings { detail: Detail::Pixels(pixels), maps, ..Settings::default() };
     vec![
         at(60.0),
-        RenderOptions { detail_fades: true, ..at(60.0) },
-        RenderOptions { detail_measure: DetailMeasure::Area, samples: Samples { across: 2, down: 1 }, ..at(20.0) },
-        RenderOptions { cull: Cull::Back, detail_caps: false, ..at(300.0) },
-        RenderOptions { detail: Detail::Splats(300), maps: Maps::NONE, ..at(0.0) },
+        Settings { detail_fades: true, ..at(60.0) },
+        Settings { detail_measure: DetailMeasure::Area, samples: Samples { across: 2, down: 1 }, ..at(20.0) },
+        Settings { cull: Cull::Back, detail_caps: false, ..at(300.0) },
+        Settings { detail: Detail::Splats(300), maps: Maps::NONE, ..at(0.0) },
         // In these two, back faces are visible in the colours but not in the maps or vice versa,
         // and samples differ.
-        RenderOptions {
+        Settings {
             composite: Composite::Layers(4),
             opacity: 0.5,
             samples: Samples { across: 2, down: 2 },
             ..at(300.0)
         },
-        RenderOptions { composite: Composite::Layers(4), maps: Maps::of(&[Map::Surfaces]), ..at(300.0) },
-        RenderOptions { low_pass: LowPass::Max, cull: Cull::Back, detail_measure: DetailMeasure::Area, ..at(100.0) },
+        Settings { composite: Composite::Layers(4), maps: Maps::of(&[Map::Surfaces]), ..at(300.0) },
+        Settings { low_pass: LowPass::Max, cull: Cull::Back, detail_measure: DetailMeasure::Area, ..at(100.0) },
     ]
 }
 
@@ -211,10 +211,10 @@ fn what_is_missing_leaves_no_holes() {
     let path = written(sphere(8000, 1.7), folder.path());
     let whole = whole(&path);
     let (_, camera) = views(&whole).swap_remove(0);
-    let coarse = RenderOptions { detail: Detail::Pixels(300.0), maps: Maps::NONE, ..ways().swap_remove(0) };
+    let coarse = Settings { detail: Detail::Pixels(300.0), maps: Maps::NONE, ..ways().swap_remove(0) };
     let (part, _) = part(&path, &camera, &coarse).unwrap();
     for detail in [20.0, 100.0] {
-        let fine = RenderOptions { detail: Detail::Pixels(detail), ..coarse.clone() };
+        let fine = Settings { detail: Detail::Pixels(detail), ..coarse.clone() };
         let mut cuts = Vec::new();
         for backend in &backends {
             let (shown, report) = render(&part, &camera, &fine, backend, &()).unwrap();
@@ -268,7 +268,7 @@ fn damaged_files_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(sphere(3000, 1.7), folder.path());
     let (_, camera) = views(&sphere(3000, 1.7)).swap_remove(0);
-    let options = RenderOptions { detail: Detail::Pixels(1.0), ..ways().swap_remove(0) };
+    let options = Settings { detail: Detail::Pixels(1.0), ..ways().swap_remove(0) };
     let bytes = std::fs::read(&path).unwrap();
     let levels = opened(&path);
     let damaged = |at: usize, with: &[u8]| {

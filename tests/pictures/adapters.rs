@@ -8,7 +8,7 @@ use common::bits;
 use common::command::{DATA, Folder, epsplat, succeeds, text};
 use common::scenes::{crowded, sphere, sphere_camera};
 use epsplat::low_level::gpu::AdapterDescription;
-use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer};
 use epsplat::low_level::scene::Projection;
 use std::path::Path;
@@ -143,7 +143,7 @@ fn a_card_is_timed_by_its_own_clock_and_draws_the_same() {
     scenes.push((sphere(3000, 1.8), sphere_camera(90, Projection::Pinhole)));
     for (scene, camera) in &scenes {
         for organisation in [Organisation::Auto, Organisation::Scatter, Organisation::Tile] {
-            let options = RenderOptions { organisation, ..RenderOptions::default() };
+            let options = Settings { organisation, ..Settings::default() };
             let frames = [&software, &card, &small_pages].map(|backend| {
                 let mut renderer = Renderer::new(scene, &options, backend).unwrap();
                 renderer.frame(camera, &()).unwrap();

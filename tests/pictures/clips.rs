@@ -9,7 +9,7 @@ use epsplat::io::{self, Points};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::metrics::reconstruction;
-use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{
     Camera, Clip, Colors, Cull, Facing, Lens, LowPass, Map, Maps, Outline, PointShape, Projection, Samples, Scene,
@@ -37,8 +37,8 @@ fn clipped() -> Scene {
     scene
 }
 
-fn options(low_pass: LowPass) -> RenderOptions {
-    RenderOptions { low_pass, maps: Maps::ON_DEVICE, cull: Cull::None, ..RenderOptions::default() }
+fn options(low_pass: LowPass) -> Settings {
+    Settings { low_pass, maps: Maps::ON_DEVICE, cull: Cull::None, ..Settings::default() }
 }
 
 /// The number of pixels whose weight differs from the `reference` without excuse, and of excused
@@ -61,20 +61,20 @@ fn kernels_and_twins_end_disks_at_the_same_lines() {
         let camera = sphere_camera(160, projection);
         for low_pass in [LowPass::None, LowPass::Max, LowPass::Ewa] {
             let options = options(low_pass);
-            let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+            let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
             let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
             let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             assert!(report.needs.contains(&"clips"));
             let (wrong, excused) = compared(&frame, &reference);
             assert!(wrong == 0 && excused < 400, "{wrong} wrong, {excused} excused, {projection:?} {low_pass:?}");
             for organisation in [Organisation::Scatter, Organisation::Tile] {
-                let other = RenderOptions { organisation, ..options.clone() };
+                let other = Settings { organisation, ..options.clone() };
                 let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
                 assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
             }
             // The rasteriser draws the same fragments.
             let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
-            let by_raster = RenderOptions { raster, ..options.clone() };
+            let by_raster = Settings { raster, ..options.clone() };
             let (by_raster, _) = render(&scene, &camera, &by_raster, &backend, &()).unwrap();
             let [counted, expected] = [&by_raster, &frame].map(|frame| frame.map(Map::Count).unwrap());
             let decided = reference.map(Map::Decision).unwrap().iter().map(|decision| *decision >= 1e-4);
@@ -98,27 +98,27 @@ fn polygons_are_drawn_by_all_alike() {
         [(&whole, 3, Projection::Pinhole), (&whole, 7, Projection::Orthographic), (&clipped(), 4, Projection::Pinhole)]
     {
         let camera = sphere_camera(160, projection);
-        let options = RenderOptions { outline: Some(Outline::of_sides(sides).unwrap()), ..options(LowPass::None) };
-        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let options = Settings { outline: Some(Outline::of_sides(sides).unwrap()), ..options(LowPass::None) };
+        let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
         let (reference, _) = render(scene, &camera, &decided, &Backend::Reference, &()).unwrap();
         let (frame, report) = render(scene, &camera, &options, &backend, &()).unwrap();
         assert!(report.needs.contains(&"outline"));
         let (wrong, excused) = compared(&frame, &reference);
         assert!(wrong == 0 && excused < 400, "{wrong} wrong, {excused} excused, {sides} sides");
         for organisation in [Organisation::Scatter, Organisation::Tile] {
-            let other = RenderOptions { organisation, ..options.clone() };
+            let other = Settings { organisation, ..options.clone() };
             let (other, _) = render(scene, &camera, &other, &backend, &()).unwrap();
             assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
         }
         let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
-        let by_raster = RenderOptions { raster, ..options.clone() };
+        let by_raster = Settings { raster, ..options.clone() };
         let (by_raster, _) = render(scene, &camera, &by_raster, &backend, &()).unwrap();
         let [counted, expected] = [&by_raster, &frame].map(|frame| frame.map(Map::Count).unwrap());
         let decided = reference.map(Map::Decision).unwrap().iter().map(|decision| *decision >= 1e-4);
         assert!(decided.zip(counted.iter().zip(expected)).all(|(decided, (a, b))| !decided || a == b));
         // Controls: disks, and polygons with one more side, give other pictures.
         for outline in [None, Outline::of_sides(sides + 1).ok()] {
-            let other = RenderOptions { outline, ..options.clone() };
+            let other = Settings { outline, ..options.clone() };
             let (other, _) = render(scene, &camera, &other, &backend, &()).unwrap();
             assert!(compared(&other, &reference).0 > 500, "{outline:?}");
         }
@@ -135,7 +135,7 @@ fn a_polygon_has_the_area_of_its_sides() {
     let scene = Scene { surfels: vec![disk], colors: Colors::Constant([1.0; 4]), ..Scene::default() };
     for sides in [3, 5, 16] {
         let outline = Some(Outline::of_sides(sides).unwrap());
-        let options = RenderOptions { outline, maps: Maps::of(&[Map::Weight]), ..RenderOptions::default() };
+        let options = Settings { outline, maps: Maps::of(&[Map::Weight]), ..Settings::default() };
         let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
         let covered = frame.map(Map::Weight).unwrap().iter().filter(|weight| **weight > 0.0).count();
         let area = covered as f64 * (2.5f64 / 500.0).powi(2);
@@ -144,15 +144,15 @@ fn a_polygon_has_the_area_of_its_sides() {
         assert!((area / expected - 1.0).abs() < 0.002, "{area} {expected}");
     }
     for options in [
-        RenderOptions { low_pass: LowPass::Max, ..RenderOptions::default() },
-        RenderOptions {
+        Settings { low_pass: LowPass::Max, ..Settings::default() },
+        Settings {
             facing: Some(Facing { shape: PointShape::Circle, pixels: Facing::LIMITS }),
             shading: Shading::Unlit,
-            ..RenderOptions::default()
+            ..Settings::default()
         },
     ] {
         assert!(check::options(&options, false).is_ok());
-        let outlined = RenderOptions { outline: Outline::of_sides(3).ok(), ..options };
+        let outlined = Settings { outline: Outline::of_sides(3).ok(), ..options };
         let error = check::options(&outlined, true).unwrap_err().to_string();
         assert!(error.contains("--outline"), "{error}");
     }
@@ -161,7 +161,7 @@ fn a_polygon_has_the_area_of_its_sides() {
 #[test]
 fn a_line_that_is_turned_the_wrong_way_is_noticed() {
     let (scene, camera, options) = (clipped(), sphere_camera(160, Projection::Pinhole), options(LowPass::None));
-    let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
     for (from, to) in [
         ("line.x * turn.x + line.y * turn.y", "line.x * turn.x - line.y * turn.y"),
@@ -192,7 +192,7 @@ fn a_disk_is_cut_where_its_line_says() {
     let camera = Camera::look_at((64, 64), lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), scene.up, 0.1).unwrap();
     let maps = Maps::of(&[Map::Weight]);
     let (frame, _) =
-        render(&scene, &camera, &RenderOptions { maps, ..RenderOptions::default() }, &Backend::Reference, &()).unwrap();
+        render(&scene, &camera, &Settings { maps, ..Settings::default() }, &Backend::Reference, &()).unwrap();
     for (pixel, weight) in frame.map(Map::Weight).unwrap().iter().enumerate() {
         let at = |k: usize| (k as f64 + 0.5) / 16.0 - 2.0;
         let ray = camera.ray_start(at(pixel % 64) * 16.0 + 32.0, at(pixel / 64) * 16.0 + 32.0);
@@ -235,7 +235,7 @@ fn a_cube_of_surfels_is_a_cube() {
         let camera = Camera::framing((240, 240), Lens::Fov(40.0), &scene, 1e-3).unwrap();
         let maps = Maps::of(&[Map::Depth, Map::Normal]);
         let samples: Samples = "16".parse().unwrap();
-        let options = RenderOptions { samples, maps, background: [1.0; 4], ..RenderOptions::default() };
+        let options = Settings { samples, maps, background: [1.0; 4], ..Settings::default() };
         let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
         let truth = Truth::cast(&Surface::read(&path, &()).unwrap(), &camera, &options, 8, &()).unwrap();
         let error = reconstruction(&frame, &truth).unwrap();

@@ -10,7 +10,7 @@ use common::scenes::{shuffled, sphere, sphere_camera};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::metrics::compare;
-use epsplat::low_level::plan::{Optimisation, RenderOptions};
+use epsplat::low_level::plan::{Optimisation, Settings};
 use epsplat::low_level::render::{Backend, Report, render};
 use epsplat::low_level::scene::{Colors, LowPass, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::Vec3;
@@ -32,12 +32,12 @@ fn scene() -> Scene {
     scene
 }
 
-fn options(low_pass: LowPass, without: &[Optimisation]) -> RenderOptions {
+fn options(low_pass: LowPass, without: &[Optimisation]) -> Settings {
     let maps = Maps::ON_DEVICE;
-    RenderOptions { maps, low_pass, shading: Shading::Phong, without: without.to_vec(), ..RenderOptions::default() }
+    Settings { maps, low_pass, shading: Shading::Phong, without: without.to_vec(), ..Settings::default() }
 }
 
-fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+fn frame(scene: &Scene, options: &Settings, backend: &Backend) -> (Frame, Report) {
     render(scene, &sphere_camera(96, Projection::Pinhole), options, backend, &()).unwrap()
 }
 

@@ -9,7 +9,7 @@ use epsplat::io::{self, Points};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::metrics::reconstruction;
-use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Cap, Clip, Cull, Lens, LowPass, Map, Maps, Projection, Samples, Scene};
 use epsplat::low_level::surfels::{FromPoints, Limits, build, build_within, from_points};
@@ -37,8 +37,8 @@ fn curved() -> Scene {
     scene
 }
 
-fn options(low_pass: LowPass, cull: Cull) -> RenderOptions {
-    RenderOptions { low_pass, maps: Maps::ON_DEVICE, cull, ..RenderOptions::default() }
+fn options(low_pass: LowPass, cull: Cull) -> Settings {
+    Settings { low_pass, maps: Maps::ON_DEVICE, cull, ..Settings::default() }
 }
 
 /// The number of pixels that differ from the `reference` without excuse, and of excused pixels,
@@ -71,14 +71,14 @@ fn kernels_and_twins_meet_the_same_caps() {
         for projection in [Projection::Pinhole, Projection::Orthographic] {
             let camera = sphere_camera(160, projection);
             let options = options(low_pass, cull);
-            let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+            let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
             let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
             let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             assert!(report.needs.contains(&"curved"));
             let (wrong, excused) = compared(&frame, &reference);
             assert!(wrong == 0 && excused < 1000, "{wrong} wrong, {excused} excused, {projection:?} {low_pass:?}");
             for organisation in [Organisation::Scatter, Organisation::Tile] {
-                let other = RenderOptions { organisation, ..options.clone() };
+                let other = Settings { organisation, ..options.clone() };
                 let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
                 assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
             }
@@ -97,7 +97,7 @@ fn kernels_and_twins_meet_the_same_caps() {
 fn broken_caps_are_noticed() {
     let (scene, camera) = (curved(), sphere_camera(160, Projection::Pinhole));
     let options = options(LowPass::None, Cull::None);
-    let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
     for (file, from, to) in [
         ("curved.wgsl", "heights.y * (a.x * b.y + a.y * b.x)", "heights.y * a.x * b.y"),
@@ -119,7 +119,7 @@ fn flat_caps_are_disks() {
     // If one cap is curved, the kernel for caps draws the flat ones too.
     let mut scene = sphere(1200, 1.7);
     let camera = sphere_camera(160, Projection::Pinhole);
-    let options = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal]), ..RenderOptions::default() };
+    let options = Settings { maps: Maps::of(&[Map::Depth, Map::Normal]), ..Settings::default() };
     let of = |scene: &Scene| render(scene, &camera, &options, &Backend::Reference, &()).unwrap().0;
     let flat = of(&scene);
     scene.caps = vec![Cap::FLAT; scene.surfels.len()];
@@ -243,7 +243,7 @@ fn the_outline_of_a_few_caps_is_that_of_their_sphere() {
     let scene = of(true);
     let camera = Camera::framing((256, 256), Lens::Fov(30.0), &scene, 1e-3).unwrap();
     let samples: Samples = "16".parse().unwrap();
-    let options = RenderOptions { samples, maps: Maps::of(&[Map::Depth, Map::Normal]), ..RenderOptions::default() };
+    let options = Settings { samples, maps: Maps::of(&[Map::Depth, Map::Normal]), ..Settings::default() };
     let truth = Truth::cast(&surface, &camera, &options, 8, &()).unwrap();
     let [caps, disks] = [scene, of(false)].map(|scene| {
         let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
@@ -276,10 +276,10 @@ fn what_normals_across_a_splat_are_worth_alone() {
         let scene = build_within(vec![points], vec![], &Limits::default(), &()).unwrap().0;
         let flat = Scene { caps: Vec::new(), ..scene.clone() };
         let camera = Camera::framing((256, 256), Lens::Fov(30.0), &scene, 1e-3).unwrap();
-        let options = RenderOptions {
+        let options = Settings {
             samples: "4".parse().unwrap(),
             maps: Maps::of(&[Map::Depth, Map::Normal]),
-            ..RenderOptions::default()
+            ..Settings::default()
         };
         let truth = Truth::cast(&surface, &camera, &options, 8, &()).unwrap();
         let db = |scene: &Scene, backend: &Backend| {

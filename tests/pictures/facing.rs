@@ -8,7 +8,7 @@ use common::scenes::{sphere, sphere_camera};
 use epsplat::io::Points;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
-use epsplat::low_level::plan::{BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::plan::{BlendFormat, Optimisation, Organisation, Raster, RasterDepth, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::facing::POINT_SHAPES;
 use epsplat::low_level::scene::{
@@ -32,18 +32,18 @@ fn points() -> Scene {
     scene
 }
 
-fn options(shape: PointShape) -> RenderOptions {
-    RenderOptions {
+fn options(shape: PointShape) -> Settings {
+    Settings {
         facing: Some(Facing { shape, pixels: [1.0, 12.0] }),
         shading: Shading::Unlit,
         maps: Maps::of(&[Map::Depth, Map::Weight, Map::Count]),
-        ..RenderOptions::default()
+        ..Settings::default()
     }
 }
 
 /// With no epsilon and a constant kernel the nearest point wins, or the mean of equally near ones.
-fn nearest(shape: PointShape) -> RenderOptions {
-    RenderOptions { epsilon: Epsilon::Absolute(0.0), kernel: Kernel::Constant, ..options(shape) }
+fn nearest(shape: PointShape) -> Settings {
+    Settings { epsilon: Epsilon::Absolute(0.0), kernel: Kernel::Constant, ..options(shape) }
 }
 
 /// The number of decided pixels where a colour or map differs by more than `tolerance` times the
@@ -69,7 +69,7 @@ fn kernels_and_twins_draw_the_same_points() {
     {
         let camera = sphere_camera(160, projection);
         let options = options(shape);
-        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
         let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
         let decision = reference.map(Map::Decision).unwrap();
         let undecided = decision.iter().filter(|decision| **decision < 1e-4).count();
@@ -78,14 +78,14 @@ fn kernels_and_twins_draw_the_same_points() {
         let wrong = differing(&frame, &reference, 1e-5);
         assert!(wrong == 0 && undecided < 800, "{wrong} wrong, {undecided} undecided, {projection:?} {name}");
         for organisation in [Organisation::Scatter, Organisation::Tile] {
-            let other = RenderOptions { organisation, ..options.clone() };
+            let other = Settings { organisation, ..options.clone() };
             let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
             assert!(common::bits(&other) == common::bits(&frame), "{organisation:?} {name}");
         }
         let (shuffled, _) = render(&common::scenes::shuffled(&scene, 3), &camera, &options, &backend, &()).unwrap();
         assert!(common::bits(&shuffled) == common::bits(&frame), "another order, {name}");
         // Control: disks in their own planes give another picture.
-        let (own, _) = render(&scene, &camera, &RenderOptions { facing: None, ..options }, &backend, &()).unwrap();
+        let (own, _) = render(&scene, &camera, &Settings { facing: None, ..options }, &backend, &()).unwrap();
         assert!(differing(&own, &reference, 1e-5) > 1000);
     }
 }
@@ -106,8 +106,8 @@ fn broken_points_are_noticed() {
         // show.
         let least = if from.starts_with("LEAST") { 3.0 } else { 1.0 };
         let facing = Some(Facing { shape, pixels: [least, 12.0] });
-        let options = RenderOptions { facing, ..options(shape) };
-        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let options = Settings { facing, ..options(shape) };
+        let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
         let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
         let sources = Sources::default().replace(file, from, to).unwrap();
         let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
@@ -169,9 +169,9 @@ fn paraboloids_give_the_power_diagram_and_points_of_a_plane_the_voronoi_diagram(
     let Some(gpu) = common::gpu() else { return };
     let (backend, size, radius) = (Backend::gpu(gpu), 192, 0.3f32);
     let r = f64::from(radius);
-    let wide = |options: RenderOptions| {
+    let wide = |options: Settings| {
         let facing = options.facing.map(|facing| Facing { pixels: [1.0, 500.0], ..facing });
-        RenderOptions { facing, ..options }
+        Settings { facing, ..options }
     };
     // Paraboloids have depth z_i + d_i^2 / R, hence the paper's straight borders (a power diagram).
     let scene = sites(300, radius, |random| random.between(-0.2, 0.2));
@@ -206,10 +206,7 @@ fn a_point_shows_at_its_own_pixel_and_is_no_larger_than_its_limit() {
         };
         for (name, shape) in POINT_SHAPES {
             let facing = |least: f64, most: f64| Some(Facing { shape, pixels: [least, most] });
-            let of = |facing| RenderOptions {
-                epsilon: Epsilon::Absolute(1e3),
-                ..RenderOptions { facing, ..options(shape) }
-            };
+            let of = |facing| Settings { epsilon: Epsilon::Absolute(1e3), ..Settings { facing, ..options(shape) } };
             let count = |facing| {
                 let (frame, _) = render(&scene, &camera, &of(facing), &backend, &()).unwrap();
                 frame.map(Map::Count).unwrap().to_vec()
@@ -248,8 +245,8 @@ fn a_shape_that_crosses_the_near_depth_ends_there() {
     let scene = sites(40, 0.5, |random| random.between(-0.3, 0.3));
     for shape in [PointShape::Sphere, PointShape::Cone, PointShape::Paraboloid] {
         let facing = Some(Facing { shape, pixels: [1.0, 500.0] });
-        let options = RenderOptions { facing, ..options(shape) };
-        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let options = Settings { facing, ..options(shape) };
+        let decided = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
         for near in [3.5, 3.9, 4.1] {
             let camera = Camera { near, ..frontal(128) };
             let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
@@ -270,7 +267,7 @@ fn the_rasteriser_draws_the_same_points() {
         let options = options(shape);
         let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
         let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
-        let (rastered, _) = render(&scene, &camera, &RenderOptions { raster, ..options }, &backend, &()).unwrap();
+        let (rastered, _) = render(&scene, &camera, &Settings { raster, ..options }, &backend, &()).unwrap();
         let [ours, theirs] = [&frame, &rastered].map(|frame| frame.map(Map::Count).unwrap());
         assert!(ours == theirs && ours.iter().sum::<f32>() > 1e4, "{name}");
     }
@@ -286,8 +283,8 @@ fn what_is_left_out_of_points_changes_no_bit() {
         let camera = sphere_camera(96, projection);
         // Points of a fifth of a pixel, and of twenty pixels.
         for pixels in [[1.0, 50.0], [20.0, 50.0]] {
-            let options = RenderOptions { facing: Some(Facing { shape, pixels }), ..options(shape) };
-            let plain = RenderOptions { without: vec![Optimisation::Culling, Optimisation::Hiding], ..options.clone() };
+            let options = Settings { facing: Some(Facing { shape, pixels }), ..options(shape) };
+            let plain = Settings { without: vec![Optimisation::Culling, Optimisation::Hiding], ..options.clone() };
             let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             let (whole, _) = render(&scene, &camera, &plain, &backend, &()).unwrap();
             assert!(common::bits(&frame) == common::bits(&whole), "{name} {pixels:?}");
@@ -304,9 +301,9 @@ fn samples_of_a_pixel_see_points_as_large_as_one_does() {
     let (scene, camera) = (points(), sphere_camera(120, Projection::Pinhole));
     for text in ["4", "8"] {
         let samples: Samples = text.parse().unwrap();
-        let options = RenderOptions { maps: Maps::default(), ..options(PointShape::Circle) };
+        let options = Settings { maps: Maps::default(), ..options(PointShape::Circle) };
         let (one, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
-        let several = RenderOptions { samples, ..options };
+        let several = Settings { samples, ..options };
         let (several, _) = render(&scene, &camera, &several, &Backend::Reference, &()).unwrap();
         let [one, several] = [one, several].map(|frame| frame.color.iter().map(|color| color[3]).sum::<f32>());
         assert!((one / several - 1.0).abs() < 0.02, "{one} {several}");
@@ -339,12 +336,12 @@ fn clouds_without_radii_take_one_for_all_whatever_the_order() {
 #[test]
 fn what_points_do_not_have_is_refused() {
     let facing = options(PointShape::Sphere);
-    let refused = |options: RenderOptions| check::options(&options, false).unwrap_err().to_string();
-    assert!(refused(RenderOptions { shading: Shading::Lambert, ..facing.clone() }).contains("no normals"));
-    assert!(refused(RenderOptions { maps: Maps::of(&[Map::Normal]), ..facing.clone() }).contains("no normals"));
-    assert!(refused(RenderOptions { low_pass: LowPass::Max, ..facing.clone() }).contains("no low-pass"));
-    assert!(refused(RenderOptions { cull: Cull::Back, ..facing.clone() }).contains("no backs"));
+    let refused = |options: Settings| check::options(&options, false).unwrap_err().to_string();
+    assert!(refused(Settings { shading: Shading::Lambert, ..facing.clone() }).contains("no normals"));
+    assert!(refused(Settings { maps: Maps::of(&[Map::Normal]), ..facing.clone() }).contains("no normals"));
+    assert!(refused(Settings { low_pass: LowPass::Max, ..facing.clone() }).contains("no low-pass"));
+    assert!(refused(Settings { cull: Cull::Back, ..facing.clone() }).contains("no backs"));
     let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Offset });
-    assert!(refused(RenderOptions { raster, ..facing.clone() }).contains("exact"));
+    assert!(refused(Settings { raster, ..facing.clone() }).contains("exact"));
     assert!(check::options(&facing, false).is_ok());
 }

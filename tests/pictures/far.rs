@@ -10,7 +10,7 @@ use epsplat::io::Mesh;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::metrics::DECISION_MARGIN;
-use epsplat::low_level::plan::{BlendFormat, Facts, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::plan::{BlendFormat, Facts, Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Lens, Map, Maps, Scene, Triangle, Triangles, Up};
 use epsplat::low_level::surfels::with_triangles;
@@ -26,11 +26,11 @@ fn broken(file: &str, from: &str, to: &str) -> Backend {
 }
 
 /// Lit, so that the normals of the triangles' planes show.
-fn lit() -> RenderOptions {
-    RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() }
+fn lit() -> Settings {
+    Settings { maps: Maps::of(&[Map::Depth]), ..Settings::default() }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -75,7 +75,7 @@ fn apart(shown: &Frame, truth: &Frame, decided: &[f32]) -> (usize, usize) {
 /// The reference's picture of the mesh at the origin, and its decision margins.
 fn truth(mesh: &Mesh, lens: Lens) -> (Frame, Vec<f32>) {
     let scene = with_triangles(None, std::slice::from_ref(mesh)).unwrap().0;
-    let with_decision = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Decision]), ..lit() };
+    let with_decision = Settings { maps: Maps::of(&[Map::Depth, Map::Decision]), ..lit() };
     let frame = frame(&scene, &camera(DVec3::ZERO, lens), &with_decision, &Backend::Reference);
     let decided = frame.map(Map::Decision).unwrap().to_vec();
     (frame, decided)
@@ -137,7 +137,7 @@ fn a_mesh_far_away_is_rasterised_as_it_is_near() {
     let Some(backend) = gpu() else { return };
     let Backend::Gpu { gpu, .. } = &backend else { return };
     let format = if gpu.adapter.blends_f32 { BlendFormat::Rgba32Float } else { BlendFormat::Rgba16Float };
-    let options = RenderOptions { raster: Some(Raster { format, depth: RasterDepth::Exact }), ..lit() };
+    let options = Settings { raster: Some(Raster { format, depth: RasterDepth::Exact }), ..lit() };
     let (mesh, place) = (rough(), DVec3::from_array(FAR[1]));
     let scene = with_triangles(None, &[mesh.clone(), at(&mesh, place)]).unwrap().0;
     let of = |scene: &Scene, place: DVec3| frame(scene, &camera(place, LENSES[0]), &options, &backend);

@@ -20,7 +20,7 @@ use common::bits;
 use common::scenes::{Case, cases, crowded, painted, sphere, sphere_camera};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Gpu;
-use epsplat::low_level::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Features, Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Camera, Colors, Composite, Epsilon, Light, LowPass, MAPS, Map, Maps, Projection, Scene, Shading, Surfel,
@@ -34,7 +34,7 @@ type View = (Scene, Camera);
 struct Row<'a> {
     name: String,
     view: &'a View,
-    options: RenderOptions,
+    options: Settings,
     /// The largest buffer, in bytes: a small limit makes pages and bands.
     buffer_limit: Option<u64>,
 }
@@ -99,12 +99,12 @@ fn copies() -> Scene {
     scene
 }
 
-fn unlit() -> RenderOptions {
-    RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
+fn unlit() -> Settings {
+    Settings { shading: Shading::Unlit, ..Settings::default() }
 }
 
-fn with_maps() -> RenderOptions {
-    RenderOptions { maps: Maps::ON_DEVICE, ..RenderOptions::default() }
+fn with_maps() -> Settings {
+    Settings { maps: Maps::ON_DEVICE, ..Settings::default() }
 }
 
 /// Lists all renders: kernels, epsilons, low-passes, shadings, maps, accumulators, organisations,
@@ -126,23 +126,19 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
         ("plain", &scenes.plain),
     ];
     for (name, view) in views {
-        add(format!("{name}, default"), view, RenderOptions::default());
+        add(format!("{name}, default"), view, Settings::default());
         for low_pass in [LowPass::Max, LowPass::Ewa] {
-            add(format!("{name}, {low_pass:?}, maps"), view, RenderOptions { low_pass, ..with_maps() });
+            add(format!("{name}, {low_pass:?}, maps"), view, Settings { low_pass, ..with_maps() });
         }
-        add(
-            format!("{name}, scatter, maps"),
-            view,
-            RenderOptions { organisation: Organisation::Scatter, ..with_maps() },
-        );
+        add(format!("{name}, scatter, maps"), view, Settings { organisation: Organisation::Scatter, ..with_maps() });
     }
     for kernel in ["gaussian", "gaussian:0.5", "ellipse:4,2,smooth", "hat", "constant"] {
         for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed)] {
-            add(format!("{name}, {kernel}"), view, RenderOptions { kernel: kernel.parse().unwrap(), ..unlit() });
+            add(format!("{name}, {kernel}"), view, Settings { kernel: kernel.parse().unwrap(), ..unlit() });
         }
     }
     for epsilon in [Epsilon::Relative(0.0), Epsilon::Absolute(0.05), Epsilon::Radius(1.5)] {
-        add(format!("mixed, {epsilon:?}"), &scenes.mixed, RenderOptions { epsilon, ..with_maps() });
+        add(format!("mixed, {epsilon:?}"), &scenes.mixed, Settings { epsilon, ..with_maps() });
     }
     let lights = vec![
         Light::Headlight { intensity: 0.5 },
@@ -150,34 +146,34 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
     ];
     for (name, view) in [("sphere", &scenes.sphere), ("plain", &scenes.plain), ("textured", &scenes.textured)] {
         let background = [0.1, 0.2, 0.3, 0.5];
-        let phong = RenderOptions { shading: Shading::Phong, lights: lights.clone(), background, ..with_maps() };
+        let phong = Settings { shading: Shading::Phong, lights: lights.clone(), background, ..with_maps() };
         add(format!("{name}, Phong, two lights, background"), view, phong);
     }
     for accumulator in [Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64] {
         for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed)] {
-            add(format!("{name}, {accumulator}"), view, RenderOptions { accumulator, ..with_maps() });
+            add(format!("{name}, {accumulator}"), view, Settings { accumulator, ..with_maps() });
         }
     }
     for organisation in [Organisation::Scatter, Organisation::Tile] {
         for (name, view) in [("sphere", &scenes.sphere), ("dense", &scenes.dense), ("large", &scenes.large)] {
-            add(format!("{name}, {organisation:?}"), view, RenderOptions { organisation, ..unlit() });
+            add(format!("{name}, {organisation:?}"), view, Settings { organisation, ..unlit() });
         }
     }
     for (optimisation, name) in Optimisation::ALL {
         let without = vec![optimisation];
-        add(format!("dense, without {name}"), &scenes.dense, RenderOptions { without, ..RenderOptions::default() });
+        add(format!("dense, without {name}"), &scenes.dense, Settings { without, ..Settings::default() });
     }
     for depth in ["exact", "offset"] {
         for format in ["rgba16float", "rgba32float"] {
             let raster =
                 epsplat::low_level::plan::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
-            let options = RenderOptions { raster: Some(raster), ..with_maps() };
+            let options = Settings { raster: Some(raster), ..with_maps() };
             add(format!("sphere, raster {depth} {format}"), &scenes.sphere, options);
         }
     }
     for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed), ("large", &scenes.large)] {
         for limit in [40_000, 120_000] {
-            let options = RenderOptions { low_pass: LowPass::Max, ..with_maps() };
+            let options = Settings { low_pass: LowPass::Max, ..with_maps() };
             let name = format!("{name}, buffers of {limit} bytes");
             rows.push(Row { name, view, options, buffer_limit: Some(limit) });
         }
@@ -205,12 +201,8 @@ fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
 /// False if the f64 reference ignores an option that the row sets: another row covers it then.
 fn differs_in_f64(row: &Row<'_>) -> bool {
     let options = &row.options;
-    let own = RenderOptions {
-        raster: None,
-        organisation: Organisation::Auto,
-        accumulator: Accumulator::Fixed,
-        ..options.clone()
-    };
+    let own =
+        Settings { raster: None, organisation: Organisation::Auto, accumulator: Accumulator::Fixed, ..options.clone() };
     row.buffer_limit.is_none() && own == *options && options.without.is_empty()
 }
 
@@ -320,7 +312,7 @@ fn maps_are_right_where_nothing_is() {
         let tiles = tiles.then_some((Composite::Opaque, Organisation::Tile));
         for (composite, organisation) in lists.into_iter().chain(tiles) {
             let maps = Maps::of(&[row.map]);
-            let options = RenderOptions { maps, composite, organisation, ..RenderOptions::default() };
+            let options = Settings { maps, composite, organisation, ..Settings::default() };
             let (frame, _) = render(scene, &camera, &options, &backend, &()).unwrap();
             let (reference, _) = render(scene, &camera, &options, &Backend::Reference, &()).unwrap();
             let words = |frame: &Frame| frame.map(row.map).unwrap().iter().map(|v| v.to_bits()).collect::<Vec<_>>();

@@ -14,7 +14,7 @@ use epsplat::io::{self, ReadOptions};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::metrics::DECISION_MARGIN;
-use epsplat::low_level::plan::{Facts, RenderOptions};
+use epsplat::low_level::plan::{Facts, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::camera::DEFAULT_FOV;
 use epsplat::low_level::scene::color::linear_to_srgb;
@@ -29,13 +29,13 @@ fn gpu() -> Option<Backend> {
 }
 
 /// The command line's defaults for Gaussians.
-fn options() -> RenderOptions {
-    RenderOptions {
+fn options() -> Settings {
+    Settings {
         kernel: gaussian::KERNEL,
         low_pass: LowPass::Gaussians,
         composite: Composite::Gaussians,
         shading: Shading::Unlit,
-        ..RenderOptions::default()
+        ..Settings::default()
     }
 }
 
@@ -58,7 +58,7 @@ fn around(size: u32) -> Camera {
     Camera::look_at((size, size), Lens::Fov(DEFAULT_FOV), eye, DVec3::ZERO, Some(DVec3::Z), Up::Z, 0.01).unwrap()
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -135,7 +135,7 @@ fn two_gaussians_are_composited_by_depth_as_codes() {
                     assert!((found - expected).abs() < 1e-6, "{pixel}: {found} {expected}");
                 }
             }
-            let over = frame(&scene, &camera, &RenderOptions { background, ..options() }, &backend);
+            let over = frame(&scene, &camera, &Settings { background, ..options() }, &backend);
             let middle = over.color[24 * 48 + 24];
             let [light, .., alpha] = expected[24 * 48 + 24];
             assert!((codes(middle)[0] - (light + 1.0 - alpha)).abs() < 1e-6, "{middle:?}");
@@ -197,9 +197,9 @@ fn device_and_twin_agree_in_every_degree_and_composite() {
         let (scene, _) = scene(&torus(5_000, degree, 7));
         let all = [Composite::Gaussians, Composite::Sorted, Composite::Layers(ALL_LAYERS), Composite::Opaque];
         for composite in all.into_iter().take(if degree == 2 { 4 } else { 1 }) {
-            let of = RenderOptions { composite, maps: Maps::of(&[Map::Decision]), ..options() };
+            let of = Settings { composite, maps: Maps::of(&[Map::Decision]), ..options() };
             let twin = frame(&scene, &camera, &of, &Backend::Reference);
-            let shown = frame(&scene, &camera, &RenderOptions { maps: Maps::NONE, ..of }, &backend);
+            let shown = frame(&scene, &camera, &Settings { maps: Maps::NONE, ..of }, &backend);
             let margins = twin.map(Map::Decision).unwrap();
             let pixels = (0..margins.len()).filter(|pixel| margins[*pixel] > DECISION_MARGIN);
             let (mut sum, mut count) = (0.0, 0);
@@ -223,7 +223,7 @@ fn order_and_memory_do_not_show() {
     let (scene, _) = scene(&torus(6_000, 3, 9));
     let small = |bytes| Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), bytes));
     let core = common::core_gpu().map(Backend::gpu).unwrap();
-    for of in [options(), RenderOptions { composite: Composite::Opaque, ..options() }] {
+    for of in [options(), Settings { composite: Composite::Opaque, ..options() }] {
         let first = bits(&frame(&scene, &camera, &of, &backend));
         for seed in [1, 2] {
             assert!(bits(&frame(&shuffled(&scene, seed), &camera, &of, &backend)) == first, "order {seed}");
@@ -250,7 +250,7 @@ fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
         let eye = distance * DVec3::new(0.3, -0.7, 0.6);
         Camera::look_at((48, 48), Lens::Fov(45.0), eye, DVec3::ZERO, Some(DVec3::Z), Up::Z, 0.01).unwrap()
     };
-    let needs = |options: &RenderOptions, backend: &Backend| {
+    let needs = |options: &Settings, backend: &Backend| {
         let (frame, report) = render(&scene, &far(16.0), options, backend, &()).unwrap();
         (bits(&frame), report.needs.contains(&"veils"))
     };
@@ -260,7 +260,7 @@ fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
         .replace("fragments_veils.wgsl", "(held_back >= ENOUGH_HELD)", "(held_back >= ENOUGH_HELD / 8u)")
         .unwrap();
     for composite in [Composite::Gaussians, Composite::Sorted] {
-        let of = RenderOptions { composite, opacity: 0.9, ..options() };
+        let of = Settings { composite, opacity: 0.9, ..options() };
         let (whole, veiled) = needs(&of, &backend);
         assert!(!veiled);
         let (ended, veiled) = needs(&of, &Backend::gpu(small()));
@@ -271,7 +271,7 @@ fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
     // The whole cloud covers a few pixels. Fragments whose depths differ only by rounding may come
     // in either order, which changes colours little, because they are alike.
     let camera = far(2000.0);
-    let of = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options() };
+    let of = Settings { maps: Maps::of(&[Map::Decision]), ..options() };
     let twin = frame(&scene, &camera, &of, &Backend::Reference);
     let shown = frame(&scene, &camera, &options(), &backend);
     let mut compared = 0;

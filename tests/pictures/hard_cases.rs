@@ -7,7 +7,7 @@ use crate::common;
 use common::judged::judge;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::hardcases::{self, Verdict};
-use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Settings};
 use epsplat::low_level::render::Backend;
 use epsplat::low_level::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
@@ -19,7 +19,7 @@ fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
     let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
     let scene =
         Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
-    judge(name, (&scene, camera), RenderOptions::default(), (covered - 0.02, covered + 0.02), &Backend::gpu(gpu));
+    judge(name, (&scene, camera), Settings::default(), (covered - 0.02, covered + 0.02), &Backend::gpu(gpu));
 }
 
 fn pinhole(size: (u32, u32)) -> Camera {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use epsplat::io;
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::color::linear_to_srgb;
 use epsplat::low_level::scene::{Camera, Colors, Lens, Light, Scene, Shading};
@@ -38,8 +38,8 @@ fn framed(scene: &Scene, size: (u32, u32), lens: Lens) -> Camera {
     Camera::framing(size, lens, scene, Camera::default_near(scene)).unwrap()
 }
 
-fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
-    let default = RenderOptions::default();
+fn cases() -> Vec<(&'static str, Scene, Camera, Settings)> {
+    let default = Settings::default();
     let mut cases = Vec::new();
     let mut case = |name, scene: Scene, size, lens, options| {
         let camera = framed(&scene, size, lens);
@@ -51,11 +51,11 @@ fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
         file("autzen.laz"),
         (1024, 400),
         Lens::Fov(20.0),
-        RenderOptions { background: [1.0; 4], ..default.clone() },
+        Settings { background: [1.0; 4], ..default.clone() },
     );
     case("bunny", file("bunny.obj"), (256, 256), Lens::Fov(45.0), default.clone());
     // The README's second picture, of glass.
-    let glass = RenderOptions {
+    let glass = Settings {
         composite: "layers".parse().unwrap(),
         opacity: 0.5,
         samples: "4".parse().unwrap(),
@@ -65,9 +65,9 @@ fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     case("glass", file("bunny.obj"), (512, 512), Lens::Fov(45.0), glass);
     let toward = Vec3::new(-1.0, 1.0, 1.0).normalize();
     let lights = vec![Light::Directional { toward, intensity: 0.9 }, Light::Headlight { intensity: 0.2 }];
-    let lit = RenderOptions { lights, background: [0.1, 0.2, 0.4, 1.0], ..default.clone() };
+    let lit = Settings { lights, background: [0.1, 0.2, 0.4, 1.0], ..default.clone() };
     case("torus", generated(Shape::Torus, 20_000), (200, 150), Lens::OrthographicHeight(2.8), lit);
-    let unlit = RenderOptions { shading: Shading::Unlit, ..default.clone() };
+    let unlit = Settings { shading: Shading::Unlit, ..default.clone() };
     case("checkerboard", generated(Shape::Checkerboard, 40_000), (160, 120), Lens::Fov(60.0), unlit);
     case("sphere", generated(Shape::Sphere, 3000), (120, 120), Lens::Intrinsics([150.0, 120.0, 50.0, 70.0]), default);
     cases
@@ -106,7 +106,7 @@ fn the_reference_renders_the_golden_images() {
         // The platform's `exp` and `pow` may change a code by one.
         assert_eq!(differing(&frame, &expected), 0.0, "{name}");
         // Control: another kernel gives another image.
-        let other = RenderOptions { kernel: "ellipse:2,3".parse().unwrap(), ..options };
+        let other = Settings { kernel: "ellipse:2,3".parse().unwrap(), ..options };
         let (frame, _) = render(&scene, &camera, &other, &Backend::Reference, &()).unwrap();
         assert!(differing(&frame, &expected) > 0.001, "{name}: a different kernel went unnoticed");
     }

@@ -14,7 +14,7 @@ use epsplat::low_level::inspect::stages;
 use epsplat::low_level::passes::accumulate::PixelSums;
 use epsplat::low_level::passes::join::Beside;
 use epsplat::low_level::passes::resolve;
-use epsplat::low_level::plan::{AccumulatorRow, COLOR_CHANNEL, Optimisation, RenderOptions};
+use epsplat::low_level::plan::{AccumulatorRow, COLOR_CHANNEL, Optimisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::camera::Lens;
 use epsplat::low_level::scene::options::HIGHLIGHT;
@@ -23,11 +23,11 @@ use glam::{DVec3, Vec3};
 
 const E: f64 = 1.0 / 16_777_216.0;
 
-fn options() -> RenderOptions {
-    RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() }
+fn options() -> Settings {
+    Settings { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -51,7 +51,7 @@ fn a_plane_of_one_colour_is_exactly_that_colour() {
 fn check_plane(row: &AccumulatorRow, backend: &Backend) {
     let camera = front(64);
     let surfels = plane(64, 5.0);
-    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
+    let options = Settings { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let color = [0.123_456_7, 7.654_321, 0.333_333_34, 1.0];
     let code = [200, 17, 99, 255];
     let decoded = Colors::Srgb8(vec![code]).linear(0);
@@ -113,7 +113,7 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
         up: Up::Y,
         ..Scene::default()
     };
-    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
+    let options = Settings { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let frame = frame(&scene, &camera, &options, backend);
     let (weights, counts) = (frame.map(Map::Weight).unwrap(), frame.map(Map::Count).unwrap());
@@ -135,7 +135,7 @@ fn sums_past_32_bits_are_exact() {
     let (scene, camera) = stack(1001, (5033.7 * UNIT) as f32);
     // With the kernels that every adapter supports.
     let without = vec![Optimisation::Pairs];
-    let options = RenderOptions { kernel: Kernel::Ellipse { a: 0.0, n: 3.0, smooth: false }, without, ..options() };
+    let options = Settings { kernel: Kernel::Ellipse { a: 0.0, n: 3.0, smooth: false }, without, ..options() };
     let sums = |sources: &Sources| {
         let device = stages(&scene, &camera, &options, &gpu, sources).unwrap();
         let sum = |pixel, channel| device.sums.sum(pixel, channel).unwrap();
@@ -164,7 +164,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         let Backend::Gpu { gpu, .. } = &backend else { unreachable!() };
         let mut worst = [0f64; 4];
         for (index, (scene, camera)) in crowded().into_iter().enumerate() {
-            let mut options = RenderOptions { shading, ..options() };
+            let mut options = Settings { shading, ..options() };
             if index != 0 {
                 options.background = [0.3, 0.2, 0.9, 0.5];
                 options.lights.push("1,2,3:0.7".parse().unwrap());
@@ -207,7 +207,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
     // The cosine of a mirrored light errs by four times the normal's error plus its own rounding;
     // its power multiplies that by the exponent; and there are two lights.
     let of_cosine = 4.0 * limits[1] + 8.0 * E;
-    let of_highlights = 2.0 * HIGHLIGHT * f64::from(RenderOptions::default().shininess) * of_cosine;
+    let of_highlights = 2.0 * HIGHLIGHT * f64::from(Settings::default().shininess) * of_cosine;
     let phong = [limits[0] + of_highlights, limits[1], limits[2], limits[3]];
     for (shading, limits) in [(Shading::Lambert, limits), (Shading::Phong, phong)] {
         let Some(gpu) = common::gpu() else { return };
@@ -236,7 +236,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
 }
 
 /// Converts the device's sums into those of the twin.
-fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Vec<PixelSums> {
+fn unmapped(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Vec<PixelSums> {
     let device = stages(scene, camera, options, gpu, &Sources::default()).unwrap();
     let (low, high) = scene.color_range();
     // An opaque scene has no sum of alpha.

@@ -11,7 +11,7 @@ use common::scenes::generated;
 use epsplat::io::{self, Points};
 use epsplat::low_level::passes::layers::{Parting, part};
 use epsplat::low_level::passes::{Strip, fragments, project};
-use epsplat::low_level::plan::{Facts, RenderOptions};
+use epsplat::low_level::plan::{Facts, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{Camera, Composite, Lens, Map, Maps, Scene, Shading, Surfel, Tail, Up};
@@ -92,7 +92,7 @@ fn inner(crossed: &[u32]) -> Vec<usize> {
 }
 
 /// The number of layers per pixel by the f64 reference.
-fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<u32> {
+fn parted(scene: &Scene, camera: &Camera, options: &Settings, parting: Parting) -> Vec<u32> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
     let strip = Strip { splats, rows, ..Strip::of((scene, &Facts::of(scene)), camera, options) };
@@ -106,13 +106,13 @@ fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Part
 #[test]
 fn layers_are_the_surfaces_that_rays_cross() {
     let Some(backend) = common::gpu().map(Backend::gpu) else { return };
-    let options = RenderOptions {
+    let options = Settings {
         composite: Composite::Layers(ALL_LAYERS),
         // Translucent enough for the farthest of twenty surfaces to count.
         opacity: 0.2,
         shading: Shading::Unlit,
         maps: Maps::of(&[Map::Layers]),
-        ..RenderOptions::default()
+        ..Settings::default()
     };
     let (mut wrong_by_runs, mut wrong_by_window) = (0.0, 0.0);
     for seen in all() {

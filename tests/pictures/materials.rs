@@ -8,7 +8,7 @@ use crate::common;
 use common::command::{Folder, succeeds, text};
 use epsplat::io::{self, Texture, png};
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Scene, Shading, Up};
 use epsplat::low_level::surfels::{Limits, build, build_painted, build_textured, with_triangles};
@@ -47,7 +47,7 @@ fn as_triangles(path: &Path) -> Scene {
 fn seen(scene: &Scene, eye: DVec3) -> Frame {
     let lens = epsplat::low_level::scene::Lens::Fov(40.0);
     let camera = Camera::look_at((SIZE, SIZE), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
-    let options = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
+    let options = Settings { shading: Shading::Unlit, ..Settings::default() };
     render(scene, &camera, &options, &Backend::Reference, &()).unwrap().0
 }
 
@@ -189,7 +189,7 @@ fn surfels_look_as_triangles_do() {
         if let Some(gpu) = common::gpu() {
             let lens = epsplat::low_level::scene::Lens::Fov(40.0);
             let camera = Camera::look_at((SIZE, SIZE), lens, ASLANT, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
-            let options = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
+            let options = Settings { shading: Shading::Unlit, ..Settings::default() };
             let drawn = render(&scene, &camera, &options, &Backend::gpu(gpu), &()).unwrap().0;
             let twin = seen(&scene, ASLANT);
             let differs = |(a, b): &(&[f32; 4], &[f32; 4])| (0..4).any(|k| (a[k] - b[k]).abs() > 5e-3);

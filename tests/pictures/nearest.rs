@@ -6,7 +6,7 @@
 use common::scenes::{sphere, sphere_camera};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
-use epsplat::low_level::plan::{Accumulator, BlendFormat, Optimisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::low_level::plan::{Accumulator, BlendFormat, Optimisation, Raster, RasterDepth, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::facing::POINT_SHAPES;
 use epsplat::low_level::scene::{
@@ -27,13 +27,13 @@ fn colored(count: u64) -> Scene {
     scene
 }
 
-fn options(facing: Option<PointShape>) -> RenderOptions {
-    RenderOptions {
+fn options(facing: Option<PointShape>) -> Settings {
+    Settings {
         facing: facing.map(|shape| Facing { shape, pixels: [1.0, 40.0] }),
         blend: Blend::Nearest,
         shading: Shading::Unlit,
         maps: Maps::of(&[Map::Depth]),
-        ..RenderOptions::default()
+        ..Settings::default()
     }
 }
 
@@ -55,8 +55,8 @@ fn wrong(frame: &Frame, reference: &Frame) -> (usize, usize) {
     (decided.len(), decided.into_iter().filter(|&pixel| differs(pixel)).count())
 }
 
-fn reference(scene: &Scene, projection: Projection, options: &RenderOptions) -> Frame {
-    let options = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+fn reference(scene: &Scene, projection: Projection, options: &Settings) -> Frame {
+    let options = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     render(scene, &sphere_camera(160, projection), &options, &Backend::Reference, &()).unwrap().0
 }
 
@@ -75,7 +75,7 @@ fn one_pass_two_passes_and_the_twin_show_the_same_fragments() {
             let (decided, wrong) = wrong(&frame, &reference(&scene, projection, &options));
             assert!(wrong == 0 && decided > 20_000, "{wrong} of {decided}, {kind:?}");
             // Two passes, as without 64-bit atomics: switched off, or absent from the adapter.
-            let second = RenderOptions { without: vec![Optimisation::Pairs], ..options.clone() };
+            let second = Settings { without: vec![Optimisation::Pairs], ..options.clone() };
             for (options, backend) in [(&second, &backend), (&options, &core)] {
                 let (frame_of_two, report) = render(&scene, &camera, options, backend, &()).unwrap();
                 assert!(report.passes.contains_key("accumulate_ms"));
@@ -102,9 +102,9 @@ fn neither_order_nor_what_is_left_out_shows() {
         for samples in ["1", "4"] {
             let samples: Samples = samples.parse().unwrap();
             let maps = if samples == Samples::ONE { Maps::of(&[Map::Depth]) } else { Maps::NONE };
-            let options = RenderOptions { samples, maps, ..options(kind) };
+            let options = Settings { samples, maps, ..options(kind) };
             let bits = |scene: &Scene, without: &[Optimisation]| {
-                let options = RenderOptions { without: without.into(), ..options.clone() };
+                let options = Settings { without: without.into(), ..options.clone() };
                 common::bits(&render(scene, &camera, &options, &backend, &()).unwrap().0)
             };
             let plain = bits(&scene, &[]);
@@ -142,7 +142,7 @@ fn broken_kernels_are_noticed() {
         (None, "depth_map.wgsl", "depth * held.world", "depth * held.world * 1.0001"),
     ] {
         let Some(gpu) = common::gpu() else { return };
-        let options = RenderOptions { without: without.into_iter().collect(), ..options(Some(PointShape::Sphere)) };
+        let options = Settings { without: without.into_iter().collect(), ..options(Some(PointShape::Sphere)) };
         let sources = Sources::default().replace(file, from, to).unwrap();
         let (frame, _) = render(&scene, &camera, &options, &Backend::Gpu { gpu: Box::new(gpu), sources }, &()).unwrap();
         let (_, wrong) = wrong(&frame, &reference(&scene, Projection::Pinhole, &options));
@@ -161,12 +161,12 @@ fn the_rasterisers_depth_test_shows_the_same_points() {
         (RasterDepth::Exact, PointShape::Paraboloid),
         (RasterDepth::Offset, PointShape::Circle),
     ] {
-        let options = RenderOptions { maps: Maps::NONE, ..options(Some(shape)) };
+        let options = Settings { maps: Maps::NONE, ..options(Some(shape)) };
         let raster = Some(Raster { format: BlendFormat::Rgba32Float, depth });
         let decisions = reference(&scene, Projection::Pinhole, &options);
         let decided = decisions.map(Map::Decision).unwrap();
         let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
-        let (rastered, report) = render(&scene, &camera, &RenderOptions { raster, ..options }, &backend, &()).unwrap();
+        let (rastered, report) = render(&scene, &camera, &Settings { raster, ..options }, &backend, &()).unwrap();
         assert!(!report.passes.contains_key("accumulate_ms"));
         let far = |pixel: usize| {
             let mut both = frame.color[pixel].into_iter().zip(rastered.color[pixel]);
@@ -179,15 +179,15 @@ fn the_rasterisers_depth_test_shows_the_same_points() {
 #[test]
 fn what_the_nearest_fragment_does_not_have_is_refused() {
     let nearest = options(None);
-    let refused = |options: RenderOptions| check::options(&options, false).unwrap_err().to_string();
-    assert!(refused(RenderOptions { shading: Shading::Lambert, ..nearest.clone() }).contains("unlit"));
+    let refused = |options: Settings| check::options(&options, false).unwrap_err().to_string();
+    assert!(refused(Settings { shading: Shading::Lambert, ..nearest.clone() }).contains("unlit"));
     for map in [Map::Normal, Map::Weight, Map::Count, Map::Index] {
-        let options = RenderOptions { maps: Maps::of(&[map]), ..nearest.clone() };
+        let options = Settings { maps: Maps::of(&[map]), ..nearest.clone() };
         assert!(refused(options).contains(map.row().name), "{map:?}");
     }
-    assert!(refused(RenderOptions { low_pass: LowPass::Max, ..nearest.clone() }).contains("low-pass"));
-    assert!(refused(RenderOptions { accumulator: Accumulator::Cas, ..nearest.clone() }).contains("accumulator"));
+    assert!(refused(Settings { low_pass: LowPass::Max, ..nearest.clone() }).contains("low-pass"));
+    assert!(refused(Settings { accumulator: Accumulator::Cas, ..nearest.clone() }).contains("accumulator"));
     let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Offset });
-    assert!(refused(RenderOptions { raster, ..nearest.clone() }).contains("exact"));
+    assert!(refused(Settings { raster, ..nearest.clone() }).contains("exact"));
     assert!(check::options(&nearest, false).is_ok());
 }

@@ -11,7 +11,7 @@ use common::scenes::{cases, crowded, shuffled, sphere, sphere_camera, stack};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::metrics::{DECISION_MARGIN, compare};
-use epsplat::low_level::plan::{Accumulator, Facts, Raster, RenderOptions, depths};
+use epsplat::low_level::plan::{Accumulator, Facts, Raster, Settings, depths};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Composite, Kernel, Map, Maps, Projection, Samples, Scene, Shading};
 
@@ -21,11 +21,11 @@ fn gpu() -> Option<Backend> {
     common::gpu().map(Backend::gpu)
 }
 
-fn options(composite: Composite) -> RenderOptions {
-    RenderOptions { composite, opacity: 0.7, ..RenderOptions::default() }
+fn options(composite: Composite) -> Settings {
+    Settings { composite, opacity: 0.7, ..Settings::default() }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -46,7 +46,7 @@ fn planes(of: &[(f32, [f32; 4])]) -> (Scene, Camera) {
 #[test]
 fn planes_are_what_the_formulas_say() {
     let Some(backend) = gpu() else { return };
-    let plain = |composite| RenderOptions {
+    let plain = |composite| Settings {
         opacity: 1.0,
         shading: Shading::Unlit,
         kernel: Kernel::Constant,
@@ -81,7 +81,7 @@ fn planes_are_what_the_formulas_say() {
         for count in [2, 4, 10, 20, 100] {
             let many: Vec<_> = (0..count).map(|k| (5.0 + 0.5 * k as f32, [0.25, 0.25, 0.25, 1.0])).collect();
             let (scene, camera) = planes(&many);
-            let shown = frame(&scene, &camera, &RenderOptions { opacity: 0.1, ..plain(composite) }, &backend);
+            let shown = frame(&scene, &camera, &Settings { opacity: 0.1, ..plain(composite) }, &backend);
             let expected = 0.9f64.powi(count);
             for transmittance in shown.map(Map::Transmittance).unwrap() {
                 assert!((f64::from(*transmittance) - expected).abs() < 1e-5, "{composite:?} {count}: {transmittance}");
@@ -115,8 +115,8 @@ fn kernels_and_twins_sum_alike() {
     for (number, (scene, camera)) in all.iter().enumerate() {
         for (composite, most) in BOTH.into_iter().zip([1e-5, 1e-3]) {
             let shading = if number % 2 == 0 { Shading::Lambert } else { Shading::Unlit };
-            let own = RenderOptions { shading, maps: Maps::of(&[Map::Transmittance]), ..options(composite) };
-            let with_decision = RenderOptions { maps: own.maps.and(&[Map::Decision]), ..own.clone() };
+            let own = Settings { shading, maps: Maps::of(&[Map::Transmittance]), ..options(composite) };
+            let with_decision = Settings { maps: own.maps.and(&[Map::Decision]), ..own.clone() };
             let truth = frame(scene, camera, &with_decision, &Backend::Reference);
             let decided = truth.map(Map::Decision).unwrap();
             let differ = |other: &Frame| {
@@ -153,9 +153,9 @@ fn the_order_shows_in_sums_of_floats_alone() {
     for (scene, camera) in crowded() {
         for composite in BOTH {
             for samples in [Samples::ONE, "4".parse().unwrap()] {
-                let own = RenderOptions { samples, ..options(composite) };
+                let own = Settings { samples, ..options(composite) };
                 let first = bits(&frame(&scene, &camera, &own, &backend));
-                let floats = RenderOptions { accumulator: Accumulator::Cas, ..own.clone() };
+                let floats = Settings { accumulator: Accumulator::Cas, ..own.clone() };
                 let of_floats = frame(&scene, &camera, &floats, &backend);
                 for seed in [3, 4] {
                     let other = shuffled(&scene, seed);
@@ -179,7 +179,7 @@ fn the_order_shows_in_sums_of_floats_alone() {
 fn what_is_dense_and_what_strays_leave_no_holes() {
     let Some(backend) = gpu() else { return };
     for composite in BOTH {
-        let own = RenderOptions {
+        let own = Settings {
             opacity: 1.0,
             kernel: Kernel::Constant,
             shading: Shading::Unlit,
@@ -229,14 +229,14 @@ fn moments_are_nearer_to_what_is_sorted() {
 fn what_does_not_go_with_sums_of_all_is_refused() {
     let Some(backend) = gpu() else { return };
     let (scene, camera) = stack(2, 0.5);
-    let refused = |of: RenderOptions| match render(&scene, &camera, &of, &backend, &()) {
+    let refused = |of: Settings| match render(&scene, &camera, &of, &backend, &()) {
         Err(error) => error.to_string(),
         Ok(_) => panic!("{of:?} is not refused"),
     };
     let own = options(Composite::Weighted);
     for (of, says) in [
-        (RenderOptions { accumulator: Accumulator::Fixed32, ..own.clone() }, "sums of 32 bits"),
-        (RenderOptions { raster: Some(Raster::default()), ..own.clone() }, "the rasteriser sums one surface"),
+        (Settings { accumulator: Accumulator::Fixed32, ..own.clone() }, "sums of 32 bits"),
+        (Settings { raster: Some(Raster::default()), ..own.clone() }, "the rasteriser sums one surface"),
     ] {
         assert!(refused(of).contains(says), "{says}");
     }

@@ -10,7 +10,7 @@ use std::cell::Cell;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::hardcases::{HardCase, judge};
-use epsplat::low_level::plan::{ACCUMULATORS, RenderOptions, check};
+use epsplat::low_level::plan::{ACCUMULATORS, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Map, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
@@ -65,7 +65,7 @@ fn camera(scene: &Scene, orthographic: bool) -> Camera {
     Camera::look_at(SIZE, lens, eye, scene.origin, None, Up::Z, 1e-2).unwrap()
 }
 
-fn options() -> impl Strategy<Value = RenderOptions> {
+fn options() -> impl Strategy<Value = Settings> {
     let ellipse =
         prop_oneof![Just(3.0), Just(2.0), Just(1.7)].prop_map(|n| Kernel::Ellipse { a: 6.0, n, smooth: false });
     let smooth = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true };
@@ -78,14 +78,14 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let kernel = prop_oneof![ellipse, others];
     (0usize..4, kernel, 0..ACCUMULATORS.len()).prop_map(|(epsilon, kernel, accumulator)| {
         let epsilons = [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0), Epsilon::Radius(0.5)];
-        RenderOptions {
+        Settings {
             epsilon: epsilons[epsilon],
             kernel,
             accumulator: ACCUMULATORS[accumulator].of,
             shading: Shading::Unlit,
             lights: vec![Light::Headlight { intensity: 0.7 }, Light::Directional { toward: Vec3::Z, intensity: 0.3 }],
             maps: Maps::ON_DEVICE,
-            ..RenderOptions::default()
+            ..Settings::default()
         }
     })
 }
@@ -186,7 +186,7 @@ fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
         if row.deterministic {
             let (again, _) = render(&dealt(scene), camera, options, backend, &()).unwrap();
             prop_assert!(frame == again, "the order of the surfels changed the image");
-            let lambert = RenderOptions { shading: Shading::Lambert, ..options.clone() };
+            let lambert = Settings { shading: Shading::Lambert, ..options.clone() };
             let (shaded, _) = render(scene, camera, &lambert, backend, &()).unwrap();
             for (pixel, color) in shaded.color.iter().enumerate() {
                 let (expected, bound) = lit(&frame, camera, &options.lights, pixel);

@@ -8,9 +8,7 @@ use crate::common;
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::hardcases::{HardCase, Row, Truth, cases, judge};
-use epsplat::low_level::plan::{
-    Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, RenderOptions,
-};
+use epsplat::low_level::plan::{Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Report, render};
 use epsplat::low_level::scene::{Camera, Epsilon, Map, Maps, Shading};
 
@@ -31,12 +29,12 @@ fn all_cases() -> Vec<(HardCase, Truth)> {
     all
 }
 
-fn options(case: &HardCase, format: BlendFormat, depth: RasterDepth) -> RenderOptions {
+fn options(case: &HardCase, format: BlendFormat, depth: RasterDepth) -> Settings {
     let maps = if format == BlendFormat::Rgba8Unorm { Maps::ON_DEVICE.but(&[Map::Count]) } else { Maps::ON_DEVICE };
-    RenderOptions { raster: Some(Raster { format, depth }), maps, ..case.options.clone() }
+    Settings { raster: Some(Raster { format, depth }), maps, ..case.options.clone() }
 }
 
-fn frame(case: &HardCase, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+fn frame(case: &HardCase, options: &Settings, backend: &Backend) -> (Frame, Report) {
     render(&case.scene, &case.camera, options, backend, &()).unwrap()
 }
 
@@ -132,7 +130,7 @@ fn the_classic_depth_test_accepts_nearly_the_same_fragments() {
     for name in ["intersecting sheets", "intersecting sheets, orthographic", "UTM, a kilometre off"] {
         let case = cases().unwrap().into_iter().find(|case| case.name == name).unwrap();
         for epsilon in [case.options.epsilon, Epsilon::Ray(0.01)] {
-            let case = HardCase { options: RenderOptions { epsilon, ..case.options.clone() }, ..case.clone() };
+            let case = HardCase { options: Settings { epsilon, ..case.options.clone() }, ..case.clone() };
             let count = |depth| {
                 let frame = frame(&case, &options(&case, BlendFormat::Rgba16Float, depth), &backend).0;
                 frame.map(Map::Count).unwrap().to_vec()
@@ -159,8 +157,7 @@ fn eight_bits_lose_what_they_must_and_refuse_to_count() {
     };
     let (half, _) = frame(&case, &options(&case, BlendFormat::Rgba16Float, RasterDepth::Exact), &backend);
     assert!(worst(&eight) > 10.0 * worst(&half), "{} and {}", worst(&eight), worst(&half));
-    let counted =
-        RenderOptions { maps: Maps::ON_DEVICE, ..options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact) };
+    let counted = Settings { maps: Maps::ON_DEVICE, ..options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact) };
     let error = render(&case.scene, &case.camera, &counted, &backend, &()).unwrap_err().to_string();
     assert!(error.contains("8-bit"), "{error}");
 }
@@ -175,12 +172,12 @@ fn lit_pictures_are_computes() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     for (case, _) in all_cases().iter().filter(|(case, _)| case.name.starts_with("intersecting")) {
-        let plain = RenderOptions::default();
+        let plain = Settings::default();
         assert_eq!(plain.shading, Shading::Lambert);
-        let lit = RenderOptions { shading: plain.shading, lights: plain.lights, ..case.options.clone() };
-        let lit = RenderOptions { maps: lit.maps.and(&[Map::Count]), ..lit };
+        let lit = Settings { shading: plain.shading, lights: plain.lights, ..case.options.clone() };
+        let lit = Settings { maps: lit.maps.and(&[Map::Count]), ..lit };
         let (compute, _) = frame(case, &lit, &backend);
-        let raster = RenderOptions { raster: Some(Raster::default()), ..lit.clone() };
+        let raster = Settings { raster: Some(Raster::default()), ..lit.clone() };
         let (raster, _) = frame(case, &raster, &backend);
         let largest = case.scene.colors.clone();
         let range = (0..case.scene.surfels.len()).flat_map(|k| largest.linear(k)).fold(1.0, f32::max);
@@ -206,7 +203,7 @@ fn tight_shapes_leave_out_nothing() {
         let Some(gpu) = common::gpu() else { return vec![] };
         let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
         let camera = Camera { width: size, height: size, ..case.camera.clone() };
-        let options = RenderOptions { ..options(case, BlendFormat::Rgba16Float, depth) };
+        let options = Settings { ..options(case, BlendFormat::Rgba16Float, depth) };
         common::bits(&render(&case.scene, &camera, &options, &backend, &()).unwrap().0)
     };
     let mut noticed = [0; 2];

@@ -9,7 +9,7 @@ use common::scenes::{painted, sphere, sphere_camera};
 use common::{Random, bits, meshes};
 use epsplat::io::{self, Mesh, Texture};
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, Settings, check};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::color::{decoded, srgb8};
 use epsplat::low_level::scene::{
@@ -17,7 +17,7 @@ use epsplat::low_level::scene::{
 };
 use epsplat::low_level::surfels::with_triangles;
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -49,12 +49,12 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
     // To the left of the Gaussians, and in front of them.
     let both = with_triangles(Some(gaussians.clone()), &[ball([0.0, 0.9, 0.9], 0.5)]).unwrap().0;
     let alone = Scene { triangles: both.triangles.clone(), ..Scene::default() };
-    let options = RenderOptions {
+    let options = Settings {
         shading: Shading::Unlit,
         kernel: gaussian::KERNEL,
         join: Join::Nearest,
         maps: Maps::of(&[Map::Depth]),
-        ..RenderOptions::default()
+        ..Settings::default()
     };
     for backend in &backends {
         let [shown, splats, triangles] =
@@ -75,7 +75,7 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
         }
         assert!(seen.iter().all(|seen| *seen > 200), "{seen:?}");
     }
-    let through = RenderOptions { composite: Composite::Gaussians, ..options };
+    let through = Settings { composite: Composite::Gaussians, ..options };
     let why = check::scene(&Facts::of(&both), &through, false).unwrap_err().to_string();
     assert!(why.contains("--composite opaque"), "{why}");
 }
@@ -91,7 +91,7 @@ fn finer_colours_are_rounded_where_one_fragment_shows() {
     let rounded = Scene { colors: Colors::Srgb8(colors.iter().map(|color| srgb8(*color)).collect()), ..scene.clone() };
     assert_ne!(decoded(srgb8(colors[0])), colors[0]);
     let camera = sphere_camera(64, Projection::Pinhole);
-    let options = RenderOptions { shading: Shading::Unlit, blend: Blend::Nearest, ..RenderOptions::default() };
+    let options = Settings { shading: Shading::Unlit, blend: Blend::Nearest, ..Settings::default() };
     for backend in &backends {
         let [own, codes] = [&scene, &rounded].map(|scene| frame(scene, &camera, &options, backend));
         assert!(own.color == codes.color && own.color.iter().any(|color| color[3] > 0.0));
@@ -106,15 +106,15 @@ fn tiles_are_taken_wherever_nobody_says_how_splats_are_drawn() {
     let mut scene = sphere(500, 2.0);
     scene.colors = Colors::Constant([0.5, 0.4, 0.3, 0.5]);
     let camera = sphere_camera(48, Projection::Pinhole);
-    let plain = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
+    let plain = Settings { shading: Shading::Unlit, ..Settings::default() };
     for options in [
-        RenderOptions { composite: Composite::Layers(2), ..plain.clone() },
-        RenderOptions { composite: Composite::Sorted, ..plain.clone() },
-        RenderOptions { composite: Composite::Moments, ..plain.clone() },
-        RenderOptions { blend: Blend::Nearest, ..plain.clone() },
-        RenderOptions { accumulator: Accumulator::Fixed32, ..plain.clone() },
+        Settings { composite: Composite::Layers(2), ..plain.clone() },
+        Settings { composite: Composite::Sorted, ..plain.clone() },
+        Settings { composite: Composite::Moments, ..plain.clone() },
+        Settings { blend: Blend::Nearest, ..plain.clone() },
+        Settings { accumulator: Accumulator::Fixed32, ..plain.clone() },
     ] {
-        let tiled = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
+        let tiled = Settings { organisation: Organisation::Tile, ..options.clone() };
         assert!(
             bits(&frame(&scene, &camera, &tiled, &gpu)) == bits(&frame(&scene, &camera, &options, &gpu)),
             "{options:?}"
@@ -129,7 +129,7 @@ fn tiles_are_taken_wherever_nobody_says_how_splats_are_drawn() {
 fn triangles_out_of_view_change_nothing() {
     let Some(backends) = backends() else { return };
     let scene = sphere(700, 2.5);
-    let options = RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
+    let options = Settings { maps: Maps::of(&[Map::Depth]), ..Settings::default() };
     for projection in [Projection::Pinhole, Projection::Orthographic] {
         let camera = sphere_camera(64, projection);
         let behind = camera.eye + (camera.eye - scene.origin);

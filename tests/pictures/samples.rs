@@ -8,7 +8,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Gpu;
 use epsplat::low_level::metrics::compare;
 use epsplat::low_level::passes::resolve::mean_of_samples;
-use epsplat::low_level::plan::{Accumulator, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Clip, Colors, Map, Maps, Projection, Samples, Scene, Shading};
 
@@ -28,8 +28,8 @@ fn scene() -> Scene {
     scene
 }
 
-fn options(samples: Samples) -> RenderOptions {
-    RenderOptions { samples, background: [0.2, 0.4, 0.6, 0.5], ..RenderOptions::default() }
+fn options(samples: Samples) -> Settings {
+    Settings { samples, background: [0.2, 0.4, 0.6, 0.5], ..Settings::default() }
 }
 
 fn views() -> [Camera; 2] {
@@ -73,7 +73,7 @@ fn the_reference_and_every_organisation_agree() {
     let (scene, backend) = (scene(), Backend::gpu(gpu));
     for camera in views() {
         let of = |organisation, accumulator, backend: &Backend| {
-            let options = RenderOptions { organisation, accumulator, ..options(samples("8")) };
+            let options = Settings { organisation, accumulator, ..options(samples("8")) };
             render(&scene, &camera, &options, backend, &()).unwrap().0
         };
         let frame = of(Organisation::Auto, Accumulator::Fixed, &backend);
@@ -95,7 +95,7 @@ fn the_reference_and_every_organisation_agree() {
 fn colours_of_many_samples_are_excused_by_their_samples() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera, backend) = (scene(), &views()[0], Backend::gpu(gpu));
-    let with = |maps: &[Map]| RenderOptions { maps: Maps::of(maps), ..options(samples("4")) };
+    let with = |maps: &[Map]| Settings { maps: Maps::of(maps), ..options(samples("4")) };
     let (frame, _) = render(&scene, camera, &with(&[Map::Depth]), &backend, &()).unwrap();
     let (reference, _) = render(&scene, camera, &with(&[Map::Depth, Map::Decision]), &Backend::Reference, &()).unwrap();
     let comparison = compare(&frame, &reference).unwrap();
@@ -110,7 +110,7 @@ fn maps_are_of_the_centre_however_many_samples_there_are() {
     let maps = Maps::ON_DEVICE;
     for backend in [backend, Backend::Reference] {
         let [one, many] = ["1", "4"].map(|count| {
-            let options = RenderOptions { maps, ..options(samples(count)) };
+            let options = Settings { maps, ..options(samples(count)) };
             render(&scene, &views()[0], &options, &backend, &()).unwrap().0
         });
         for map in maps.iter() {
@@ -128,7 +128,7 @@ fn maps_do_not_change_the_colours_of_several_samples() {
     let (mut scene, backend) = (scene(), Backend::gpu(gpu));
     scene.normals = vec![[0.0, 0.6, 0.8]; scene.surfels.len()];
     let with = |maps: &[Map]| {
-        let options = RenderOptions { shading: Shading::Unlit, maps: Maps::of(maps), ..options(samples("4")) };
+        let options = Settings { shading: Shading::Unlit, maps: Maps::of(maps), ..options(samples("4")) };
         render(&scene, &views()[0], &options, &backend, &()).unwrap().0
     };
     let plain = with(&[]);
@@ -141,7 +141,7 @@ fn maps_do_not_change_the_colours_of_several_samples() {
 fn an_outline_has_alphas_in_between() {
     let (scene, camera) = (sphere(3000, 1.7), &views()[0]);
     let alphas = |count: &str| {
-        let options = RenderOptions { samples: samples(count), shading: Shading::Unlit, ..RenderOptions::default() };
+        let options = Settings { samples: samples(count), shading: Shading::Unlit, ..Settings::default() };
         let (frame, _) = render(&scene, camera, &options, &Backend::Reference, &()).unwrap();
         let mut levels: Vec<u32> = frame.color.iter().map(|color| (color[3] * 16.0).round() as u32).collect();
         levels.sort_unstable();

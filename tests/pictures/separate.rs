@@ -12,7 +12,7 @@ use common::{Random, bits, meshes};
 use epsplat::io::{Mesh, Points};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Facts, Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Epsilon, Join, Kernel, LowPass, Map, Maps, Projection, Samples, Scene, Shading,
@@ -69,8 +69,8 @@ fn body() -> Mesh {
 
 const MAPS: Maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count, Map::Transmittance]);
 
-fn apart() -> RenderOptions {
-    RenderOptions { separate: true, shading: Shading::Unlit, maps: MAPS, ..RenderOptions::default() }
+fn apart() -> Settings {
+    Settings { separate: true, shading: Shading::Unlit, maps: MAPS, ..Settings::default() }
 }
 
 fn gpu() -> Option<Backend> {
@@ -82,7 +82,7 @@ fn broken(file: &str, from: &str, to: &str) -> Backend {
     Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
 }
 
-fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, options: &Settings, backend: &Backend) -> Frame {
     render(scene, &camera(), options, backend, &()).unwrap().0
 }
 
@@ -104,8 +104,8 @@ fn differ(shown: &Frame, truth: &Frame) -> usize {
     (0..decided.len()).filter(|pixel| decided[*pixel] > 1e-5 && !alike(*pixel)).count()
 }
 
-fn truth(scene: &Scene, options: &RenderOptions) -> Frame {
-    let with_decision = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+fn truth(scene: &Scene, options: &Settings) -> Frame {
+    let with_decision = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     frame(scene, &with_decision, &Backend::Reference)
 }
 
@@ -113,15 +113,15 @@ fn truth(scene: &Scene, options: &RenderOptions) -> Frame {
 fn inputs_do_not_blend_and_kernels_agree_with_twins() {
     let Some(backend) = gpu() else { return };
     let scene = scene();
-    let together = RenderOptions { separate: false, ..apart() };
+    let together = Settings { separate: false, ..apart() };
     for organisation in [Organisation::Scatter, Organisation::Tile] {
         for samples in [Samples::ONE, Samples { across: 2, down: 2 }] {
-            let of = |options: RenderOptions| {
+            let of = |options: Settings| {
                 let maps = if samples == Samples::ONE { MAPS } else { Maps::NONE };
-                RenderOptions { organisation, samples, maps, ..options }
+                Settings { organisation, samples, maps, ..options }
             };
             let shown = frame(&scene, &of(apart()), &backend);
-            let all = truth(&scene, &of(RenderOptions { organisation: Organisation::Auto, ..apart() }));
+            let all = truth(&scene, &of(Settings { organisation: Organisation::Auto, ..apart() }));
             assert_eq!(differ(&shown, &all), 0, "{organisation:?}, {samples:?}");
             if samples == Samples::ONE {
                 assert_eq!(mixed(&shown), 0);
@@ -137,13 +137,13 @@ fn inputs_do_not_blend_and_kernels_agree_with_twins() {
     }
     // Lit, with other accumulators, epsilons and low-passes, and over a background.
     for options in [
-        RenderOptions { shading: Shading::Phong, ..apart() },
-        RenderOptions { accumulator: Accumulator::Fixed32, ..apart() },
-        RenderOptions { accumulator: Accumulator::Cas, ..apart() },
-        RenderOptions { accumulator: Accumulator::Fixed32, kernel: Kernel::Constant, ..apart() },
-        RenderOptions { epsilon: Epsilon::Ray(0.02), ..apart() },
-        RenderOptions { low_pass: LowPass::Max, ..apart() },
-        RenderOptions { background: [0.2, 0.4, 0.6, 0.5], ..apart() },
+        Settings { shading: Shading::Phong, ..apart() },
+        Settings { accumulator: Accumulator::Fixed32, ..apart() },
+        Settings { accumulator: Accumulator::Cas, ..apart() },
+        Settings { accumulator: Accumulator::Fixed32, kernel: Kernel::Constant, ..apart() },
+        Settings { epsilon: Epsilon::Ray(0.02), ..apart() },
+        Settings { low_pass: LowPass::Max, ..apart() },
+        Settings { background: [0.2, 0.4, 0.6, 0.5], ..apart() },
     ] {
         let shown = frame(&scene, &options, &backend);
         assert_eq!(differ(&shown, &truth(&scene, &options)), 0, "{options:?}");
@@ -155,7 +155,7 @@ fn a_wrong_kernel_is_noticed() {
     let Some(backend) = gpu() else { return };
     let scene = scene();
     let all = truth(&scene, &apart());
-    let scattered = RenderOptions { organisation: Organisation::Scatter, ..apart() };
+    let scattered = Settings { organisation: Organisation::Scatter, ..apart() };
     assert_eq!(differ(&frame(&scene, &scattered, &backend), &all), 0);
     for (file, from, to) in [
         ("individuals.wgsl", "(a.depth < b.depth)", "(a.depth > b.depth)"),
@@ -167,7 +167,7 @@ fn a_wrong_kernel_is_noticed() {
         let shown = frame(&scene, &scattered, &broken(file, from, to));
         assert!(differ(&shown, &all) > 10, "{file}: {from}");
     }
-    let tiles = RenderOptions { organisation: Organisation::Tile, ..apart() };
+    let tiles = Settings { organisation: Organisation::Tile, ..apart() };
     let shown = frame(&scene, &tiles, &broken("tile_individuals.wgsl", "keep_nearest_of(k,", "keep_nearest_of(0u,"));
     assert!(differ(&shown, &all) > 10);
 }
@@ -178,10 +178,10 @@ fn the_same_bits_however_they_are_drawn() {
     let scenes = [scene(), with_triangles(Some(scene()), &[body()]).unwrap().0];
     for scene in scenes {
         let one = bits(&frame(&scene, &apart(), &backend));
-        let same = |name: &str, scene: &Scene, options: &RenderOptions, backend: &Backend| {
+        let same = |name: &str, scene: &Scene, options: &Settings, backend: &Backend| {
             assert!(bits(&frame(scene, options, backend)) == one, "{name}");
         };
-        let organised = |organisation| RenderOptions { organisation, ..apart() };
+        let organised = |organisation| Settings { organisation, ..apart() };
         same("scatter", &scene, &organised(Organisation::Scatter), &backend);
         same("tile", &scene, &organised(Organisation::Tile), &backend);
         let small = Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), 60_000));
@@ -196,7 +196,7 @@ fn the_same_bits_however_they_are_drawn() {
         same("a core adapter", &scene, &apart(), &Backend::gpu(common::core_gpu().unwrap()));
         for optimisation in Optimisation::ALL {
             let (left_out, name) = optimisation;
-            let without = RenderOptions { without: vec![left_out], ..apart() };
+            let without = Settings { without: vec![left_out], ..apart() };
             same(name, &scene, &without, &backend);
         }
         // In another order of the inputs, and of the surfels in each.
@@ -253,7 +253,7 @@ fn triangles_are_joined_to_the_nearest_input() {
     assert!(scene.triangles != Triangles::default());
     assert_eq!(Facts::of(&scene).individuals, [1500, 1100, 900]);
     for join in [Join::Corrected, Join::Nearest, Join::Blended] {
-        let options = RenderOptions { join, ..apart() };
+        let options = Settings { join, ..apart() };
         let shown = frame(&scene, &options, &backend);
         assert_eq!(differ(&shown, &truth(&scene, &options)), 0, "{join:?}");
         let weights = shown.map(Map::Weight).unwrap();
@@ -275,11 +275,11 @@ fn one_input_costs_nothing() {
 #[test]
 fn what_does_not_go_with_it_is_refused() {
     let scene = scene();
-    let refused = |options: RenderOptions| {
+    let refused = |options: Settings| {
         let error = render(&scene, &camera(), &options, &Backend::Reference, &()).unwrap_err().to_string();
         assert!(error.contains("--separate"), "{error}");
     };
-    refused(RenderOptions { blend: Blend::Nearest, maps: Maps::NONE, ..apart() });
-    refused(RenderOptions { composite: Composite::Sorted, ..apart() });
-    refused(RenderOptions { maps: Maps::of(&[Map::Index]), ..apart() });
+    refused(Settings { blend: Blend::Nearest, maps: Maps::NONE, ..apart() });
+    refused(Settings { composite: Composite::Sorted, ..apart() });
+    refused(Settings { maps: Maps::of(&[Map::Index]), ..apart() });
 }

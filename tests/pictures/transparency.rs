@@ -12,7 +12,7 @@ use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::metrics::{DECISION_MARGIN, compare};
 use epsplat::low_level::passes::layers::{Parting, part};
 use epsplat::low_level::passes::{Strip, fragments, project};
-use epsplat::low_level::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Renderer, Report, render};
 use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{
@@ -30,15 +30,15 @@ fn gpu() -> Option<Backend> {
     common::gpu().map(Backend::gpu)
 }
 
-fn options(composite: Composite) -> RenderOptions {
-    RenderOptions { composite, epsilon: Epsilon::Relative(0.02), ..RenderOptions::default() }
+fn options(composite: Composite) -> Settings {
+    Settings { composite, epsilon: Epsilon::Relative(0.02), ..Settings::default() }
 }
 
-fn unlit(composite: Composite, opacity: f32) -> RenderOptions {
-    RenderOptions { opacity, shading: Shading::Unlit, maps: BOTH_MAPS, ..options(composite) }
+fn unlit(composite: Composite, opacity: f32) -> Settings {
+    Settings { opacity, shading: Shading::Unlit, maps: BOTH_MAPS, ..options(composite) }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -49,8 +49,8 @@ fn all_bits(frame: &Frame) -> Vec<u32> {
 }
 
 /// Which pixels are decided: in the reference, no fragment lies within rounding of a decision.
-fn decided(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<bool> {
-    let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options.clone() };
+fn decided(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<bool> {
+    let options = Settings { maps: Maps::of(&[Map::Decision]), ..options.clone() };
     let reference = frame(scene, camera, &options, &Backend::Reference);
     reference.map(Map::Decision).unwrap().iter().map(|margin| *margin > DECISION_MARGIN).collect()
 }
@@ -74,8 +74,8 @@ fn shells_let_through_what_their_alphas_say() {
     for crossings in [2, 4, 10, 20] {
         let scene = shells(crossings / 2, 6000);
         let camera = sphere_camera(64, Projection::Pinhole);
-        let of = RenderOptions { background: [1.0; 4], ..unlit(Composite::Layers(crossings as u32), 0.3) };
-        let of = RenderOptions { tail: Tail::None, epsilon: Epsilon::Absolute(0.02), ..of };
+        let of = Settings { background: [1.0; 4], ..unlit(Composite::Layers(crossings as u32), 0.3) };
+        let of = Settings { tail: Tail::None, epsilon: Epsilon::Absolute(0.02), ..of };
         let expected = 0.7f64.powi(crossings as i32);
         let through = frame(&scene, &camera, &of, &backend);
         let (decided, layers) = (decided(&scene, &camera, &of), through.map(Map::Layers).unwrap());
@@ -105,7 +105,7 @@ fn sorted_planes_let_through_what_their_alphas_say() {
         }
         // The surfels that stretch the range of colours move out of sight.
         scene.surfels.iter_mut().skip(crossings).for_each(|surfel| surfel.center[0] = 1000.0);
-        let of = RenderOptions { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.1) };
+        let of = Settings { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.1) };
         let shown = frame(&scene, &camera, &of, &backend);
         let expected = 0.9f64.powi(crossings as i32);
         for (transmittance, color) in shown.map(Map::Transmittance).unwrap().iter().zip(&shown.color) {
@@ -138,9 +138,9 @@ fn kernels_and_twins_composite_alike() {
     let mut compared = 0;
     for (number, (scene, camera)) in all.iter().enumerate() {
         for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
-            let own = RenderOptions { opacity: 0.7, maps: BOTH_MAPS, ..options(composite) };
+            let own = Settings { opacity: 0.7, maps: BOTH_MAPS, ..options(composite) };
             let shading = if number % 2 == 0 { Shading::Lambert } else { Shading::Unlit };
-            let own = RenderOptions { shading, ..own };
+            let own = Settings { shading, ..own };
             let decided = decided(scene, camera, &own);
             let truth = frame(scene, camera, &own, &Backend::Reference);
             // The number of pixels that differ by more than f32 rounding.
@@ -194,7 +194,7 @@ fn lists_do_not_show_how_they_came_to_be() {
     for (number, (scene, camera)) in all.iter().enumerate() {
         for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
             for samples in [Samples::ONE, "4".parse().unwrap()] {
-                let own = RenderOptions { samples, opacity: 0.6, maps: BOTH_MAPS, ..options(composite) };
+                let own = Settings { samples, opacity: 0.6, maps: BOTH_MAPS, ..options(composite) };
                 let first = all_bits(&frame(scene, camera, &own, &backend));
                 let name = format!("{number} {composite:?} {samples:?}");
                 for seed in [3, 4] {
@@ -204,7 +204,7 @@ fn lists_do_not_show_how_they_came_to_be() {
                 for (other, what) in [(if number == 0 { &narrow } else { &wide }, "bands"), (&core, "core features")] {
                     assert!(all_bits(&frame(scene, camera, &own, other)) == first, "{name}: {what}");
                 }
-                let scattered = RenderOptions { organisation: Organisation::Scatter, ..own.clone() };
+                let scattered = Settings { organisation: Organisation::Scatter, ..own.clone() };
                 assert!(all_bits(&frame(scene, camera, &scattered, &backend)) == first, "{name}: scattered");
                 let mut moved = scene.clone();
                 moved.surfels.iter_mut().for_each(|surfel| surfel.center[0] = surfel.center[0].next_up());
@@ -253,7 +253,7 @@ fn the_density_of_a_cloud_does_not_show_in_layers() {
     let Some(backend) = gpu() else { return };
     let camera = sphere_camera(64, Projection::Pinhole);
     let mean = |count: usize, composite: Composite| {
-        let of = RenderOptions { epsilon: Epsilon::Absolute(0.05), ..unlit(composite, 0.5) };
+        let of = Settings { epsilon: Epsilon::Absolute(0.05), ..unlit(composite, 0.5) };
         let shown = frame(&sphere(count, 1.5 * (count as f64 / 2000.0).sqrt()), &camera, &of, &backend);
         // The middle of the image, away from the outline.
         let middle = (24..40).flat_map(|y| (24..40).map(move |x| y * 64 + x));
@@ -274,7 +274,7 @@ fn a_tail_is_one_more_layer() {
     let disk = |k: usize| Surfel::disk(Vec3::new(0.2, 0.1, 5.0 + k as f32), Vec3::NEG_Z, 20.0);
     let scene = Scene { surfels: (0..5).map(disk).collect(), colors, oriented: true, ..Scene::default() };
     let shown = |composite, tail| {
-        let of = RenderOptions { kernel: Kernel::Constant, tail, ..unlit(composite, 0.5) };
+        let of = Settings { kernel: Kernel::Constant, tail, ..unlit(composite, 0.5) };
         let frame = frame(&scene, &camera, &of, &backend);
         (frame.color[5], frame.map(Map::Layers).unwrap()[5])
     };
@@ -302,7 +302,7 @@ fn a_kept_renderer_draws_what_a_fresh_one_does() {
     };
     let views = [far(0.3), far(1.0), far(0.3), far(0.6)];
     for composite in [ALL, Composite::Sorted] {
-        let own = RenderOptions { opacity: 0.6, maps: Maps::of(&[Map::Depth, Map::Layers]), ..options(composite) };
+        let own = Settings { opacity: 0.6, maps: Maps::of(&[Map::Depth, Map::Layers]), ..options(composite) };
         for backend in [&all, &small] {
             let mut kept = Renderer::new(&scene, &own, backend).unwrap();
             for view in &views {
@@ -319,7 +319,7 @@ fn copies_are_fragments_each() {
     let Some(backend) = gpu() else { return };
     let (mut scene, camera) = stack(1500, 0.5);
     scene.surfels.iter_mut().skip(1500).for_each(|surfel| surfel.center[0] = 1000.0);
-    let of = RenderOptions { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.001) };
+    let of = Settings { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.001) };
     let expected = 1.0 - 0.999f64.powi(1500);
     for backend in [&backend, &Backend::Reference] {
         let shown = frame(&scene, &camera, &of, backend);
@@ -338,8 +338,8 @@ fn maps_of_the_nearest_surface_stay() {
     for ((scene, camera), samples, most) in
         [(&solid, Samples::ONE, 2.0), (&solid, several, 2.0), (&mixed, Samples::ONE, 3.0), (&mixed, several, 3.0)]
     {
-        let plain = RenderOptions { samples, maps: Maps::ON_DEVICE, ..options(Composite::Opaque) };
-        let layered = RenderOptions {
+        let plain = Settings { samples, maps: Maps::ON_DEVICE, ..options(Composite::Opaque) };
+        let layered = Settings {
             opacity: 0.5,
             composite: ALL,
             maps: Maps::ON_DEVICE.and(&[Map::Transmittance, Map::Layers]),
@@ -356,7 +356,7 @@ fn maps_of_the_nearest_surface_stay() {
 }
 
 /// The number of layers of each pixel's fragments.
-fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<usize> {
+fn parted(scene: &Scene, camera: &Camera, options: &Settings, parting: Parting) -> Vec<usize> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
     let strip = Strip { splats, rows, ..Strip::of((scene, &Facts::of(scene)), camera, options) };
@@ -383,14 +383,14 @@ fn layers_of_surfels_of_many_sizes_are_peeled_as_their_twin_has_them() {
         sources.replace("raster_peeled.wgsl", "bitcast<f32>(front), radius", "bitcast<f32>(front), 0.5 * radius");
     let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: wrong.unwrap() };
     for layers in [2, 4] {
-        let of = RenderOptions {
+        let of = Settings {
             composite: Composite::Layers(layers),
             opacity: 0.5,
             tail: Tail::None,
             raster,
-            ..RenderOptions::default()
+            ..Settings::default()
         };
-        let told = RenderOptions { maps: Maps::of(&[Map::Decision]), ..of.clone() };
+        let told = Settings { maps: Maps::of(&[Map::Decision]), ..of.clone() };
         let twin = frame(&scene, &camera, &told, &Backend::Reference);
         let error =
             |backend: &Backend| compare(&frame(&scene, &camera, &of, backend), &twin).unwrap().rmse_decided.unwrap();
@@ -418,7 +418,7 @@ fn the_rasteriser_peels_what_lists_part() {
     let mut noticed = [0; 2];
     for (layers, oriented) in [(1, true), (2, true), (4, false), (6, true), (9, false)] {
         let scene = Scene { oriented, ..scene.clone() };
-        let of = RenderOptions { opacity: 0.6, tail: Tail::None, ..options(Composite::Layers(layers)) };
+        let of = Settings { opacity: 0.6, tail: Tail::None, ..options(Composite::Layers(layers)) };
         let [runs, windows] = [Parting::Runs, Parting::Window].map(|parting| parted(&scene, &camera, &of, parting));
         let alike = runs.iter().zip(windows).map(|(runs, windows)| *runs == windows);
         let decided: Vec<bool> =
@@ -427,7 +427,7 @@ fn the_rasteriser_peels_what_lists_part() {
         assert!(compared > 5000, "{layers}: {compared}");
         let listed = frame(&scene, &camera, &of, &backend);
         let differ = |backend: &Backend| {
-            let peeled = frame(&scene, &camera, &RenderOptions { raster, ..of.clone() }, backend);
+            let peeled = frame(&scene, &camera, &Settings { raster, ..of.clone() }, backend);
             let far = |pixel: &usize| {
                 peeled.color[*pixel]
                     .iter()
@@ -443,8 +443,8 @@ fn the_rasteriser_peels_what_lists_part() {
         }
     }
     assert!(noticed.iter().all(|noticed| *noticed > 0), "{noticed:?}");
-    let refused = |options: RenderOptions| {
-        let options = RenderOptions { raster, ..options };
+    let refused = |options: Settings| {
+        let options = Settings { raster, ..options };
         render(&scene, &camera, &options, &backend, &()).unwrap_err().to_string()
     };
     assert!(refused(options(ALL)).contains("1 to 64 layers"));
@@ -462,11 +462,8 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
     for (surfel, depth) in scene.surfels.iter_mut().zip([5.0, 7.0, 11.0]) {
         surfel.center[2] = depth;
     }
-    let of = |composite, maps: &[Map]| RenderOptions {
-        kernel: Kernel::Constant,
-        maps: Maps::of(maps),
-        ..unlit(composite, 0.25)
-    };
+    let of =
+        |composite, maps: &[Map]| Settings { kernel: Kernel::Constant, maps: Maps::of(maps), ..unlit(composite, 0.25) };
     let near = |found: &[f32], expected: &[f32]| {
         let same = |(a, b): (&f32, &f32)| a == b || (a - b).abs() < 1e-5;
         found.len() == expected.len() && found.iter().zip(expected).all(same)
@@ -494,7 +491,7 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
     }
     // Opaque surfaces are in the map too, and pixels without a surface have none.
     let (scene, camera) = (sphere(4000, 2.0), sphere_camera(96, Projection::Pinhole));
-    let own = RenderOptions { opacity: 1.0, ..of(ALL, &[Map::Surfaces]) };
+    let own = Settings { opacity: 1.0, ..of(ALL, &[Map::Surfaces]) };
     let [device, twin] = [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &own, backend));
     let decided = decided(&scene, &camera, &own);
     let (mut seen, mut none_seen) = (0, 0);
@@ -509,7 +506,7 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
     let wrong = Sources::default().replace("surfaces_map.wgsl", "2u * number] = depth", "2u * number] = 1.001 * depth");
     let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: wrong.unwrap() };
     assert!(pixels(&frame(&scene, &camera, &own, &wrong)) != pixels(&device));
-    let refused = |of: RenderOptions| match render(&scene, &camera, &of, &backend, &()) {
+    let refused = |of: Settings| match render(&scene, &camera, &of, &backend, &()) {
         Err(error) => error.to_string(),
         Ok(_) => panic!("{of:?} is not refused"),
     };

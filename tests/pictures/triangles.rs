@@ -15,7 +15,7 @@ use epsplat::io::{Mesh, Texture};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::metrics::DECISION_MARGIN;
-use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::low_level::plan::{BlendFormat, Organisation, Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Camera, Epsilon, Join, Lens, Map, Maps, Projection, Samples, Scene, Shading, Triangle, Triangles, Up,
@@ -33,11 +33,11 @@ fn broken(file: &str, from: &str, to: &str) -> Backend {
     Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
 }
 
-fn unlit() -> RenderOptions {
-    RenderOptions { shading: Shading::Unlit, maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() }
+fn unlit() -> Settings {
+    Settings { shading: Shading::Unlit, maps: Maps::of(&[Map::Depth]), ..Settings::default() }
 }
 
-fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
@@ -222,7 +222,7 @@ fn kernels_and_twins_see_hard_triangles_alike() {
         let camera = looking(projection);
         for (name, triangles) in hard() {
             let scene = Scene { triangles: Triangles::new(&triangles), ..Scene::default() };
-            let with_decision = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Decision]), ..unlit() };
+            let with_decision = Settings { maps: Maps::of(&[Map::Depth, Map::Decision]), ..unlit() };
             let truth = frame(&scene, &camera, &with_decision, &Backend::Reference);
             let shown = frame(&scene, &camera, &unlit(), &backend);
             let [depth, true_depth] = [&shown, &truth].map(|frame| frame.map(Map::Depth).unwrap());
@@ -269,9 +269,9 @@ fn kernels_and_twins_join_alike() {
     let Some(backend) = gpu() else { return };
     let (scene, camera) = joined();
     let maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count, Map::Transmittance]);
-    let of = |join| RenderOptions { join, maps, ..RenderOptions::default() };
+    let of = |join| Settings { join, maps, ..Settings::default() };
     let differ = |join, shown: &Frame| {
-        let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..of(join) };
+        let with_decision = Settings { maps: maps.and(&[Map::Decision]), ..of(join) };
         let truth = frame(&scene, &camera, &with_decision, &Backend::Reference);
         let decided = truth.map(Map::Decision).unwrap();
         let near =
@@ -300,8 +300,8 @@ fn kernels_and_twins_join_alike() {
     // An epsilon along the ray, which is shorter along the axis that the blend uses, and one that
     // reaches beyond the scene.
     for epsilon in [Epsilon::Ray(0.2), Epsilon::Absolute(1e3), Epsilon::Relative(0.1)] {
-        let own = RenderOptions { epsilon, ..of(Join::Blended) };
-        let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..own.clone() };
+        let own = Settings { epsilon, ..of(Join::Blended) };
+        let with_decision = Settings { maps: maps.and(&[Map::Decision]), ..own.clone() };
         let (shown, truth) =
             (frame(&scene, &camera, &own, &backend), frame(&scene, &camera, &with_decision, &Backend::Reference));
         let decided = truth.map(Map::Decision).unwrap();
@@ -336,7 +336,7 @@ fn the_rasteriser_draws_the_same_but_for_edges() {
     for (scene, camera) in [(&joined, &camera), (&alone, &camera), (&alone, &parallel)] {
         let computed = frame(scene, camera, &unlit(), &backend);
         let raster = Some(Raster { format, depth: RasterDepth::Exact });
-        let options = RenderOptions { raster, ..unlit() };
+        let options = Settings { raster, ..unlit() };
         let shown = frame(scene, camera, &options, &backend);
         let depths = |frame: &Frame| frame.map(Map::Depth).unwrap().to_vec();
         let (a, b) = (depths(&computed), depths(&shown));
@@ -351,7 +351,7 @@ fn the_rasteriser_draws_the_same_but_for_edges() {
         assert!(a.iter().zip(&others).filter(|pair| off(*pair)).count() * 5 > covered);
     }
     let offset = Some(Raster { format, depth: RasterDepth::Offset });
-    let error = render(&joined, &camera, &RenderOptions { raster: offset, ..unlit() }, &backend, &()).unwrap_err();
+    let error = render(&joined, &camera, &Settings { raster: offset, ..unlit() }, &backend, &()).unwrap_err();
     assert!(error.to_string().contains("--raster-depth"), "{error}");
 }
 
@@ -380,10 +380,10 @@ fn the_same_bits_however_it_is_drawn() {
     let other = Scene { triangles: Triangles::new(&all), ..scene.clone() };
     for join in [Join::Corrected, Join::Nearest, Join::Blended] {
         for samples in [Samples::ONE, "4".parse().unwrap()] {
-            let own = RenderOptions { join, samples, maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
+            let own = Settings { join, samples, maps: Maps::of(&[Map::Depth]), ..Settings::default() };
             let first = bits(&frame(&scene, &camera, &own, &backend));
             for organisation in [Organisation::Scatter, Organisation::Tile] {
-                let by = RenderOptions { organisation, ..own.clone() };
+                let by = Settings { organisation, ..own.clone() };
                 assert!(bits(&frame(&scene, &camera, &by, &backend)) == first, "{join:?} {organisation:?}");
             }
             for other in [&small, &core] {
@@ -395,7 +395,7 @@ fn the_same_bits_however_it_is_drawn() {
     }
     // OpenGL's own compiler rounds differently.
     if let Some(gl) = gl {
-        let plain = RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
+        let plain = Settings { maps: Maps::of(&[Map::Depth]), ..Settings::default() };
         let shown = frame(&scene, &camera, &plain, &gl);
         let rmse =
             epsplat::low_level::metrics::compare(&shown, &frame(&scene, &camera, &plain, &backend)).unwrap().rmse;
@@ -424,7 +424,7 @@ fn kernels_and_twins_paint_alike() {
     ];
     let scene = Scene { triangles: Triangles::textured(&all, &[texture, other]), ..Scene::default() };
     let differ = |camera: &Camera, backend: &Backend| {
-        let with_decision = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+        let with_decision = Settings { maps: Maps::of(&[Map::Decision]), ..unlit() };
         let truth = frame(&scene, camera, &with_decision, &Backend::Reference);
         let shown = frame(&scene, camera, &unlit(), backend);
         let decided = truth.map(Map::Decision).unwrap();

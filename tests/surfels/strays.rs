@@ -11,7 +11,7 @@ use common::bits;
 use common::scenes::shuffled;
 use epsplat::io::Points;
 use epsplat::low_level::metrics::{Comparison, compare};
-use epsplat::low_level::plan::{Organisation, RenderOptions};
+use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Cull, Epsilon, Lens, LowPass, Map, Maps, Scene, Texture, Up};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
@@ -58,11 +58,11 @@ fn camera(target: DVec3, away: f64) -> Camera {
 
 /// Compares the kernels' picture of `scene` with the f64 reference of the sphere alone at zero,
 /// where no precision is lost.
-fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOptions) -> Option<Comparison> {
+fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &Settings) -> Option<Comparison> {
     let gpu = common::gpu()?;
     let maps = Maps::ON_DEVICE;
-    let options = RenderOptions { maps, ..options.clone() };
-    let decided = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };
+    let options = Settings { maps, ..options.clone() };
+    let decided = Settings { maps: maps.and(&[Map::Decision]), ..options.clone() };
     let (alone, _) = self::scene(&[DVec3::ZERO], &[]);
     let (expected, _) = render(&alone, &camera(DVec3::ZERO, away), &decided, &Backend::Reference, &()).unwrap();
     let (frame, _) = render(scene, &camera(center, away), &options, &Backend::gpu(gpu), &()).unwrap();
@@ -76,7 +76,7 @@ fn is_the_same(name: &str, scene: &Scene, center: DVec3, away: f64) {
         // From far away, an epsilon of one radius would be below the precision of depths, and the
         // sphere's back within 1e-6 of its front.
         let (epsilon, cull) = (Epsilon::Relative(0.01), if away > 1e5 { Cull::Back } else { Cull::Auto });
-        let options = RenderOptions { low_pass, epsilon, cull, ..RenderOptions::default() };
+        let options = Settings { low_pass, epsilon, cull, ..Settings::default() };
         let Some(comparison) = against_alone(scene, center, away, &options) else { return };
         assert!(comparison.rmse_decided.unwrap() < 1e-6, "{name}: {comparison:?}");
         assert!(comparison.excused.unwrap() < 0.02, "{name}: {comparison:?}");
@@ -108,7 +108,7 @@ fn distant_clusters_are_each_as_they_are() {
         }
         // The control: centres in f32 only.
         let single = Scene { low: vec![], ..scene };
-        if let Some(comparison) = against_alone(&single, other, 1.0, &RenderOptions::default()) {
+        if let Some(comparison) = against_alone(&single, other, 1.0, &Settings::default()) {
             assert!(comparison.rmse_decided.unwrap() > 1e-3, "{apart}: {comparison:?}");
         }
     }
@@ -142,7 +142,7 @@ fn doubled_centres_have_the_same_bits_in_any_order_and_organisation() {
     let (scene, _) = scene(&[MAP, other], &[DVec3::ZERO]);
     assert_eq!(scene.low.len(), scene.surfels.len());
     let frame = |scene: &Scene, organisation| {
-        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        let options = Settings { organisation, ..Settings::default() };
         bits(&render(scene, &camera(other, 1.0), &options, &backend, &()).unwrap().0)
     };
     let expected = frame(&scene, Organisation::Auto);
@@ -158,13 +158,13 @@ fn a_texture_far_away_is_where_it_is_near_zero() {
     let texels = (0..64 * 64).map(|k: u32| [(k % 64 * 4) as u8, (k / 64 * 4) as u8, 128, 255]).collect();
     let texture = Texture::new(64, 64, texels).unwrap();
     let painted = |centers: &[DVec3]| build_textured(vec![points(centers, &[])], vec![texture.clone()], &()).unwrap().0;
-    let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..RenderOptions::default() };
+    let options = Settings { maps: Maps::of(&[Map::Decision]), ..Settings::default() };
     let expected =
         render(&painted(&[DVec3::ZERO]), &camera(DVec3::ZERO, 1.0), &options, &Backend::Reference, &()).unwrap().0;
     let other = MAP + DVec3::new(3e5, -2e5, 1e3);
     let far = painted(&[MAP, other]);
     assert!(!far.low.is_empty());
-    let options = RenderOptions::default();
+    let options = Settings::default();
     let error = |scene: &Scene| {
         let frame = render(scene, &camera(other, 1.0), &options, &backend, &()).unwrap().0;
         compare(&frame, &expected).unwrap().rmse_decided.unwrap()

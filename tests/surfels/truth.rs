@@ -9,7 +9,7 @@ use std::path::Path;
 use common::meshes::sphere;
 use epsplat::io::Mesh;
 use epsplat::low_level::metrics::{Reconstruction, reconstruction};
-use epsplat::low_level::plan::RenderOptions;
+use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::options::HIGHLIGHT;
 use epsplat::low_level::scene::{Camera, Colors, Lens, Light, Map, Maps, Shading, Up};
@@ -23,7 +23,7 @@ fn camera(side: u32, lens: Lens, eye: DVec3) -> Camera {
 }
 
 fn cast(surface: &Surface, camera: &Camera) -> Truth {
-    Truth::cast(surface, camera, &RenderOptions::default(), DEFAULT_GRID, &()).unwrap()
+    Truth::cast(surface, camera, &Settings::default(), DEFAULT_GRID, &()).unwrap()
 }
 
 fn depth(truth: &Truth, pixel: usize) -> f64 {
@@ -39,12 +39,11 @@ fn area(truth: &Truth) -> f64 {
 #[test]
 fn rays_go_through_what_lets_them_through() {
     let camera = camera(51, Lens::Fov(30.0), DVec3::new(0.0, 0.0, 5.0));
-    let options = RenderOptions { shading: Shading::Unlit, opacity: 0.5, ..RenderOptions::default() };
+    let options = Settings { shading: Shading::Unlit, opacity: 0.5, ..Settings::default() };
     let mesh = Surface::mesh(&sphere(4, false)).unwrap();
     for (surface, slack) in [(Surface::Analytic(Shape::Sphere), 0.0), (mesh, 0.01)] {
         let truth = Truth::cast(&surface, &camera, &options, 1, &()).unwrap();
-        let opaque =
-            Truth::cast(&surface, &camera, &RenderOptions { opacity: 1.0, ..options.clone() }, 1, &()).unwrap();
+        let opaque = Truth::cast(&surface, &camera, &Settings { opacity: 1.0, ..options.clone() }, 1, &()).unwrap();
         let alphas = |of: &Truth| of.frame.color.iter().map(|color| color[3]).collect::<Vec<_>>();
         let covered = alphas(&opaque).iter().filter(|alpha| **alpha == 1.0).count();
         let twice = alphas(&truth).iter().filter(|alpha| **alpha == 0.75).count();
@@ -124,8 +123,7 @@ fn highlights_are_phongs() {
     let lights =
         [Light::Headlight { intensity: 0.5 }, Light::Directional { toward: toward.as_vec3(), intensity: 0.25 }];
     let cast = |shading, lights: &[Light]| {
-        let options =
-            RenderOptions { shading, lights: lights.into(), shininess: exponent as f32, ..Default::default() };
+        let options = Settings { shading, lights: lights.into(), shininess: exponent as f32, ..Default::default() };
         Truth::cast(&Surface::Analytic(Shape::Plane), &camera, &options, 1, &()).unwrap().frame
     };
     let (diffuse, both) = (cast(Shading::Lambert, &lights), cast(Shading::Phong, &lights));
@@ -154,9 +152,9 @@ fn highlights_are_phongs() {
 fn shading_and_background_are_those_of_a_render() {
     let camera = camera(65, Lens::Fov(24.0), DVec3::new(0.0, 0.0, 5.0));
     let surface = Surface::Analytic(Shape::Checkerboard);
-    let unlit = RenderOptions { shading: Shading::Unlit, background: [0.0, 0.5, 0.0, 1.0], ..RenderOptions::default() };
-    let truth = |options: &RenderOptions| Truth::cast(&surface, &camera, options, DEFAULT_GRID, &()).unwrap();
-    let [plain, lit] = [&unlit, &RenderOptions { shading: Shading::Lambert, ..unlit.clone() }].map(truth);
+    let unlit = Settings { shading: Shading::Unlit, background: [0.0, 0.5, 0.0, 1.0], ..Settings::default() };
+    let truth = |options: &Settings| Truth::cast(&surface, &camera, options, DEFAULT_GRID, &()).unwrap();
+    let [plain, lit] = [&unlit, &Settings { shading: Shading::Lambert, ..unlit.clone() }].map(truth);
     let inside = |pixel: &usize| plain.coverage[*pixel] == 1.0;
     let mut light = 0.0;
     for pixel in (0..plain.coverage.len()).filter(inside) {
@@ -286,7 +284,7 @@ fn what_has_no_area_is_not_there() {
     for bad in [outside, colorless] {
         assert!(Surface::mesh(&bad).is_err());
     }
-    assert!(Truth::cast(&Surface::Analytic(Shape::Plane), &camera, &RenderOptions::default(), 0, &()).is_err());
+    assert!(Truth::cast(&Surface::Analytic(Shape::Plane), &camera, &Settings::default(), 0, &()).is_err());
 }
 
 #[test]
@@ -297,7 +295,7 @@ fn obj_files_keep_their_normals_and_colors() {
     let camera = camera(33, Lens::OrthographicHeight(2.0), DVec3::new(0.0, 0.0, 5.0));
     let read = |faces: &str| {
         std::fs::write(&path, format!("{text}{faces}\n")).unwrap();
-        let unlit = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
+        let unlit = Settings { shading: Shading::Unlit, ..Settings::default() };
         Truth::cast(&Surface::read(&path, &()).unwrap(), &camera, &unlit, DEFAULT_GRID, &()).unwrap()
     };
     let center = 16 * 33 + 16;
@@ -324,7 +322,7 @@ fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     let (scene, _) = epsplat::low_level::surfels::build(vec![points.clone()], &()).unwrap();
     let camera = Camera::framing((200, 200), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
     let maps = Maps::of(&[Map::Depth, Map::Normal]);
-    let options = RenderOptions { maps, ..RenderOptions::default() };
+    let options = Settings { maps, ..Settings::default() };
     let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
     let error = |surface: &Surface| {
         let truth = Truth::cast(surface, &camera, &options, DEFAULT_GRID, &()).unwrap();

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{Card, sphere};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::plan::{ACCUMULATORS, Accumulator, Optimisation, Organisation, RenderOptions, check as possible};
+use crate::plan::{ACCUMULATORS, Accumulator, Optimisation, Organisation, Settings, check as possible};
 use crate::render::{Backend, Renderer};
 use crate::scene::{Colors, Maps, Scene};
 
@@ -110,7 +110,7 @@ fn of_scene(
     card.told.progress.begin("comparing images", (accumulators.len() + variants.len()) as u64);
     let Card { backend, record, told, .. } = card;
     let backend: &Backend = backend;
-    let frame = |scene: &Scene, options: &RenderOptions| {
+    let frame = |scene: &Scene, options: &Settings| {
         Renderer::new(scene, options, backend)?.frame(camera, &()).map(|(frame, _)| frame)
     };
     let mut plain = None;
@@ -148,14 +148,14 @@ fn of_scene(
     Ok(())
 }
 
-fn options(accumulator: Accumulator) -> RenderOptions {
-    RenderOptions { accumulator, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
+fn options(accumulator: Accumulator) -> Settings {
+    Settings { accumulator, maps: Maps::ON_DEVICE, ..Settings::default() }
 }
 
 /// A way to render that must give the image of `fixed`.
 struct Variant {
     what: String,
-    options: RenderOptions,
+    options: Settings,
     /// Whether the surfels are in reverse order.
     reverse: bool,
 }
@@ -163,8 +163,8 @@ struct Variant {
 fn variants() -> Vec<Variant> {
     let plain = || options(Accumulator::Fixed);
     let variant = |what: &str, options| Variant { what: what.to_owned(), options, reverse: false };
-    let organised = |organisation| RenderOptions { organisation, ..plain() };
-    let without = |without| RenderOptions { without, ..plain() };
+    let organised = |organisation| Settings { organisation, ..plain() };
+    let without = |without| Settings { without, ..plain() };
     let all = Optimisation::ALL.map(|(optimisation, _)| optimisation).to_vec();
     let mut variants = vec![
         variant("organisation scatter", organised(Organisation::Scatter)),

@@ -9,7 +9,7 @@ use super::bytes::Moved;
 use super::{Card, sphere};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::plan::{Facts, PixelLayout, RenderOptions, SceneNeeds};
+use crate::plan::{Facts, PixelLayout, SceneNeeds, Settings};
 use crate::render::{Backend, Renderer, Report};
 use crate::report::Summary;
 
@@ -116,7 +116,7 @@ pub(super) fn measure(card: &mut Card<'_>) -> Result<()> {
 
 fn of_size(card: &Card<'_>, surfels: u64) -> Result<Throughput> {
     let staged = sphere(surfels, None, SIDE, card.told.progress)?;
-    let options = RenderOptions::default();
+    let options = Settings::default();
     let (scene, camera) = (&staged.scene, &staged.cameras[0]);
     let backend: &Backend = &card.backend;
     let mut renderer = Renderer::new(scene, &options, backend)?;
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn reports_become_medians_and_what_is_in_no_pass() {
         let staged = sphere(200, None, 16, &()).unwrap();
-        let options = RenderOptions::default();
+        let options = Settings::default();
         let (scene, camera) = (&staged.scene, &staged.cameras[0]);
         let mut renderer = Renderer::new(scene, &options, &Backend::Reference).unwrap();
         let (frame, report) = renderer.frame(camera, &()).unwrap();

@@ -83,6 +83,7 @@ impl Arguments {
         let SceneOptions { surfels, triangles, .. } = &self.scene;
         let others = triangles.texture.iter().chain(&self.camera.file).chain(&surfels.textures);
         let meshes = triangles.meshes.iter().map(Source::cloud);
-        Source::of(inputs).chain(meshes).chain(others.map(Source::other))
+        let kernels = self.options.research.sources.iter().filter_map(|source| source.path());
+        Source::of(inputs).chain(meshes).chain(others.map(Source::other)).chain(kernels.map(Source::other))
     }
 }

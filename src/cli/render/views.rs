@@ -57,6 +57,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let format = arguments.views.format.unwrap_or(if maps == Maps::NONE { Format::Png } else { Format::Exr });
     check_format(arguments, format)?;
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
+    Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
     let views = views(arguments, path, format)?;
     check_outputs(arguments, &files, path, &views)?;
     let scene = Scene::of_files(files, &arguments.scene)?;

@@ -185,6 +185,13 @@ pub(super) fn math(
         MathFunction::Cosh => x.cosh(),
         MathFunction::Sinh => x.sinh(),
         MathFunction::Tanh => x.tanh(),
+        MathFunction::Asinh => x.asinh(),
+        MathFunction::Acosh => x.acosh(),
+        MathFunction::Atanh => x.atanh(),
+        MathFunction::Radians => x.to_radians(),
+        MathFunction::Degrees => x.to_degrees(),
+        MathFunction::Length => x.abs(),
+        MathFunction::Distance => (x - float(second)?).abs(),
         MathFunction::Acos => x.acos(),
         MathFunction::Asin => x.asin(),
         MathFunction::Atan => x.atan(),
@@ -198,7 +205,14 @@ pub(super) fn math(
         MathFunction::Exp2 => x.exp2(),
         MathFunction::Log => x.ln(),
         MathFunction::Log2 => x.log2(),
-        MathFunction::Pow => x.powf(float(second)?),
+        // WGSL defines no power of a negative number; devices give NaN.
+        MathFunction::Pow => {
+            if x < 0.0 {
+                f64::NAN
+            } else {
+                x.powf(float(second)?)
+            }
+        }
         MathFunction::Sign => {
             if x == 0.0 {
                 0.0

@@ -14,9 +14,12 @@ use naga::{
     TypeInner,
 };
 
+use naga::valid::Capabilities;
+
+use super::interface::Interface;
 use arithmetic::{binary, converted, math, of_literal, recast, unary};
 
-/// The most rounds that all loops of a call may take together.
+/// The most rounds that all loops, and the calls of functions, may take together.
 const MOST_ROUNDS: u32 = 10_000;
 
 /// The most calls inside each other. WGSL has no recursion, so this bounds only the stack.
@@ -27,8 +30,10 @@ const DEEPEST: u32 = 64;
 pub enum Fault {
     /// The function uses what is not evaluated here.
     Unsupported(String),
-    /// Its loops take more than [`MOST_ROUNDS`] rounds.
+    /// Its loops and calls take more than [`MOST_ROUNDS`] rounds.
     Endless,
+    /// The text is not valid by itself: the line and column of the fault, and what it is.
+    Invalid(Option<(u32, u32)>, String),
 }
 
 impl fmt::Display for Fault {
@@ -36,6 +41,7 @@ impl fmt::Display for Fault {
         match self {
             Self::Unsupported(what) => write!(f, "it uses {what}"),
             Self::Endless => write!(f, "its loops take more than {MOST_ROUNDS} rounds"),
+            Self::Invalid(_, what) => f.write_str(what),
         }
     }
 }
@@ -72,10 +78,13 @@ impl Evaluated {
     /// Parses `text` and finds its function `name`, which takes and returns one f32.
     ///
     /// # Errors
-    /// [`Fault::Unsupported`] for a text that is not valid by itself, or without such a function.
+    /// [`Fault::Invalid`] for a text that is not valid by itself, [`Fault::Unsupported`] for one
+    /// without such a function.
     pub fn new(text: &str, name: &str, overrides: &[(&'static str, f64)]) -> Result<Self, Fault> {
-        let module = naga::front::wgsl::parse_str(text)
-            .map_err(|error| Fault::Unsupported(format!("more than its own file: {}", error.message())))?;
+        let Interface { module, .. } = Interface::of(text, Capabilities::empty()).map_err(|invalid| {
+            let (at, sentence) = invalid.parts();
+            Fault::Invalid(at, sentence)
+        })?;
         let is_float = |ty| matches!(module.types[ty].inner, TypeInner::Scalar(scalar) if scalar == naga::Scalar::F32);
         let found = module.functions.iter().find(|(_, function)| function.name.as_deref() == Some(name));
         let fits = |function: &Function| {
@@ -109,6 +118,10 @@ impl Evaluated {
         rounds: &mut u32,
         depth: u32,
     ) -> Result<Option<Value>, Fault> {
+        *rounds += 1;
+        if *rounds > MOST_ROUNDS {
+            return Err(Fault::Endless);
+        }
         if depth > DEEPEST {
             return unsupported(format!("more than {DEEPEST} calls inside each other"));
         }
@@ -130,7 +143,7 @@ impl Evaluated {
             Expression::ZeroValue(ty) => self.zero(ty),
             Expression::Unary { op, expr } => unary(op, self.global(expr)?),
             Expression::Binary { op, left, right } => binary(op, self.global(left)?, self.global(right)?),
-            Expression::As { expr, kind, convert: Some(4) } => converted(self.global(expr)?, kind),
+            Expression::As { expr, kind, convert: Some(1 | 4) } => converted(self.global(expr)?, kind),
             _ => unsupported("a constant that is no number"),
         }
     }
@@ -292,7 +305,9 @@ impl Call<'_> {
             Expression::Constant(constant) => self.of.global(self.of.module.constants[constant].init),
             Expression::Override(which) => self.of.of_override(which),
             Expression::ZeroValue(ty) => self.of.zero(ty),
-            Expression::FunctionArgument(index) => Ok(self.arguments[index as usize]),
+            Expression::FunctionArgument(index) => {
+                self.arguments.get(index as usize).map_or_else(|| unsupported("a missing argument"), |value| Ok(*value))
+            }
             Expression::Load { pointer } => {
                 let local = self.local(pointer)?;
                 if let Some(value) = self.locals.get(&local) {
@@ -319,7 +334,7 @@ impl Call<'_> {
                 let [second, third] = [arg1, arg2].map(|arg| arg.map(|arg| self.value(arg)).transpose());
                 math(fun, self.value(arg)?, second?, third?)
             }
-            Expression::As { expr, kind, convert: Some(_) } => converted(self.value(expr)?, kind),
+            Expression::As { expr, kind, convert: Some(1 | 4) } => converted(self.value(expr)?, kind),
             Expression::As { expr, kind, convert: None } => recast(self.value(expr)?, kind),
             _ => unsupported("vectors, arrays or memory"),
         }
@@ -370,7 +385,19 @@ mod tests {
         assert!(matches!(at("return length(vec2<f32>(x, 1.0));", 1.0), Err(Fault::Unsupported(_))));
         let other = of("fn f(x: vec2<f32>) -> f32 { return x.x; }");
         assert!(other.err().unwrap().to_string().contains("no function f"));
-        assert!(of("fn f(x: f32) -> f32 { return elsewhere(x); }").err().unwrap().to_string().contains("elsewhere"));
+        let fault = of("fn f(x: f32) -> f32 { return elsewhere(x); }").err().unwrap();
+        assert!(matches!(&fault, Fault::Invalid(Some((3, _)), what) if what.contains("elsewhere")), "{fault:?}");
+        // The parser leaves the number of arguments to the validator.
+        let two = of("fn g(a: f32, b: f32) -> f32 { return a + b; } fn f(x: f32) -> f32 { return g(x); }");
+        assert!(matches!(two.err().unwrap(), Fault::Invalid(..)));
+        // Each function calls the next twice: no loop, but a million calls.
+        let mut text = String::from("fn f20(x: f32) -> f32 { return x; }");
+        (0..20).for_each(|k| text += &format!("fn f{k}(x: f32) -> f32 {{ return f{}(x) + f{}(x); }}", k + 1, k + 1));
+        assert_eq!(
+            of(&format!("{text} fn f(x: f32) -> f32 {{ return f0(x); }}")).unwrap().at(1.0),
+            Err(Fault::Endless)
+        );
+        assert!(at("return pow(x, 2.0);", -1.0).unwrap().is_nan());
     }
 
     /// The built-in kernels evaluate to their hand-written twins.

@@ -3,7 +3,7 @@
 //! Most options keep their default, so that several features meet in one picture and few pictures
 //! are refused.
 
-use epsplat::low_level::plan::{Accumulator, Optimisation, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Optimisation, Settings};
 use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::facing::POINT_SHAPES;
 use epsplat::low_level::scene::{
@@ -19,8 +19,8 @@ fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
 }
 
 /// Draws options for a picture of `scene`, which may not go with it or with each other.
-pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
-    let mut options = RenderOptions {
+pub fn sampled(scene: &Scene, random: &mut Random) -> Settings {
+    let mut options = Settings {
         epsilon: epsilon(random),
         low_pass: pick(
             random,
@@ -40,7 +40,7 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> RenderOptions {
         shading: pick(random, &[Shading::Unlit, Shading::Unlit, Shading::Lambert, Shading::Phong]),
         maps: maps(random),
         separate: random.one_in(5),
-        ..RenderOptions::default()
+        ..Settings::default()
     };
     options.kernel = match options.low_pass {
         LowPass::Gaussians => gaussian::KERNEL,
@@ -103,7 +103,7 @@ fn epsilon(random: &mut Random) -> Epsilon {
         2 => Epsilon::Ray(random.scale(1e-4, 0.5)),
         3 => Epsilon::Radius(random.between(0.1, 3.0)),
         4 => Epsilon::Bounded { radius: random.between(0.1, 3.0), relative: random.scale(1e-3, 0.3) },
-        _ => RenderOptions::default().epsilon,
+        _ => Settings::default().epsilon,
     }
 }
 
@@ -113,7 +113,7 @@ fn kernel(random: &mut Random) -> Kernel {
         1 => Kernel::Ellipse { a: random.between(0.5, 8.0), n: random.between(1.0, 6.0), smooth: random.one_in(2) },
         2 => Kernel::Cone { power: random.between(0.3, 3.0) },
         3 => Kernel::Constant,
-        _ => RenderOptions::default().kernel,
+        _ => Settings::default().kernel,
     }
 }
 

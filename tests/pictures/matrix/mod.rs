@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
 
@@ -58,7 +58,7 @@ struct Devices {
 struct Combination {
     seed: u64,
     sampled: Sampled,
-    options: RenderOptions,
+    options: Settings,
     random: Random,
 }
 
@@ -106,7 +106,7 @@ impl Tally {
     }
 }
 
-fn checked(scene: &Scene, options: &RenderOptions) -> epsplat::Result<()> {
+fn checked(scene: &Scene, options: &Settings) -> epsplat::Result<()> {
     check::options(options, false)?;
     check::scene(&Facts::of(scene), options, false)
 }
@@ -128,7 +128,7 @@ fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
 }
 
 /// Chooses another form of a combination, which must give the same bits.
-fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static str, Scene, RenderOptions, Gpu) {
+fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static str, Scene, Settings, Gpu) {
     let Combination { sampled: Sampled { scene, .. }, options, random, .. } = combination;
     let (scene, options, whole) = (scene.clone(), options.clone(), devices.whole.clone());
     match random.below(5) {
@@ -140,7 +140,7 @@ fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static s
             (lacking.adapter.subgroups, lacking.adapter.atomics_u64) = (random.one_in(2), random.one_in(2));
             ("an adapter that lacks some", scene, options, lacking)
         }
-        _ => ("no optimisations", scene, RenderOptions { without: choices::without(random), ..options }, whole),
+        _ => ("no optimisations", scene, Settings { without: choices::without(random), ..options }, whole),
     }
 }
 
@@ -151,7 +151,7 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
     let Combination { seed, sampled: Sampled { scene, about, .. }, options, .. } = &combination;
     let mut forms = vec![form];
     for (name, organisation) in [("scatter", Organisation::Scatter), ("tile", Organisation::Tile)] {
-        let other = RenderOptions { organisation, ..options.clone() };
+        let other = Settings { organisation, ..options.clone() };
         match checked(scene, &other) {
             Ok(()) => forms.push((name, scene.clone(), other, devices.whole.clone())),
             // Other accumulators do not support every organisation.
@@ -188,16 +188,16 @@ fn views(combination: &mut Combination) -> Vec<Camera> {
 
 /// The faults of one picture: against the reference, and of its other forms.
 fn wrong(
-    (scene, camera, options): (&Scene, &Camera, &RenderOptions),
-    forms: &[(&'static str, Scene, RenderOptions, Gpu)],
+    (scene, camera, options): (&Scene, &Camera, &Settings),
+    forms: &[(&'static str, Scene, Settings, Gpu)],
     (whole, sources): (&Gpu, &Sources),
     tally: &mut Tally,
 ) -> Vec<String> {
     let on = |gpu: &Gpu| Backend::Gpu { gpu: Box::new(gpu.clone()), sources: sources.clone() };
-    let frame = |scene: &Scene, options: &RenderOptions, backend: &Backend| -> Result<Frame, String> {
+    let frame = |scene: &Scene, options: &Settings, backend: &Backend| -> Result<Frame, String> {
         render(scene, camera, options, backend, &()).map(|(frame, _)| frame).map_err(|error| error.to_string())
     };
-    let reference = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let reference = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     let own = frame(scene, options, &on(whole));
     let (own, reference) = match own.and_then(|own| Ok((own, frame(scene, &reference, &Backend::Reference)?))) {
         Ok(both) => both,
@@ -233,13 +233,13 @@ fn wrong(
 }
 
 /// The error per pixel that a sum's few digits explain: 0 where sums have many digits.
-fn digits(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Vec<f32>, String> {
+fn digits(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Vec<f32>, String> {
     if !judge::has_few_digits(options.accumulator) {
         return Ok(vec![0.0; camera.pixels()]);
     }
     let Samples { across, down } = options.samples;
     let maps = Maps::of(&[Map::Count, Map::Weight]);
-    let one = RenderOptions { samples: Samples::ONE, maps, accumulator: Accumulator::Fixed, ..options.clone() };
+    let one = Settings { samples: Samples::ONE, maps, accumulator: Accumulator::Fixed, ..options.clone() };
     let sampled = camera.sampled(options.samples).map_err(|error| error.to_string())?;
     let frame = render(scene, &sampled, &one, &Backend::Reference, &()).map_err(|error| error.to_string())?.0;
     let (low, high) = scene.color_range();

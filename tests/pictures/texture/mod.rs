@@ -17,7 +17,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::passes::project::reference_all;
 use epsplat::low_level::passes::{accumulate, visibility};
-use epsplat::low_level::plan::{Accumulator, RenderOptions};
+use epsplat::low_level::plan::{Accumulator, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{
     Camera, Colors, Lens, LowPass, Map, Maps, Place, Projection, Scene, Shading, Textured, Up,
@@ -85,12 +85,12 @@ fn camera(size: u32, projection: Projection) -> Camera {
 /// and in the transition.
 fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sources: &Sources) -> Option<[usize; 4]> {
     let gpu = common::gpu()?;
-    let options = RenderOptions { accumulator, ..unlit() };
+    let options = Settings { accumulator, ..unlit() };
     let row = accumulator.row();
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
     let (device, _) = render(scene, camera, &options, &backend, &()).unwrap();
-    let exact = RenderOptions { maps: options.maps.and(&[Map::Decision, Map::Normal]), ..options };
+    let exact = Settings { maps: options.maps.and(&[Map::Decision, Map::Normal]), ..options };
     let (twin, _) = render(scene, camera, &exact, &Backend::Reference, &()).unwrap();
     let splats = reference_all(scene, camera, &exact);
     let nearest = visibility::reference(splats.iter(), camera, LowPass::None, 0, camera.height);
@@ -137,8 +137,8 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
     Some(found)
 }
 
-fn unlit() -> RenderOptions {
-    RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
+fn unlit() -> Settings {
+    Settings { shading: Shading::Unlit, ..Settings::default() }
 }
 
 /// Fragments outside their disks have texture coordinates beyond the scene's range: device and twin
@@ -148,8 +148,8 @@ fn filtered_surfels_are_painted_alike_outside_their_disks() {
     let Some(gpu) = common::gpu() else { return };
     let camera = camera(60, Projection::Pinhole);
     let globe = globe(60, 0.4, waves(true));
-    let options = RenderOptions { low_pass: LowPass::Max, maps: Maps::of(&[Map::TexZ]), ..unlit() };
-    let exact = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let options = Settings { low_pass: LowPass::Max, maps: Maps::of(&[Map::TexZ]), ..unlit() };
+    let exact = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     let (twin, _) = render(&globe, &camera, &exact, &Backend::Reference, &()).unwrap();
     let decided = |pixel: &usize| twin.map(Map::Decision).unwrap()[*pixel] > 1e-3;
     let apart = |sources: Sources| {
@@ -250,7 +250,7 @@ fn what_is_seen_from_afar_is_averaged() {
     let backend = Backend::gpu(gpu);
     let picks = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: picking };
     for (camera, far) in cameras.iter().zip([true, true, false]) {
-        let exact = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+        let exact = Settings { maps: Maps::of(&[Map::Decision]), ..unlit() };
         let (twin, _) = render(&scene, camera, &exact, &Backend::Reference, &()).unwrap();
         let (device, _) = render(&scene, camera, &unlit(), &backend, &()).unwrap();
         let (picked, _) = render(&scene, camera, &unlit(), &picks, &()).unwrap();
@@ -426,7 +426,7 @@ fn a_texture_survives_simplification() {
 fn texz_holds_where_a_pixel_lies_in_the_texture() {
     let scene = globe(6000, 1.2, waves(true));
     let camera = sphere_camera(96, Projection::Pinhole);
-    let of = RenderOptions { maps: Maps::of(&[Map::TexZ, Map::Depth]), ..unlit() };
+    let of = Settings { maps: Maps::of(&[Map::TexZ, Map::Depth]), ..unlit() };
     let twin = render(&scene, &camera, &of, &Backend::Reference, &()).unwrap().0;
     let places = |frame: &Frame| frame.map(Map::TexZ).unwrap().as_chunks::<3>().0.to_vec();
     let mut compared = 0;

@@ -308,7 +308,7 @@ fn surfels_and_triangles_have_their_own_textures() {
     let textures: Vec<std::sync::Arc<Texture>> = both().into_iter().rev().map(Into::into).collect();
     let with = |texture: u32| Scene { triangles: Triangles::textured(&[wall(texture)], &textures), ..scene.clone() };
     let camera = camera(96, Projection::Pinhole);
-    let exact = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+    let exact = Settings { maps: Maps::of(&[Map::Decision]), ..unlit() };
     let (twin, _) = render(&with(0), &camera, &exact, &Backend::Reference, &()).unwrap();
     let decided = twin.map(Map::Decision).unwrap();
     let off = |frame: &Frame| {
@@ -317,7 +317,7 @@ fn surfels_and_triangles_have_their_own_textures() {
     };
     let backend = Backend::gpu(gpu);
     for organisation in [Organisation::Scatter, Organisation::Tile] {
-        let options = RenderOptions { organisation, ..unlit() };
+        let options = Settings { organisation, ..unlit() };
         let drawn = |texture: u32| render(&with(texture), &camera, &options, &backend, &()).unwrap().0;
         let (same, other) = (off(&drawn(0)), off(&drawn(1)));
         assert!(same < 20 && other > 500, "{organisation:?}: {same} {other}");

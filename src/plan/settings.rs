@@ -70,7 +70,7 @@ impl FromStr for Organisation {
 
 /// Everything a caller may choose, scene and camera apart.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RenderOptions {
+pub struct Settings {
     /// Depth tolerance.
     pub epsilon: Epsilon,
     /// Which surfels are left out by the side that they show.
@@ -136,7 +136,7 @@ pub struct RenderOptions {
     pub own_kernel: Option<OwnKernel>,
 }
 
-impl RenderOptions {
+impl Settings {
     /// Whether identical surfels are drawn once. Tiles list each of them.
     pub fn draws_copies_once(&self) -> bool {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
@@ -182,7 +182,7 @@ impl RenderOptions {
     }
 }
 
-impl Default for RenderOptions {
+impl Default for Settings {
     fn default() -> Self {
         Self {
             epsilon: Epsilon::Bounded { radius: 1.0, relative: 0.01 },

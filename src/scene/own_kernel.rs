@@ -53,8 +53,8 @@ impl OwnKernel {
         (self.weight)(rho2).ok().filter(|weight| !weight.is_nan()).unwrap_or(0.0).clamp(0.0, 1.0)
     }
 
-    /// Tries the kernel at 4,097 distances from the disk's centre to `farthest` radii, and counts the
-    /// weights that are none: those between 0 and 1 are. It stops at a loop that does not end.
+    /// Tries the kernel at 4,097 distances from the disk's centre to `farthest` radii, and counts
+    /// wrong weights, which do not lie between 0 and 1. It stops at a loop that does not end.
     pub fn faults(&self, farthest: f64) -> KernelFaults {
         let mut faults = KernelFaults { kernel: self.name.clone(), ..KernelFaults::default() };
         for k in 0..=DISTANCES {

@@ -104,7 +104,7 @@ impl Scene {
         Ok(Self(Arc::new(Inputs { files, options: options.clone(), ..Inputs::default() })))
     }
 
-    /// Makes a scene of points in memory. They stay there, beside the surfels that are made of them.
+    /// Makes a scene of points in memory. They stay there, beside the surfels that replace them.
     pub fn from_points(points: Vec<Points>, options: &SceneOptions) -> Self {
         Self(Arc::new(Inputs { given: points, options: options.clone(), ..Inputs::default() }))
     }

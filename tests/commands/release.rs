@@ -1,4 +1,4 @@
-//! What a release states: one version everywhere, and the checksum of each file of `data`.
+//! A release: one version everywhere, and the checksum of each file of `data`.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,7 +1,7 @@
 // Textured surfels: the sums of their texture coordinates, and the lookup at the mean coordinates
 // of a pixel (textures.wgsl). Same interface as texture_absent.wgsl.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x72c5d58f37fbc572
+// All loops end, by 1 of src/gpu/loops.rs: 0x37656be3471cf966
 // #import *::{Term, add, add_pair, sum_at, term}
 // #import camera_*::{area_in_pixel, seen_at}
 // #import color_textured::{color_part}

@@ -118,3 +118,25 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
         epsplat::io::atomic::write_whole(path, |file| file.write_all(text.as_bytes()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory;
+
+    use super::Arguments;
+
+    /// Clap looks for arguments of one name only in debug builds: one would take the other's text.
+    #[test]
+    fn no_two_arguments_of_a_command_have_one_name() {
+        for command in Arguments::command().get_subcommands() {
+            let names = |of: fn(&clap::Arg) -> Option<&str>| {
+                let all: Vec<&str> = command.get_arguments().filter_map(of).collect();
+                assert_eq!(all.iter().collect::<BTreeSet<_>>().len(), all.len(), "{}: {all:?}", command.get_name());
+            };
+            names(|argument| Some(argument.get_id().as_str()));
+            names(clap::Arg::get_long);
+        }
+    }
+}

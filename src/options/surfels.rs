@@ -42,7 +42,7 @@ pub struct SurfelOptions {
     #[cfg_attr(feature = "cli", command(flatten))]
     pub limits: LimitOptions,
     /// Size the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat, ...
-    #[cfg_attr(feature = "cli", arg(long = "surfel-size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true))]
+    #[cfg_attr(feature = "cli", arg(long = "surfel-size", id = "surfel_size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true))]
     pub size: Option<Size>,
     /// Image that paints the surfels by their texture coordinates: .png, .jpg, .bmp or .tga
     ///

@@ -383,6 +383,20 @@ fn surfels_are_made_of_points_and_drawn() {
     fails(&["surfels", text(&empty), "-o", text(&made)], 1, &["holds no points"]);
 }
 
+/// `--surfel-size` draws the surfels that `epsplat surfels --size` writes.
+#[test]
+fn sizes_are_chosen_without_a_file_between() {
+    let folder = Folder::new();
+    let [sphere, made, with, without] = ["s.ply", "made.ply", "with.exr", "without.exr"].map(|file| folder.path(file));
+    let rows: String = (0..400).map(|i| format!("{} {} {}\n", i % 20, i / 20, (i % 7) as f64 * 0.01)).collect();
+    std::fs::write(&sphere, ply("x y z", 400, &rows)).unwrap();
+    succeeds(&["surfels", text(&sphere), "-o", text(&made), "--size", "ellipse"]);
+    let size = ["--size", "48x32", "--backend", "reference", "-o"];
+    succeeds(&[&["render", text(&made)], &size[..], &[text(&without)]].concat());
+    succeeds(&[&["render", text(&sphere), "--surfel-size", "ellipse"], &size[..], &[text(&with)]].concat());
+    assert!(std::fs::read(with).unwrap() == std::fs::read(without).unwrap());
+}
+
 #[test]
 fn info_tells_what_is_missing_and_which_command_supplies_it() {
     let folder = Folder::new();

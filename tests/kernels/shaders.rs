@@ -379,8 +379,9 @@ fn no_kernel_uses_a_product_whose_order_is_not_written() {
 #[test]
 fn every_file_is_known_and_reached() {
     let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/wgsl");
-    let on_disk: BTreeSet<String> = std::fs::read_dir(directory)
-        .unwrap()
+    let stages = std::fs::read_dir(directory).unwrap().map(|stage| stage.unwrap().path());
+    let on_disk: BTreeSet<String> = stages
+        .flat_map(|stage| std::fs::read_dir(stage).unwrap())
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .filter(|name| name.ends_with(".wgsl"))
         .collect();

@@ -290,6 +290,9 @@ fn every_combination_is_drawn_alike_and_right() {
             running.into_iter().map(|worker| worker.join().unwrap()).collect::<Vec<_>>()
         });
         tally = tallies.into_iter().fold(tally, Tally::and);
+        if frames > FRAMES {
+            eprintln!("seeds to {}: {} combinations, {} frames", seed + AT_ONCE - 1, tally.combinations, tally.frames);
+        }
         seed += AT_ONCE;
     }
     tally.print();

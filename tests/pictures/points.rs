@@ -98,7 +98,7 @@ fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
 /// Noise of standard deviation s in z tilts fitted normals by 0.262 s on average.
 ///
 /// The slopes of a plane through n points have the deviation s / sqrt(n var(x)) along each axis. 17
-/// points at one per unit area fill a disk of radius h² = 17/pi, in which var(x) = h²/4. The angle
+/// points at one per unit area fill a disk of h^2 = 17/pi, in which var(x) = h^2/4. The angle
 /// is the length of two such slopes, Rayleigh distributed with a mean of sqrt(pi/2) times that
 /// deviation.
 #[test]

@@ -126,7 +126,7 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
         let normal = surfel.normal().as_dvec3().normalize();
         assert!(normal.dot(center(surfel) / distance) > 1.0 - 1e-6);
     }
-    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r²)), which gives a lower bound
+    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r^2)), which is a lower bound
     // of the number. Circles that cover a plane overlap by at least 2 pi / sqrt(27) (Kershner
     // 1939); greedy selection needs less than twice that.
     let cap = |radius: f64| 2.0 * PI * (1.0 - (1.0 - radius * radius).sqrt());

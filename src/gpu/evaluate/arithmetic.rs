@@ -131,47 +131,45 @@ fn whole(op: BinaryOperator, a: i64, b: i64) -> Result<i64, Fault> {
     })
 }
 
+/// A function of one to three scalars.
 pub(super) fn math(
     fun: MathFunction,
     first: Value,
     second: Option<Value>,
     third: Option<Value>,
 ) -> Result<Value, Fault> {
-    let integers = match (first, second, third) {
-        (Value::Signed(a), b, c) => Some((i64::from(a), b, c)),
-        (Value::Unsigned(a), b, c) => Some((i64::from(a), b, c)),
-        _ => None,
-    };
-    if let Some((a, b, c)) = integers {
-        let number = |value: Option<Value>| match value {
-            Some(Value::Signed(number)) => Ok(i64::from(number)),
-            Some(Value::Unsigned(number)) => Ok(i64::from(number)),
-            _ => unsupported("a function of two types"),
-        };
-        let result = match fun {
-            MathFunction::Abs => a.abs(),
-            MathFunction::Sign => a.signum(),
-            MathFunction::Min => a.min(number(b)?),
-            MathFunction::Max => a.max(number(b)?),
-            MathFunction::Clamp => a.max(number(b)?).min(number(c)?),
-            _ => return unsupported(format!("the function {fun:?} of integers")),
-        };
-        return Ok(if matches!(first, Value::Signed(_)) {
-            Value::Signed(result as i32)
-        } else {
-            Value::Unsigned(result as u32)
-        });
+    match first {
+        Value::Float(x) => match of_one(fun, x) {
+            Some(value) => Ok(Value::Float(value)),
+            None => of_several(fun, x, second, third).map(Value::Float),
+        },
+        Value::Signed(number) => Ok(Value::Signed(of_integers(fun, number.into(), second, third)? as i32)),
+        Value::Unsigned(number) => Ok(Value::Unsigned(of_integers(fun, number.into(), second, third)? as u32)),
+        Value::Truth(_) => unsupported("a function of truth values"),
     }
-    let float = |value: Option<Value>| match value {
-        Some(Value::Float(number)) => Ok(number),
+}
+
+/// A function of integers of 32 bits, which lie in 64; its low bits are the result.
+fn of_integers(fun: MathFunction, a: i64, second: Option<Value>, third: Option<Value>) -> Result<i64, Fault> {
+    let number = |value: Option<Value>| match value {
+        Some(Value::Signed(number)) => Ok(i64::from(number)),
+        Some(Value::Unsigned(number)) => Ok(i64::from(number)),
         _ => unsupported("a function of two types"),
     };
-    let x = float(Some(first))?;
-    Ok(Value::Float(match fun {
+    Ok(match fun {
+        MathFunction::Abs => a.abs(),
+        MathFunction::Sign => a.signum(),
+        MathFunction::Min => a.min(number(second)?),
+        MathFunction::Max => a.max(number(second)?),
+        MathFunction::Clamp => a.max(number(second)?).min(number(third)?),
+        _ => return unsupported(format!("the function {fun:?} of integers")),
+    })
+}
+
+/// A function of one number; None for a function of several.
+fn of_one(fun: MathFunction, x: f64) -> Option<f64> {
+    Some(match fun {
         MathFunction::Abs => x.abs(),
-        MathFunction::Min => x.min(float(second)?),
-        MathFunction::Max => x.max(float(second)?),
-        MathFunction::Clamp => x.max(float(second)?).min(float(third)?),
         MathFunction::Saturate => {
             if x.is_nan() {
                 0.0
@@ -185,17 +183,15 @@ pub(super) fn math(
         MathFunction::Cosh => x.cosh(),
         MathFunction::Sinh => x.sinh(),
         MathFunction::Tanh => x.tanh(),
+        MathFunction::Acos => x.acos(),
+        MathFunction::Asin => x.asin(),
+        MathFunction::Atan => x.atan(),
         MathFunction::Asinh => x.asinh(),
         MathFunction::Acosh => x.acosh(),
         MathFunction::Atanh => x.atanh(),
         MathFunction::Radians => x.to_radians(),
         MathFunction::Degrees => x.to_degrees(),
         MathFunction::Length => x.abs(),
-        MathFunction::Distance => (x - float(second)?).abs(),
-        MathFunction::Acos => x.acos(),
-        MathFunction::Asin => x.asin(),
-        MathFunction::Atan => x.atan(),
-        MathFunction::Atan2 => x.atan2(float(second)?),
         MathFunction::Ceil => x.ceil(),
         MathFunction::Floor => x.floor(),
         MathFunction::Round => x.round_ties_even(),
@@ -205,19 +201,37 @@ pub(super) fn math(
         MathFunction::Exp2 => x.exp2(),
         MathFunction::Log => x.ln(),
         MathFunction::Log2 => x.log2(),
+        MathFunction::Sign => {
+            if x == 0.0 {
+                0.0
+            } else {
+                x.signum()
+            }
+        }
+        MathFunction::Sqrt => x.sqrt(),
+        MathFunction::InverseSqrt => x.sqrt().recip(),
+        _ => return None,
+    })
+}
+
+/// A function of two or three numbers.
+fn of_several(fun: MathFunction, x: f64, second: Option<Value>, third: Option<Value>) -> Result<f64, Fault> {
+    let float = |value: Option<Value>| match value {
+        Some(Value::Float(number)) => Ok(number),
+        _ => unsupported("a function of two types"),
+    };
+    Ok(match fun {
+        MathFunction::Min => x.min(float(second)?),
+        MathFunction::Max => x.max(float(second)?),
+        MathFunction::Clamp => x.max(float(second)?).min(float(third)?),
+        MathFunction::Distance => (x - float(second)?).abs(),
+        MathFunction::Atan2 => x.atan2(float(second)?),
         // WGSL defines no power of a negative number; devices give NaN.
         MathFunction::Pow => {
             if x < 0.0 {
                 f64::NAN
             } else {
                 x.powf(float(second)?)
-            }
-        }
-        MathFunction::Sign => {
-            if x == 0.0 {
-                0.0
-            } else {
-                x.signum()
             }
         }
         MathFunction::Fma => x.mul_add(float(second)?, float(third)?),
@@ -227,8 +241,6 @@ pub(super) fn math(
             let t = ((float(third)? - x) / (float(second)? - x)).clamp(0.0, 1.0);
             t * t * (3.0 - 2.0 * t)
         }
-        MathFunction::Sqrt => x.sqrt(),
-        MathFunction::InverseSqrt => x.sqrt().recip(),
         _ => return unsupported(format!("the function {fun:?}")),
-    }))
+    })
 }

@@ -7,9 +7,11 @@ use std::process::{Command, Output};
 
 const BUNNY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data/bunny.obj");
 
-/// Runs the example `name` in `folder`. Cargo builds examples with the tests, beside the program.
+/// Runs the example `name` in `folder`. `cargo test` builds all examples beside the program, but
+/// `cargo test --test commands` does not: `tests/run` builds them first.
 fn run(name: &str, arguments: &[&str], folder: &Path) -> Output {
     let built = PathBuf::from(env!("CARGO_BIN_EXE_epsplat")).with_file_name("examples").join(name);
+    assert!(built.exists(), "cargo build --release --all-features --examples has to run first");
     let output = Command::new(built).args(arguments).current_dir(folder).output().unwrap();
     assert!(output.status.success(), "{name}: {output:?}");
     output

@@ -6,7 +6,6 @@ use super::case::{Case, Timed};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::metrics::{Reconstruction, compare, joint, reconstruction};
-use crate::passes::peel;
 use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
@@ -52,7 +51,7 @@ pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: 
         accumulator: default.accumulator,
         // Peeled layers differ from those of fragment lists, so the rasteriser has a reference of
         // its own.
-        raster: timed.options.raster.filter(|_| peel::layers(timed.options).is_some()),
+        raster: timed.options.raster.filter(|_| matches!(timed.options.composite, Composite::Layers(_))),
         maps,
         ..timed.options.clone()
     };

@@ -52,7 +52,7 @@ use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Accumulator, Plan, SceneNeeds, Settings, Winner, wide_bits};
+use crate::plan::{Accumulator, Plan, SceneNeeds, Settings, wide_bits};
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Camera, Colors, Fade, Map, Scene};
 
@@ -63,11 +63,11 @@ use crate::scene::{Camera, Colors, Fade, Map, Scene};
 /// whether the adapter adds 64 bits at once ([`SceneNeeds::atomics_u64`]), which makes the same
 /// sums in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
-    match (needs.wide_sums || needs.copies, needs.atomics_u64) {
+    match (needs.wide_sums || needs.surface.copies(), needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => PAIRS,
         // Products with numbers of copies are made of single words.
-        (true, true) if !needs.copies => "accumulator_fixed64.wgsl",
+        (true, true) if !needs.surface.copies() => "accumulator_fixed64.wgsl",
         (true, _) => "accumulator_fixed_wide.wgsl",
     }
 }
@@ -279,13 +279,9 @@ fn decision_beside(at: Intersection, behind: f64, near: f64, beside: f64) -> f64
 pub const PASS: Pass = Pass {
     name: "accumulate",
     files: |needs| {
-        if needs.sums_by_compute() || needs.winner == Some(Winner::Second) {
-            vec!["accumulate.wgsl"]
-        } else {
-            Vec::new()
-        }
+        if needs.surface.accumulates() { vec!["accumulate.wgsl"] } else { Vec::new() }
     },
-    kernels: |needs| match (needs.sums_by_compute() && !needs.gather) || needs.winner == Some(Winner::Second) {
+    kernels: |needs| match needs.surface.accumulates() && !needs.surface.gathers() {
         true => vec![ACCUMULATE, ACCUMULATE_LARGE],
         false => Vec::new(),
     },
@@ -301,7 +297,7 @@ pub const PASS: Pass = Pass {
 /// The files that store the sums, for a render's main module.
 pub const SUMS: Pass = Pass {
     name: "sums",
-    files: |needs| if needs.sums_by_compute() { files(needs) } else { Vec::new() },
+    files: |needs| if needs.surface.sums_by_compute() { files(needs) } else { Vec::new() },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),
 };

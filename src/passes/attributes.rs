@@ -15,13 +15,13 @@ pub const PASS: Pass = Pass {
     name: "attributes",
     files: |needs| {
         let pick = |needed, file, absent| if needed { file } else { absent };
-        let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
+        let whole = needs.surface.raster().is_some_and(|raster| raster.depth != RasterDepth::Exact);
         let mut files = vec![
             pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
             // A single fragment needs no sum.
-            match needs.sums_depth() && needs.winner.is_none() {
+            match needs.sums_depth() && !needs.surface.shows_nearest() {
                 false => "depth_absent.wgsl",
                 true if needs.compares_depth() => "depth_middles.wgsl",
                 true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),

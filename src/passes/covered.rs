@@ -18,10 +18,10 @@ pub const PASS: Pass = Pass {
         // With depth peeling the last layer may be empty, so the nearest depths do not show which
         // tiles have earlier ones.
         let needs = making.needs;
-        let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some();
+        let list_empty = making.options.shows_where_nothing_is() || needs.surface.peels().is_some();
         vec![
             ("LIST_EMPTY", u32::from(list_empty).into()),
-            ("LIST_APART", u32::from(needs.separate).into()),
+            ("LIST_APART", u32::from(needs.surface.separate()).into()),
             ("TILE_ROWS", super::tiles::rows(needs).into()),
         ]
     },
@@ -39,7 +39,7 @@ pub fn words(band: &Band) -> u64 {
 /// stores no depths in that buffer.
 pub fn start(plan: &Plan, band: usize) -> u64 {
     let band = &plan.bands[band];
-    if plan.needs.raster.is_some() { 0 } else { band.pixels + band.tiles }
+    if plan.needs.surface.raster().is_some() { 0 } else { band.pixels + band.tiles }
 }
 
 /// The clear of the list's header, which empties the list.

@@ -20,9 +20,9 @@ pub const PASS: Pass = Pass {
             },
             "footprint.wgsl",
             "side.wgsl",
-            match needs.winner {
-                Some(_) => "epsilon_none.wgsl",
-                None => match needs.epsilon {
+            match needs.surface.shows_nearest() {
+                true => "epsilon_none.wgsl",
+                false => match needs.epsilon {
                     EpsilonForm::Depth => "epsilon.wgsl",
                     EpsilonForm::Radius => "epsilon_radius.wgsl",
                     EpsilonForm::Ray => "epsilon_ray.wgsl",

@@ -100,18 +100,18 @@ pub fn reference(strip: &Strip<'_>) -> Vec<List> {
 pub const PASS: Pass = Pass {
     name: "fragments",
     files: |needs| {
-        let ties = match needs.lists {
+        let ties = match needs.surface.lists() {
             None => return Vec::new(),
             Some(Lists::Layers) => "fragments_untied.wgsl",
             Some(Lists::Sorted) => "fragments_ranked.wgsl",
         };
         // With veils, fragments_veils.wgsl counts.
-        let count = (!needs.veils).then_some("fragments_count.wgsl");
+        let count = (!needs.surface.veils()).then_some("fragments_count.wgsl");
         let sort = ["fragments_sort.wgsl", "fragments_network.wgsl", ties];
         let all = ["fragments.wgsl", "compositing.wgsl", "layer_sums.wgsl"].into_iter().chain(sort);
         all.chain(count).chain([terms_file(needs)]).collect()
     },
-    kernels: |needs| match needs.lists {
+    kernels: |needs| match needs.surface.lists() {
         None => Vec::new(),
         Some(_) => vec![OF_ROWS, START_ROWS, START_PIXELS, LIST, LIST_LARGE, SORT],
     },

@@ -9,34 +9,26 @@
 
 use super::resolve::Surface;
 use super::{Strip, accumulate, covered, resolve, visibility};
+use crate::plan::Plan;
+use crate::plan::extra::individual_words;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
-use crate::plan::{Plan, SceneNeeds};
 
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "individuals",
-    files: |needs| match needs.separate {
+    files: |needs| match needs.surface.separate() {
         true => vec!["individuals.wgsl"],
         // With lists or peeled layers there are no separate inputs.
-        false if needs.lists.is_some() || needs.peels.is_some() => Vec::new(),
+        false if needs.surface.lists().is_some() || needs.surface.peels().is_some() => Vec::new(),
         false => vec!["individuals_absent.wgsl"],
     },
-    kernels: |needs| if needs.separate { vec![KEEP, LIST] } else { Vec::new() },
-    constants: |making| vec![("INDIVIDUAL_VECTORS", (words(making.needs) / 4).into())],
+    kernels: |needs| if needs.surface.separate() { vec![KEEP, LIST] } else { Vec::new() },
+    constants: |making| vec![("INDIVIDUAL_VECTORS", (individual_words(making.needs) / 4).into())],
 };
 
 const KEEP: Kernel = Kernel::new("keep_individual");
 const LIST: Kernel = Kernel::new("list_individuals");
-
-/// Words per pixel of the nearest surface of the inputs so far.
-pub fn words(needs: &SceneNeeds) -> u32 {
-    match needs.separate {
-        false => 0,
-        true if needs.maps.is_empty() && needs.mesh.is_none() => 8,
-        true => 16,
-    }
-}
 
 /// The dispatch that lists the tiles in which any input is visible.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
@@ -51,7 +43,7 @@ pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
 /// The clears before an input's tiles are listed. Before the `first` input they include the
 /// surfaces kept.
 pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
-    let words = plan.bands[band].pixels * u64::from(words(&plan.needs));
+    let words = plan.bands[band].pixels * u64::from(individual_words(&plan.needs));
     let kept = first.then(|| Clear::of("individuals", 0, words));
     [covered::restart(plan, band)].into_iter().chain(kept).collect()
 }

@@ -96,7 +96,7 @@ pub const PASS: Pass = Pass {
     name: "join",
     files: |needs| {
         // With lists or peeled layers there are no triangles.
-        if needs.lists.is_some() || needs.peels.is_some() {
+        if needs.surface.lists().is_some() || needs.surface.peels().is_some() {
             return Vec::new();
         }
         let Some(mesh) = needs.mesh else { return vec!["join_absent.wgsl"] };

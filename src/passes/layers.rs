@@ -190,7 +190,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
 /// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "layers",
-    files: |needs| match needs.lists {
+    files: |needs| match needs.surface.lists() {
         Some(Lists::Layers) => vec!["layers.wgsl"],
         _ => Vec::new(),
     },

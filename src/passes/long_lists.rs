@@ -53,11 +53,11 @@ pub fn room(words: u64) -> u64 {
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "long_lists",
-    files: |needs| match needs.lists {
+    files: |needs| match needs.surface.lists() {
         None => Vec::new(),
-        Some(_) => vec![if needs.long_lists { "long_lists.wgsl" } else { "long_lists_absent.wgsl" }],
+        Some(_) => vec![if needs.surface.long_lists() { "long_lists.wgsl" } else { "long_lists_absent.wgsl" }],
     },
-    kernels: |needs| if needs.long_lists { vec![FIND, SORT, COMPOSITE] } else { Vec::new() },
+    kernels: |needs| if needs.surface.long_lists() { vec![FIND, SORT, COMPOSITE] } else { Vec::new() },
     constants: |making| {
         let long = most_at_once(making.needs.samples);
         vec![("LONG", long.into()), ("HEAP_STEPS", HEAP_STEPS.into()), ("LOOKS", LOOKS.into())]
@@ -78,12 +78,12 @@ pub fn sorts(plan: &Plan, band: usize) -> Option<Stage> {
     let find = Run { kernel: FIND, over: Over::Pixels };
     let runs = std::iter::once(find).chain(times(SORT, (longest / 2 + longest).div_ceil(HEAP_STEPS.into())));
     let clears = vec![Clear::of("long_lists", 0, HEAD)];
-    plan.needs.long_lists.then(|| Stage::new("sort", band, runs.collect()).after(clears))
+    plan.needs.surface.long_lists().then(|| Stage::new("sort", band, runs.collect()).after(clears))
 }
 
 /// The dispatches that composite the long lists, before pixels are resolved.
 pub fn composites(plan: &Plan) -> impl Iterator<Item = Run> {
     let longest = u64::from(plan.longest_list);
     let rounds = (5 * longest).div_ceil(u64::from(LOOKS) - 1) + 1;
-    times(COMPOSITE, if plan.needs.long_lists { rounds } else { 0 })
+    times(COMPOSITE, if plan.needs.surface.long_lists() { rounds } else { 0 })
 }

@@ -171,7 +171,7 @@ pub fn of_maps(plan: &Plan, band: usize) -> impl Iterator<Item = Stage> {
 
 /// Whether a map or sorted lists need the order in which surfels are stored.
 pub fn asks_for_order(needs: &SceneNeeds) -> bool {
-    own_maps(needs).next().is_some() || needs.lists == Some(Lists::Sorted)
+    own_maps(needs).next().is_some() || needs.surface.lists() == Some(Lists::Sorted)
 }
 
 /// Converts the maps of `frame`, as read back from the device, to the values that a user gets.
@@ -225,7 +225,7 @@ pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
     let cut = || Module { files: first_files(&needs.before_cut()), kernels: select::CHOOSING.into() };
     let kernels = passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect();
     let first = Module { files: first_files(needs), kernels };
-    std::iter::once(first).chain(needs.tiles.then(tiles)).chain(needs.levels.then(cut)).collect()
+    std::iter::once(first).chain(needs.surface.tiles().then(tiles)).chain(needs.levels.then(cut)).collect()
 }
 
 /// The files that every module includes, and those of one more pass.

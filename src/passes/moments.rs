@@ -23,11 +23,9 @@
 
 use super::Strip;
 use super::oit::{held_back, visit};
+use crate::plan::extra::MOMENT_WORDS;
 use crate::plan::steps::Clear;
 use crate::plan::{Oit, Plan};
-
-/// Words per pixel: two per moment.
-pub const MOMENT_WORDS: u32 = 10;
 
 /// The part of the spread measure that is mixed in.
 const MIXED: f64 = 1.0 / 16384.0;
@@ -137,7 +135,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<(Moments, f64)> {
 /// The clear before moments are summed; `None` if there are no moments.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = u64::from(MOMENT_WORDS) * plan.bands[band].pixels;
-    (plan.needs.oit == Some(Oit::Moments)).then(|| Clear::of("moments", 0, words))
+    (plan.needs.surface.oit() == Some(Oit::Moments)).then(|| Clear::of("moments", 0, words))
 }
 
 #[cfg(test)]

@@ -116,7 +116,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
 /// The pass's files, kernels and constants.
 pub const PASS: Pass = Pass {
     name: "oit",
-    files: |needs| match needs.oit {
+    files: |needs| match needs.surface.oit() {
         None => vec!["oit_absent.wgsl"],
         Some(Oit::Weighted) => vec!["oit.wgsl", "oit_weighted.wgsl"],
         Some(Oit::Moments) => vec!["oit.wgsl", "oit_moments.wgsl"],
@@ -129,7 +129,7 @@ const MARK: Kernel = Kernel::new("mark_covered");
 
 /// Whether sums mark the pixels that are not empty, because there is no visibility pass.
 pub fn marks(needs: &SceneNeeds) -> bool {
-    needs.oit == Some(Oit::Weighted)
+    needs.surface.oit() == Some(Oit::Weighted)
 }
 
 /// The stage that marks the pixels that are not empty.

@@ -8,30 +8,16 @@
 //! ([`Parting::Window`](super::layers::Parting::Window)): the rasteriser cannot know where a run of
 //! fragments ends before it has drawn all of them.
 
+use crate::plan::Plan;
+use crate::plan::extra::PEELED_WORDS;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step};
-use crate::plan::{Plan, Settings};
-use crate::scene::Composite;
-
-/// The largest number of layers that can be peeled.
-pub const MOST_LAYERS: u32 = 64;
-
-/// Words per pixel in the buffer `peeled` (`peeled.wgsl`).
-pub const PEELED_WORDS: u32 = 8;
-
-/// The number of layers that the rasteriser peels for `options`; `None` if it does not peel.
-pub fn layers(options: &Settings) -> Option<u32> {
-    match options.composite {
-        Composite::Layers(layers) if options.raster.is_some() => Some(layers),
-        _ => None,
-    }
-}
 
 /// The pass's kernels and files.
 pub const PASS: Pass = Pass {
     name: "peel",
-    files: |needs| if needs.peels.is_some() { vec!["peeled.wgsl"] } else { Vec::new() },
-    kernels: |needs| if needs.peels.is_some() { vec![PEEL] } else { Vec::new() },
+    files: |needs| if needs.surface.peels().is_some() { vec!["peeled.wgsl"] } else { Vec::new() },
+    kernels: |needs| if needs.surface.peels().is_some() { vec![PEEL] } else { Vec::new() },
     constants: |_| Vec::new(),
 };
 

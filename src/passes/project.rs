@@ -156,7 +156,7 @@ const ARRANGE: Kernel = Kernel::of("arrange", [1; 3]);
 
 /// The number of pixels above which the bounds of a splat make it large.
 fn large(making: &Making<'_>) -> u32 {
-    match (making.needs.tiles, making.options.organisation) {
+    match (making.needs.surface.tiles(), making.options.organisation) {
         (true, Organisation::Tile) => 0,
         (true, _) => tuning::LARGE_BY_TILES,
         (false, _) => tuning::LARGE_BY_WORKGROUPS,

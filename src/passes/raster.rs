@@ -35,27 +35,28 @@ use crate::plan::{BlendFormat, PixelLayout, Plan, Raster, RasterDepth, SceneNeed
 /// The pass's files and constants; its pipelines are those of [`draws`].
 pub const PASS: Pass = Pass {
     name: "raster",
-    files: |needs| match needs.raster {
+    files: |needs| match needs.surface.raster() {
         None => Vec::new(),
         Some(raster) => {
             let mut files = vec!["raster.wgsl", "accumulator_raster.wgsl", targets_file(needs)];
-            let peeled = if needs.peels.is_some() { "raster_peeled.wgsl" } else { "raster_peeled_absent.wgsl" };
-            let own: &[&str] = match (raster.depth, needs.winner) {
-                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl", peeled],
-                (RasterDepth::Exact, Some(_)) => &["raster_own_depths.wgsl", "raster_nearest_exact.wgsl"],
-                (RasterDepth::Offset, None) => &["raster_offset.wgsl"],
-                (RasterDepth::Offset, Some(_)) => &["raster_nearest_offset.wgsl"],
+            let peeled =
+                if needs.surface.peels().is_some() { "raster_peeled.wgsl" } else { "raster_peeled_absent.wgsl" };
+            let own: &[&str] = match (raster.depth, needs.surface.shows_nearest()) {
+                (RasterDepth::Exact, false) => &["raster_own_depths.wgsl", "raster_exact.wgsl", peeled],
+                (RasterDepth::Exact, true) => &["raster_own_depths.wgsl", "raster_nearest_exact.wgsl"],
+                (RasterDepth::Offset, false) => &["raster_offset.wgsl"],
+                (RasterDepth::Offset, true) => &["raster_nearest_offset.wgsl"],
             };
             files.extend(own);
             files
         }
     },
     kernels: |_| Vec::new(),
-    constants: |making| match making.needs.raster {
+    constants: |making| match making.needs.surface.raster() {
         None => Vec::new(),
         Some(raster) => vec![
             ("VERTICES", vertices(making.needs).into()),
-            ("BLEND_SCALE", if making.needs.winner.is_some() { 1.0 } else { blend_scale(raster.format) }),
+            ("BLEND_SCALE", if making.needs.surface.shows_nearest() { 1.0 } else { blend_scale(raster.format) }),
             // The visibility pass's pipeline overrides this.
             ("MOVED", 0.0),
         ],
@@ -64,7 +65,7 @@ pub const PASS: Pass = Pass {
 
 /// Vertices per splat; see raster.wgsl.
 pub fn vertices(needs: &SceneNeeds) -> u32 {
-    if needs.triangles { 3 } else { 6 }
+    if needs.surface.by_triangles() { 3 } else { 6 }
 }
 
 /// The file that declares as many targets as `needs` requires.
@@ -134,7 +135,7 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
         depth,
         constant: Some(("MOVED", u32::from(moved).into())),
     };
-    if needs.winner.is_some() {
+    if needs.surface.shows_nearest() {
         let replaced = wgpu::ColorTargetState { blend: None, ..target };
         let entries = ("shape_with_attributes", "raster_nearest");
         return vec![draw(
@@ -146,7 +147,7 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
         )];
     }
     let of_triangles = needs.mesh.map(|_| triangles::draw());
-    let shape = if needs.peels.is_some() { "shape_to_peel" } else { "shape" };
+    let shape = if needs.surface.peels().is_some() { "shape_to_peel" } else { "shape" };
     [
         draw("visibility", (shape, "raster_visibility"), vec![], depth(near_first, true), true),
         draw(

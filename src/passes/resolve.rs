@@ -240,7 +240,11 @@ pub const PASS: Pass = Pass {
         vec![
             "resolve.wgsl",
             pick(needs.samples == Samples::ONE, "resolve_pixels.wgsl", "resolve_samples.wgsl"),
-            pick(needs.lists.is_some() || needs.peels.is_some(), "resolve_lists.wgsl", "resolve_surface.wgsl"),
+            pick(
+                needs.surface.lists().is_some() || needs.surface.peels().is_some(),
+                "resolve_lists.wgsl",
+                "resolve_surface.wgsl",
+            ),
             pick(!needs.maps.is_empty(), "image_maps.wgsl", "image_color.wgsl"),
             pick(needs.maps.has(Map::Normal), "normal_map.wgsl", "normal_map_absent.wgsl"),
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
@@ -256,7 +260,7 @@ pub const PASS: Pass = Pass {
             },
         ]
     },
-    kernels: |needs| if needs.gather && !needs.separate { Vec::new() } else { vec![RESOLVE] },
+    kernels: |needs| if needs.surface.gathers() && !needs.surface.separate() { Vec::new() } else { vec![RESOLVE] },
     constants: |making| {
         let layout = PixelLayout::of(making.needs);
         let mut constants =
@@ -277,11 +281,11 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 
 /// The stage that resolves the covered tiles.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
-    let lists = if plan.needs.separate { individuals::LISTS } else { covered::LISTS };
+    let lists = if plan.needs.surface.separate() { individuals::LISTS } else { covered::LISTS };
     let mut runs = covered::runs(lists).to_vec();
     runs.extend(long_lists::composites(plan));
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
-    let twin = match plan.needs.lists {
+    let twin = match plan.needs.surface.lists() {
         None => Twin::Resolve,
         Some(Lists::Layers) => Twin::Layers,
         Some(Lists::Sorted) => Twin::Sorted,

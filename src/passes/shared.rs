@@ -19,7 +19,7 @@ pub const PASS: Pass = Pass {
             "double.wgsl",
             "rows.wgsl",
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
-            pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
+            pick(needs.surface.copies(), "copies.wgsl", "copies_absent.wgsl"),
             pick(needs.fades, "fade.wgsl", "fade_absent.wgsl"),
         ];
         // With a cut, select_fades.wgsl reads the fades that the cut assigns.

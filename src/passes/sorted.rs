@@ -97,7 +97,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
 /// The pass's files and constants.
 pub const PASS: Pass = Pass {
     name: "sorted",
-    files: |needs| if needs.lists == Some(Lists::Sorted) { vec!["sorted.wgsl"] } else { Vec::new() },
+    files: |needs| if needs.surface.lists() == Some(Lists::Sorted) { vec!["sorted.wgsl"] } else { Vec::new() },
     kernels: |_| Vec::new(),
     constants: |making| {
         let Rules { least_alpha, most_alpha, least_shown, leaves_last } = Rules::of(making.options);

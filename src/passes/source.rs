@@ -121,7 +121,7 @@ impl Source for Scene {
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
         let given = || (0..self.surfels.len() as u32).collect();
         let mut order = ordered.map_or_else(given, |facts| order(self, &facts.core));
-        let copies: Option<Arc<[u32]>> = needs.copies.then(|| copies(self).into());
+        let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(self).into());
         if let Some(copies) = &copies {
             order.retain(|&index| copies[index as usize] > 0);
         }
@@ -134,7 +134,7 @@ impl Source for Scene {
             copies: copies.clone(),
         };
         let of = |indices: &[u32]| Box::new(page(indices)) as Box<dyn Page>;
-        if !needs.separate {
+        if !needs.surface.separate() {
             return order.chunks(most).map(of).collect();
         }
         let own = self.provenance.ranges(self.surfels.len() as u64);

@@ -43,19 +43,19 @@ pub const PASS: Pass = Pass {
             pick(needs.fades, "tile_fade.wgsl", "tile_fade_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "tile_texture.wgsl", "tile_plain.wgsl"),
             pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
-            pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
-            match needs.separate {
+            pick(needs.surface.gathers(), "tile_small.wgsl", "tile_small_absent.wgsl"),
+            match needs.surface.separate() {
                 true => "tile_individuals.wgsl",
                 false => pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
             },
-            pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"),
+            pick(needs.surface.subgroups(), "splat_shared.wgsl", "splat_plain.wgsl"),
         ];
         files.extend(accumulate::tile_files(needs));
         files
     },
     kernels: |needs| {
         let large = [COUNT_LARGE, SCAN_LARGE, PLACE_LARGE, VISIBILITY];
-        let rest: &[Kernel] = if needs.gather { &[COUNT, SCAN, PLACE, RESOLVE] } else { &[ACCUMULATE] };
+        let rest: &[Kernel] = if needs.surface.gathers() { &[COUNT, SCAN, PLACE, RESOLVE] } else { &[ACCUMULATE] };
         large.into_iter().chain(rest.iter().copied()).collect()
     },
     constants: |_| Vec::new(),
@@ -73,7 +73,7 @@ const RESOLVE: Kernel = Kernel::new("tile_resolve");
 
 /// The height of a tile, pixels.
 pub fn rows(needs: &SceneNeeds) -> u32 {
-    if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN }
+    if needs.surface.subgroups() { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN }
 }
 
 /// The mean number of tiles of [`TILE_ROWS_SHARED`] rows that a splat touches in the view of
@@ -174,7 +174,7 @@ pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
 pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
-    let separate = plan.needs.separate;
+    let separate = plan.needs.surface.separate();
     let clears = if separate { individuals::clears(plan, band, page == 0) } else { covered::clears(plan, band) };
     let stage = Stage::new("accumulate", band, runs).of_page(page).after(clears);
     vec![bin(plan, Listed::Small, (band, page), page == 0, true), stage]

@@ -49,6 +49,7 @@ use super::raster::DEPTH_FORMAT;
 use super::resolve::shaded;
 use crate::gpu::layout::{QUEUE_START, TILE};
 use crate::gpu::program::Draw;
+use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step, Twin};
 use crate::plan::{Band, ColorNeed, Plan};
@@ -266,9 +267,6 @@ fn reach(camera: &Camera, of: &[Corner; 3], (first_row, rows): (u32, u32)) -> Op
 /// Words per pixel of the buffer of nearest triangles.
 pub const NEAREST_TRIANGLE_WORDS: u32 = 2;
 
-/// Words per pixel of the shaded triangles.
-pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
-
 /// The word at which the list of tiles with triangles starts, after its count and a grid.
 const TRIANGLE_TILES: u64 = 8;
 
@@ -294,7 +292,7 @@ pub const PASS: Pass = Pass {
             Projection::Pinhole => "corner_pinhole.wgsl",
             Projection::Orthographic => "corner_orthographic.wgsl",
         };
-        let visibility: &[&str] = match (needs.raster, mesh.once) {
+        let visibility: &[&str] = match (needs.surface.raster(), mesh.once) {
             (Some(_), _) => &["triangles_raster.wgsl"],
             (None, true) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_once.wgsl"],
             (None, false) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_twice.wgsl"],
@@ -318,7 +316,7 @@ pub const PASS: Pass = Pass {
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),
-        Some(_) if needs.raster.is_some() => vec![SEE_CORNERS, LIST_TILES, ARRANGE_TILES, SHADE],
+        Some(_) if needs.surface.raster().is_some() => vec![SEE_CORNERS, LIST_TILES, ARRANGE_TILES, SHADE],
         Some(mesh) => {
             let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, DRAW_RARE, LIST_TILES, ARRANGE_TILES, SHADE];
             all.into_iter().chain([NAME, NAME_LARGE, NAME_RARE].into_iter().filter(|_| !mesh.once)).collect()
@@ -389,7 +387,7 @@ pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
     let once = plan.needs.mesh.is_some_and(|mesh| mesh.once);
     let tiles = Clear::of("triangle_tiles", 0, TRIANGLE_TILES);
     let shade = [run(LIST_TILES, Over::Occlusion), run(ARRANGE_TILES, Over::Once), run(SHADE, Over::TriangleTiles)];
-    if plan.needs.raster.is_some() {
+    if plan.needs.surface.raster().is_some() {
         return vec![Stage::new("triangles", band, shade.to_vec()).after(vec![tiles])];
     }
     let mut runs = Vec::new();

@@ -2,7 +2,8 @@
 //!
 //! For a far cloud thousands of fragments may lie at a pixel, more than a device sorts or a buffer
 //! holds, though the nearest ones hide the others. So in a view whose lists turn out to be too
-//! long, the visibility pass sums the fragments' optical depths, `-ln(1 - alpha)`, in [`VEILS`]
+//! long, the visibility pass sums the fragments' optical depths, `-ln(1 - alpha)`, in
+//! [`VEILS`](crate::plan::extra::VEILS)
 //! steps of depth. The list ends with the first step up to which the sum H is at least
 //! `ln(1 / s) + MARGIN`, where s is the transmittance below which nothing more is composited
 //! ([`Rules::least_shown`](super::sorted::Rules)).
@@ -22,14 +23,9 @@
 
 use super::sorted::Rules;
 use crate::plan::Plan;
+use crate::plan::extra::VEIL_WORDS;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
-
-/// The number of steps of depth.
-pub const VEILS: u32 = 16;
-
-/// Words per pixel: the count and the optical depth of each step.
-pub const VEIL_WORDS: u32 = 2 * VEILS;
 
 /// Units per optical depth of 1.
 const UNITS: f64 = 1024.0;
@@ -40,8 +36,8 @@ const MARGIN: f64 = 0.02;
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "veils",
-    files: |needs| if needs.veils { vec!["fragments_veils.wgsl"] } else { Vec::new() },
-    kernels: |needs| if needs.veils { vec![END] } else { Vec::new() },
+    files: |needs| if needs.surface.veils() { vec!["fragments_veils.wgsl"] } else { Vec::new() },
+    kernels: |needs| if needs.surface.veils() { vec![END] } else { Vec::new() },
     constants: |making| {
         let rules = Rules::of(making.options);
         let enough = ((1.0 / rules.least_shown).ln() + MARGIN) * UNITS;
@@ -60,11 +56,11 @@ const END: Kernel = Kernel::new("end_lists");
 /// The clear before fragments are counted.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = u64::from(VEIL_WORDS) * plan.bands[band].pixels;
-    plan.needs.veils.then(|| Clear::of("veils", 0, words))
+    plan.needs.surface.veils().then(|| Clear::of("veils", 0, words))
 }
 
 /// The stage that finds where lists end, after fragments were counted.
 pub fn steps(plan: &Plan, band: usize) -> Option<Stage> {
     let run = Run { kernel: END, over: Over::Pixels };
-    plan.needs.veils.then(|| Stage::new("visibility", band, vec![run]))
+    plan.needs.surface.veils().then(|| Stage::new("visibility", band, vec![run]))
 }

@@ -72,9 +72,13 @@ pub fn reference<'a>(
 pub const PASS: Pass = Pass {
     name: "visibility",
     files: |needs| {
-        if needs.raster.is_none() { vec!["visibility.wgsl", "occlusion.wgsl", "front.wgsl"] } else { Vec::new() }
+        if needs.surface.raster().is_none() {
+            vec!["visibility.wgsl", "occlusion.wgsl", "front.wgsl"]
+        } else {
+            Vec::new()
+        }
     },
-    kernels: |needs| match (needs.raster, needs.cull) {
+    kernels: |needs| match (needs.surface.raster(), needs.cull) {
         (None, false) if oit::marks(needs) => vec![OCCLUDE],
         (None, false) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE],
         (None, true) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE, OCCLUDE_OPEN],
@@ -82,7 +86,7 @@ pub const PASS: Pass = Pass {
     },
     constants: |making| {
         // Fragments that are all summed (order-independent transparency) do not hide each other.
-        let hides = making.options.has(Optimisation::Hiding) && making.needs.oit.is_none();
+        let hides = making.options.has(Optimisation::Hiding) && making.needs.surface.oit().is_none();
         vec![("HIDES", u32::from(hides).into())]
     },
 };

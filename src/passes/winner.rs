@@ -13,23 +13,24 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Clear;
-use crate::plan::{Oit, Plan, Settings, Winner};
+use crate::plan::{Oit, Plan, Settings, Surface, Winner};
 use crate::scene::color::{decoded, srgb8};
 use crate::scene::{Camera, Colors, Scene};
 
 /// The pass's files.
 pub const PASS: Pass = Pass {
     name: "winner",
-    files: |needs| match needs.winner {
-        // Moments and lists store something else in place of nearest depths.
-        None if needs.oit == Some(Oit::Moments) || needs.lists.is_some() => Vec::new(),
-        None if needs.raster.is_none() => vec!["nearest_depth.wgsl"],
-        None => Vec::new(),
-        Some(Winner::Rasterised) => Vec::new(),
-        Some(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],
-        Some(Winner::Once) => vec!["winner.wgsl", "nearest_color.wgsl", "winner_color.wgsl", "srgb.wgsl"],
-        Some(Winner::Second) => {
+    files: |needs| match needs.surface {
+        Surface::Blended { .. } | Surface::OrderFree(Oit::Weighted) => vec!["nearest_depth.wgsl"],
+        Surface::Nearest(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],
+        Surface::Nearest(Winner::Once) => vec!["winner.wgsl", "nearest_color.wgsl", "winner_color.wgsl", "srgb.wgsl"],
+        Surface::Nearest(Winner::Second) => {
             vec!["winner.wgsl", "nearest_depth.wgsl", "winner_second.wgsl", "winner_color.wgsl", "srgb.wgsl"]
+        }
+        // Moments and lists store something else in place of nearest depths, and the rasteriser has
+        // a depth buffer.
+        Surface::OrderFree(Oit::Moments) | Surface::Layers { .. } | Surface::Sorted { .. } | Surface::Raster { .. } => {
+            Vec::new()
         }
     },
     kernels: |_| Vec::new(),
@@ -39,7 +40,7 @@ pub const PASS: Pass = Pass {
 /// The clear before the visibility pass, if that pass stores colours.
 pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
     let words = plan.bands[band].pixels * u64::from(plan.sum_words);
-    (plan.needs.winner == Some(Winner::Once)).then(|| Clear::of("sums", 0, words))
+    (plan.needs.surface == Surface::Nearest(Winner::Once)).then(|| Clear::of("sums", 0, words))
 }
 
 /// The fragment that wins a pixel.

@@ -26,10 +26,10 @@ impl FragmentLayout {
     /// The layout for `needs`.
     pub fn of(needs: &SceneNeeds) -> Self {
         let (rank, colors) = (1, color_channels(needs));
-        let color = rank + u32::from(needs.lists == Some(Lists::Sorted));
+        let color = rank + u32::from(needs.surface.lists() == Some(Lists::Sorted));
         let normal = color + colors;
         let radius = normal + if needs.normal { 3 } else { 0 };
-        let has_radius = needs.lists == Some(Lists::Layers) && needs.epsilon == EpsilonForm::Radius;
+        let has_radius = needs.surface.lists() == Some(Lists::Layers) && needs.epsilon == EpsilonForm::Radius;
         let words = (radius + u32::from(has_radius)).next_multiple_of(4);
         Self { words, rank, color, colors, normal, radius, has_radius }
     }

@@ -5,6 +5,7 @@ mod accumulator;
 pub mod check;
 mod composited;
 mod cuts;
+pub mod extra;
 mod facts;
 mod fragment;
 pub mod known;
@@ -16,6 +17,7 @@ mod pixel;
 mod raster;
 mod settings;
 pub mod steps;
+mod surface;
 mod surfel;
 pub mod tuning;
 mod view;
@@ -28,11 +30,12 @@ pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
 pub use mesh::{MeshFacts, MeshNeeds, texture_words};
 pub(crate) use mesh::{bounds_of, in_view};
-pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
+pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, culls_back};
 pub use optimisation::Optimisation;
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use settings::{BackendName, Organisation, Settings};
+pub use surface::{Rasterised, Splats, Surface, Winner};
 pub use surfel::{SurfelLayout, splat_words};
 pub use view::{depths, device_unit, farthest};
 
@@ -41,12 +44,8 @@ use std::ops::Range;
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
-use crate::passes::individuals;
-use crate::passes::moments::MOMENT_WORDS;
-use crate::passes::peel::PEELED_WORDS;
-use crate::passes::triangles::TRIANGLE_PIXEL_WORDS;
-use crate::passes::veils::VEIL_WORDS;
 use crate::scene::Camera;
+use extra::most_words;
 use known::Listed;
 use steps::Part;
 
@@ -91,22 +90,11 @@ pub struct Plan {
     pub looks_for_lists: [bool; 2],
 }
 
-/// The most u32 words per pixel in any buffer that only some renders have.
-fn most_words(needs: &SceneNeeds) -> u32 {
-    let of = |has: bool, words: u32| if has { words } else { 0 };
-    let peeled = of(needs.peels.is_some(), PEELED_WORDS);
-    let moments = of(needs.oit == Some(Oit::Moments), MOMENT_WORDS);
-    // Four words per tile of 64 pixels (fewer at the image's edges) are at most one more per pixel,
-    // unless the image has only a few pixels.
-    let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS + 1);
-    peeled.max(moments).max(triangles).max(individuals::words(needs)).max(of(needs.veils, VEIL_WORDS))
-}
-
 /// The largest number of surfels that blend with each other. Tiles gather them only if they fit one
 /// page.
 fn most_together((facts, drawn): (&Facts, u64), needs: &SceneNeeds) -> u64 {
     let largest = facts.individuals.iter().copied().max();
-    largest.filter(|_| needs.separate).unwrap_or(drawn)
+    largest.filter(|_| needs.surface.separate()).unwrap_or(drawn)
 }
 
 /// The range of pages of each group of surfels in `apart`, at `most` surfels per page.
@@ -123,7 +111,7 @@ fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
 /// Whether tiles sum all splats of a page, if those that blend with each other share one.
 fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     let pays = match options.organisation {
-        Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
+        Organisation::Auto => needs.surface.subgroups() && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
         Organisation::Tile => true,
         Organisation::Scatter => false,
     };
@@ -138,11 +126,11 @@ fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &Settings) ->
     options.has(Optimisation::Culling)
         && tuning::PIXELS_A_CULLED_SURFEL * drawn > camera.pixels() as u64
         && !needs.levels
-        && !needs.copies
-        && needs.lists.is_none()
-        && needs.oit.is_none()
-        && !needs.separate
-        && needs.raster.is_none()
+        && !needs.surface.copies()
+        && needs.surface.lists().is_none()
+        && needs.surface.oit().is_none()
+        && !needs.surface.separate()
+        && needs.surface.raster().is_none()
 }
 
 impl Plan {
@@ -169,13 +157,13 @@ impl Plan {
         // Each branch has its own pages.
         let apart = if needs.levels { cut.clone().unwrap_or_default() } else { vec![facts.surfels] };
         let (drawn, pages) = (apart.iter().sum(), pages_of(&apart, page).last().map_or(0, |last| last.end));
-        let in_one = (pages == 1 || needs.separate) && (1..=page).contains(&most_together((facts, drawn), &needs));
+        let in_one =
+            (pages == 1 || needs.surface.separate()) && (1..=page).contains(&most_together((facts, drawn), &needs));
         let gather = in_one && gathers(&needs, options, known);
         let cull = page >= BATCH.into() && culls(drawn, &needs, camera, options);
-        let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
-        let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
-        let long_lists = needs.lists.is_some() && known.longest_list > 0;
-        let needs = SceneNeeds { gather, cull, veils, long_lists, ..needs };
+        let individuals = if needs.surface.separate() { pages_of(&facts.individuals, page) } else { Vec::new() };
+        let surface = needs.surface.sized(gather, known.veiled, known.longest_list > 0);
+        let needs = SceneNeeds { surface, cull, ..needs };
         // Gathering tiles keep sums in registers.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
@@ -183,14 +171,14 @@ impl Plan {
         let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;
-        if several && needs.peels.is_some() {
+        if several && needs.surface.peels().is_some() {
             let what =
                 "the rasteriser peels layers of the whole image, and this one is too large: choose a smaller one";
             return Err(adapter.error(what));
         }
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
-                Listed::Large => needs.tiles && (gather || known.large != Some(false)),
+                Listed::Large => needs.surface.tiles() && (gather || known.large != Some(false)),
                 Listed::Small => gather,
             };
             wanted && known.entries_of(of).is_none()
@@ -207,10 +195,10 @@ impl Plan {
             cut,
             individuals,
             longest_list: known.longest_list,
-            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some(),
+            lists_empty: options.shows_where_nothing_is() || needs.surface.peels().is_some(),
             projects_each_band: several && (cull || gather),
             looks_for_slots: cull && (several || !known.slots),
-            large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),
+            large_by_tiles: needs.surface.tiles() && (looks[0] || known.entries_of(Listed::Large).is_some()),
             looks_for_lists: looks,
         })
     }
@@ -218,14 +206,11 @@ impl Plan {
     /// Plans the frame of the f64 reference, in strips of sample rows; nothing is culled.
     pub fn of_reference(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let needs = SceneNeeds::of_picture(facts, camera, options);
-        let individuals = if needs.separate { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
+        let individuals = if needs.surface.separate() { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
             // The twins have one path for what a device draws in several ways.
             needs: SceneNeeds {
-                raster: None,
-                tiles: false,
-                lists: Lists::of(facts, options),
-                peels: None,
+                surface: Surface::by_compute(facts, options),
                 // The reference gets a scene that holds only the cut.
                 levels: false,
                 ..needs
@@ -256,7 +241,7 @@ impl Plan {
     /// The groups of pages whose surfels blend with each other: all pages, or those of each
     /// individual.
     pub fn together(&self) -> Vec<Range<usize>> {
-        if self.needs.separate { self.individuals.clone() } else { std::iter::once(0..self.pages).collect() }
+        if self.needs.surface.separate() { self.individuals.clone() } else { std::iter::once(0..self.pages).collect() }
     }
 
     /// Whether splats are projected, and their unknown counts read back, in `band`.

@@ -1,11 +1,10 @@
 //! The needs of a scene and its options, computed once: the only variant key of the kernels.
 
 use super::{
-    Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth, Settings,
+    Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, RasterDepth, Settings, Splats, Surface, Winner,
     composited, in_view, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
-use crate::passes::peel;
 use crate::scene::{
     Blend, Camera, Composite, Cull, Epsilon, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
     Shading,
@@ -15,6 +14,8 @@ use crate::scene::{
 /// buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SceneNeeds {
+    /// How the fragments of a pixel become its colour.
+    pub surface: Surface,
     /// The camera model.
     pub projection: Projection,
     /// The format of sums on the device.
@@ -32,9 +33,6 @@ pub struct SceneNeeds {
     pub long_words: bool,
     /// The f32 centres of surfels omit digits that show, so their low parts are stored too.
     pub doubled: bool,
-    /// One surfel is drawn for all identical ones. This requires the accumulator `fixed`, a surfel
-    /// with many copies, no texture, and no separate inputs.
-    pub copies: bool,
     /// A cut of levels of detail is drawn.
     pub levels: bool,
     /// Octree nodes in the cut are drawn with curvature (caps).
@@ -45,37 +43,8 @@ pub struct SceneNeeds {
     /// drawn, and enough surfels for the number of pixels, because the search for what hides them
     /// visits every pixel ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
-    /// Tiles draw at least the large splats. This requires the accumulator `fixed`, and options
-    /// that do not ask for scatter.
-    pub tiles: bool,
-    /// Tiles sum all splats, large and small, and resolve their pixels directly (or keep what an
-    /// input shows), so no sums are stored.
-    pub gather: bool,
-    /// The invocations of a subgroup read a splat's record together; a software adapter would
-    /// otherwise read it for each of them.
-    pub subgroups: bool,
-    /// The rasteriser makes the sums, in this format.
-    pub raster: Option<Raster>,
-    /// Only the nearest fragment shows, and it is found in this way.
-    pub winner: Option<Winner>,
     /// The needs of the triangles drawn with the splats.
     pub mesh: Option<MeshNeeds>,
-    /// Inputs are kept separate ([`individuals`](crate::passes::individuals)).
-    pub separate: bool,
-    /// Pixels have lists of their fragments, which are composited in this way.
-    pub lists: Option<Lists>,
-    /// All fragments of a pixel are summed in any order, weighted by an estimate of what lies in
-    /// front of each.
-    pub oit: Option<Oit>,
-    /// Number of layers that the rasteriser peels, one after the other.
-    pub peels: Option<u32>,
-    /// Lists end where nothing behind shows; without that some would be too long.
-    pub veils: bool,
-    /// Some lists are sorted and composited in rounds, because they exceed the loop limit of one
-    /// invocation.
-    pub long_lists: bool,
-    /// The rasteriser draws a triangle per splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
-    pub triangles: bool,
     /// The formula of the blending kernel.
     pub kernel: KernelShape,
     /// The filter for small splats.
@@ -133,19 +102,6 @@ impl EpsilonForm {
             Epsilon::Ray(_) | Epsilon::Relative(_) | Epsilon::Absolute(_) => Self::Depth,
         }
     }
-}
-
-/// How the only fragment that shows at a pixel is found ([`winner`](crate::passes::winner)).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Winner {
-    /// All surfels have one colour, so the nearest depth is enough.
-    Depth,
-    /// Depth and colour in one 64-bit number, by one atomic minimum.
-    Once,
-    /// The nearest depth first, then its colour in a second pass.
-    Second,
-    /// By the rasteriser's depth test.
-    Rasterised,
 }
 
 /// Returns the needs of the scene's triangles, or `None` if the view shows none. Next to triangles,
@@ -228,47 +184,32 @@ impl Sides {
 impl SceneNeeds {
     /// Returns the needs of a picture of the scene that `facts` describe, for any renderer.
     pub fn of_picture(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
+        let surface = Surface::of_picture(facts, options);
         let (low, high) = facts.color;
         let lit = options.shading != Shading::Unlit;
-        let blends = options.blend == Blend::Weighted;
-        let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none() && blends;
-        let lists = Lists::of(facts, options);
-        let peels = lists.and(peel::layers(options));
-        let oit = Oit::of(options);
-        let separate = options.separate && facts.individuals.len() > 1;
+        let blends = !surface.shows_nearest();
+        let fixed = options.accumulator == Accumulator::Fixed && surface.raster().is_none() && blends;
+        let order_free = surface.oit().is_some();
         let node_caps = options.draws_node_caps() && facts.nodes_of(options).is_some_and(|nodes| nodes.caps);
-        let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
+            surface,
             projection: camera.projection,
             accumulator: options.accumulator,
-            wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || oit.is_some()),
+            wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || order_free),
             atomics_u64: false,
             long_words: false,
             doubled: facts.doubled,
-            copies: false,
             levels: facts.nodes_of(options).is_some(),
             node_caps,
             fades: if facts.nodes_of(options).is_some() { options.detail_fades } else { facts.fades },
             cull: false,
-            tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
-            gather: false,
-            subgroups: false,
-            raster: options.raster,
-            winner: (!blends).then_some(unblended),
             mesh: mesh(facts, camera, options),
-            separate,
-            lists: if options.raster.is_some() { None } else { lists },
-            oit,
-            peels,
-            veils: false,
-            long_lists: false,
-            triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
-            epsilon: match oit {
-                Some(_) => EpsilonForm::All,
-                None if blends => EpsilonForm::of(options.epsilon, camera),
-                None => EpsilonForm::Depth,
+            epsilon: match blends {
+                _ if order_free => EpsilonForm::All,
+                true => EpsilonForm::of(options.epsilon, camera),
+                false => EpsilonForm::Depth,
             },
             // Lit surfels differ even if all have one colour.
             color: match facts.colors {
@@ -296,63 +237,62 @@ impl SceneNeeds {
     /// Returns the needs of a render on `adapter`, before the image is cut into bands.
     pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &Settings) -> Self {
         let picture = Self::of_picture(facts, camera, options);
-        let blends = picture.winner.is_none();
-        // Lists are summed in registers.
-        let stored = blends && picture.lists.is_none();
-        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none() && stored;
         let long_atomics = adapter.atomics_u64 && options.has(Optimisation::Pairs);
-        let winner = picture.winner.map(|winner| match winner {
-            Winner::Second if picture.color == ColorNeed::Constant => Winner::Depth,
-            Winner::Second if long_atomics => Winner::Once,
+        let surface = match picture.surface {
+            Surface::Nearest(_) if picture.color == ColorNeed::Constant => Surface::Nearest(Winner::Depth),
+            Surface::Nearest(_) if long_atomics => Surface::Nearest(Winner::Once),
+            Surface::Blended { separate: false, .. } if picture.may_draw_copies(facts, options) => {
+                // Copies would make the lists of tiles long.
+                Surface::Blended { splats: Splats::Copies, separate: false }
+            }
+            Surface::Blended { splats: Splats::Tiles { gather, .. }, separate } => {
+                let subgroups = tuning::shares(adapter) && options.has(Optimisation::Sharing);
+                Surface::Blended { splats: Splats::Tiles { gather, subgroups }, separate }
+            }
+            Surface::Raster { raster, shown, .. } => {
+                let triangles = tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64;
+                Surface::Raster { raster, shown, triangles }
+            }
             other => other,
-        });
-        let copies = facts.copies
-            && options.draws_copies_once()
-            && fixed
-            && picture.oit.is_none()
-            && !picture.separate
-            && !picture.levels
-            && !picture.fades
-            && picture.color != ColorNeed::Textured;
-        // Copies would make the lists of tiles long.
-        let tiles = picture.tiles && !copies;
+        };
+        // Lists are summed in registers.
+        let fixed = picture.accumulator == Accumulator::Fixed && surface.sums_by_compute();
+        let once = long_atomics && surface.raster().is_none();
         Self {
-            copies,
-            tiles,
-            winner,
-            mesh: picture.mesh.map(|mesh| MeshNeeds { once: long_atomics && picture.raster.is_none(), ..mesh }),
-            atomics_u64: long_atomics && fixed && !copies,
+            surface,
+            mesh: picture.mesh.map(|mesh| MeshNeeds { once, ..mesh }),
+            atomics_u64: long_atomics && fixed && !surface.copies(),
             long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
-            subgroups: tiles && tuning::shares(adapter) && options.has(Optimisation::Sharing),
             ..picture
         }
     }
 
-    /// Whether compute kernels make weighted sums, in storage or in a tile's registers.
-    pub fn sums_by_compute(&self) -> bool {
-        self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
+    /// Whether one surfel may be drawn for all identical ones.
+    fn may_draw_copies(&self, facts: &Facts, options: &Settings) -> bool {
+        let plain = !self.levels && !self.fades && self.color != ColorNeed::Textured;
+        facts.copies && options.draws_copies_once() && self.accumulator == Accumulator::Fixed && plain
     }
 
     /// Whether tiles may sum all splats. With textures and triangles they would bind more buffers
     /// than core WebGPU allows.
     pub fn may_gather(&self) -> bool {
-        self.tiles && !(self.color == ColorNeed::Textured && self.mesh.is_some())
+        self.surface.tiles() && !(self.color == ColorNeed::Textured && self.mesh.is_some())
     }
 
     /// Returns these needs without those that depend on how much is drawn.
     pub fn before_cut(&self) -> Self {
-        Self { cull: false, gather: false, veils: false, long_lists: false, ..*self }
+        Self { cull: false, surface: self.surface.before_cut(), ..*self }
     }
 
     /// Whether records store the surfels' places in the octree, which decide the order of sorted
     /// fragments at one depth.
     pub fn numbers_surfels(&self) -> bool {
-        self.levels && self.lists == Some(Lists::Sorted)
+        self.levels && self.surface.lists() == Some(Lists::Sorted)
     }
 
     /// Whether surfaces are compared by their blended depths.
     pub fn compares_depth(&self) -> bool {
-        self.separate || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
+        self.surface.separate() || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
     }
 
     /// Whether depths are summed.
@@ -363,7 +303,7 @@ impl SceneNeeds {
     /// Whether fragments have weights: they are summed, or drawn by the rasteriser, whose targets
     /// hold terms even of a single fragment.
     pub fn weighs(&self) -> bool {
-        matches!(self.winner, None | Some(Winner::Rasterised))
+        self.surface.winner().is_none()
     }
 
     /// Returns the names of the needs, for people and JSON.
@@ -385,7 +325,7 @@ impl SceneNeeds {
             KernelShape::Cone => "kernel-cone",
             KernelShape::Constant => "kernel-constant",
         };
-        let raster = self.raster.map(|raster| match raster.depth {
+        let raster = self.surface.raster().map(|raster| match raster.depth {
             RasterDepth::Exact => "raster-exact",
             RasterDepth::Offset => "raster-offset",
         });
@@ -398,7 +338,7 @@ impl SceneNeeds {
     }
 
     /// The optional needs, each with whether it is set and its name.
-    fn flags(&self) -> Vec<(bool, &'static str)> {
+    pub fn flags(&self) -> Vec<(bool, &'static str)> {
         let joins = |join| self.mesh.is_some_and(|mesh| mesh.join == join);
         vec![
             (self.low_pass == LowPass::Max, "lowpass-max"),
@@ -408,13 +348,13 @@ impl SceneNeeds {
             (self.atomics_u64, "atomics-u64"),
             (self.long_words, "long-words"),
             (self.doubled, "doubled"),
-            (self.copies, "copies"),
+            (self.surface.copies(), "copies"),
             (self.levels, "levels"),
             (self.node_caps, "node-caps"),
             (self.fades, "fades"),
             (self.cull, "cull"),
-            (self.tiles, "tiles"),
-            (self.gather, "gather"),
+            (self.surface.tiles(), "tiles"),
+            (self.surface.gathers(), "gather"),
             (self.epsilon == EpsilonForm::Radius, "epsilon-radius"),
             (self.epsilon == EpsilonForm::Ray, "epsilon-ray"),
             (self.alpha, "alpha"),
@@ -426,20 +366,20 @@ impl SceneNeeds {
             (self.outline, "outline"),
             (self.curved, "curved"),
             (self.facing.is_some(), "facing"),
-            (self.winner.is_some(), "nearest"),
-            (self.lists == Some(Lists::Layers), "lists-layers"),
-            (self.lists == Some(Lists::Sorted), "lists-sorted"),
-            (self.oit == Some(Oit::Weighted), "oit-weighted"),
-            (self.oit == Some(Oit::Moments), "oit-moments"),
-            (self.peels.is_some(), "peels"),
+            (self.surface.shows_nearest(), "nearest"),
+            (self.surface.lists() == Some(Lists::Layers), "lists-layers"),
+            (self.surface.lists() == Some(Lists::Sorted), "lists-sorted"),
+            (self.surface.oit() == Some(Oit::Weighted), "oit-weighted"),
+            (self.surface.oit() == Some(Oit::Moments), "oit-moments"),
+            (self.surface.peels().is_some(), "peels"),
             (self.mesh.is_some(), "triangles"),
             (self.mesh.is_some_and(|mesh| mesh.textured), "painted-triangles"),
             (self.mesh.is_some_and(|mesh| mesh.doubled), "doubled-triangles"),
-            (self.separate, "separate"),
+            (self.surface.separate(), "separate"),
             (joins(Join::Corrected), "join-corrected"),
             (joins(Join::Blended), "join-blended"),
-            (self.veils, "veils"),
-            (self.long_lists, "long-lists"),
+            (self.surface.veils(), "veils"),
+            (self.surface.long_lists(), "long-lists"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -1,6 +1,6 @@
 //! The layout of a pixel's sums and of its image record.
 
-use super::{ColorNeed, SceneNeeds, Winner};
+use super::{ColorNeed, SceneNeeds, Surface, Winner};
 use crate::scene::{MAPS, Map};
 
 /// Offsets of a pixel's values: in the sums by channel, in the image by u32 word. Values that are
@@ -44,7 +44,7 @@ impl PixelLayout {
         let middles_channel = depth_channel + channels(needs.sums_depth(), 1);
         let count_channel = middles_channel + channels(needs.compares_depth(), 1);
         let held_back_channel = count_channel + channels(needs.maps.has(Map::Count), 1);
-        let place_channel = (held_back_channel + channels(needs.oit.is_some(), 1)).next_multiple_of(2);
+        let place_channel = (held_back_channel + channels(needs.surface.oit().is_some(), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;
         let map_words = MAPS.each_ref().map(|row| {
             let first = image_words;
@@ -67,12 +67,12 @@ impl PixelLayout {
     /// u32 words per pixel of sums in storage, or of the nearest colour; 0 if sums are in the
     /// rasteriser's textures or in lists.
     pub fn sum_words(&self, needs: &SceneNeeds) -> u32 {
-        match needs.winner {
-            _ if needs.raster.is_some() || needs.lists.is_some() => 0,
-            None => self.channels * needs.accumulator.row().words,
-            Some(Winner::Once) => 2,
-            Some(Winner::Second) => 1,
-            Some(Winner::Depth | Winner::Rasterised) => 0,
+        match needs.surface {
+            Surface::Blended { .. } | Surface::OrderFree(_) => self.channels * needs.accumulator.row().words,
+            Surface::Nearest(Winner::Once) => 2,
+            Surface::Nearest(Winner::Second) => 1,
+            Surface::Nearest(Winner::Depth) => 0,
+            Surface::Layers { .. } | Surface::Sorted { .. } | Surface::Raster { .. } => 0,
         }
     }
 

@@ -39,7 +39,7 @@ impl SurfelLayout {
             // A colour, a place in the texture, and the two slopes of that place.
             ColorNeed::Textured => 16,
         };
-        let low = copies + u32::from(needs.copies);
+        let low = copies + u32::from(needs.surface.copies());
         let clip = low + if needs.doubled { 3 } else { 0 };
         let cap = clip + if needs.clips { 6 } else { 0 };
         let normal = cap + if needs.curved { 3 } else { 0 };

@@ -170,7 +170,7 @@ impl Kept {
         camera: &Camera,
         (tally, clock, passes, total_ms): (Tally, &'static str, BTreeMap<&'static str, f64>, f64),
     ) -> Report {
-        let raster = plan.needs.raster;
+        let raster = plan.needs.surface.raster();
         Report {
             backend: if raster.is_some() { "raster" } else { "gpu" },
             adapter: gpu.adapter.name.clone(),

@@ -64,7 +64,7 @@ impl Kernels {
         if let Some(program) = program.get() {
             return Ok(program);
         }
-        let draws = match self.made.0.raster {
+        let draws = match self.made.0.surface.raster() {
             Some(raster) if index == 0 => raster::draws(raster, &self.made.0),
             _ => Vec::new(),
         };

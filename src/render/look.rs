@@ -36,13 +36,13 @@ impl Run<'_> {
     /// retried.
     pub(super) fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
         self.timing.flush(self.gpu)?;
-        let gathers = self.plan.needs.gather;
+        let gathers = self.plan.needs.surface.gathers();
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
             let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
             // If lists cannot hold the large splats of one individual, those of all are drawn
             // without lists, and later bands skip this look.
-            let large = large && !(self.plan.needs.separate && self.unlisted);
+            let large = large && !(self.plan.needs.surface.separate() && self.unlisted);
             self.by_tiles = large;
             if !large {
                 return Ok(true);
@@ -117,7 +117,7 @@ impl Run<'_> {
     /// Makes lists end where nothing behind shows, from the next try on. Returns false if that
     /// changes nothing.
     fn veil(&mut self) -> bool {
-        let veils = self.plan.needs.lists == Some(Lists::Sorted) && !self.plan.needs.veils;
+        let veils = self.plan.needs.surface.lists() == Some(Lists::Sorted) && !self.plan.needs.surface.veils();
         if veils {
             // Bands are cut anew by the shorter lists.
             (self.known.veiled, self.known.cuts) = (true, None);

@@ -147,7 +147,7 @@ impl<'a> Run<'a> {
         self.timing.flush(self.gpu)?;
         let wanted = |name: &'static str| self.store.buffer(name);
         let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
-        let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
+        let small = self.plan.needs.surface.gathers().then(|| wanted("small_lists")).flatten();
         let counts_wraps = self.plan.sum_words > 0 && self.plan.needs.accumulator.row().head_words() > 0;
         let sums = counts_wraps.then(|| wanted("sums")).flatten();
         let chosen = self.store.chosen().filter(|_| self.plan.cut.is_some());
@@ -216,7 +216,7 @@ impl<'a> Run<'a> {
     /// Draws the rasteriser's visibility and attribute passes over the whole image.
     fn draw(&mut self) -> Result<()> {
         let (gpu, plan, store) = (self.gpu, self.plan, &*self.store);
-        let (Some(raster), Some(targets)) = (plan.needs.raster, &store.targets) else { return Ok(()) };
+        let (Some(raster), Some(targets)) = (plan.needs.surface.raster(), &store.targets) else { return Ok(()) };
         let program = self.kernels.first(gpu)?;
         let draw = |pass: &mut wgpu::RenderPass<'_>, name| {
             for (number, page) in store.pages.iter().enumerate() {
@@ -239,7 +239,7 @@ impl<'a> Run<'a> {
             |view| Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
         let sums: Vec<_> = targets.sums.iter().map(attach).collect();
         let cleared = Some(attachment(Some(clear)));
-        if plan.needs.winner.is_some() {
+        if plan.needs.surface.shows_nearest() {
             return self.timing.draw(gpu, "visibility", &sums, cleared, |pass| draw(pass, "nearest"));
         }
         self.timing.draw(gpu, "visibility", &[], cleared, |pass| draw(pass, "visibility"))?;

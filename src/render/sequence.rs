@@ -8,7 +8,7 @@ use crate::passes::{
 };
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step, Twin};
-use crate::plan::{Oit, Plan, Winner};
+use crate::plan::{Oit, Plan, Rasterised, Surface, Winner};
 
 /// Returns the steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
@@ -21,23 +21,23 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         steps.push(Step::Look(Look::Cut));
         return steps;
     }
-    if plan.needs.raster.is_some() {
+    if let Surface::Raster { shown, .. } = plan.needs.surface {
         steps.push(Step::Stage(project::steps(plan, 0, Part::All)));
         steps.extend(plan.needs.mesh.into_iter().flat_map(|_| triangles::drawn()));
-        match plan.needs.peels {
-            Some(layers) => steps.extend(peel::steps(plan, layers)),
-            None => steps.push(raster::STEP),
+        match shown {
+            Rasterised::Layers(layers) => steps.extend(peel::steps(plan, layers)),
+            Rasterised::Blended | Rasterised::Nearest => steps.push(raster::STEP),
         }
     }
     for band in 0..plan.bands.len() {
         if plan.needs.mesh.is_some() {
             steps.extend(triangles::steps(plan, band).into_iter().map(Step::Stage));
         }
-        match (plan.needs.raster, plan.needs.lists) {
-            (Some(_), _) => {}
-            (None, Some(_)) => lists(plan, band, &mut steps),
-            (None, None) if plan.needs.oit.is_some() => order_free(plan, band, &mut steps),
-            (None, None) => {
+        match plan.needs.surface {
+            Surface::Raster { .. } => {}
+            Surface::Layers { .. } | Surface::Sorted { .. } => lists(plan, band, &mut steps),
+            Surface::OrderFree(_) => order_free(plan, band, &mut steps),
+            Surface::Blended { .. } | Surface::Nearest(_) => {
                 project_in(plan, band, &mut steps);
                 for pages in plan.together() {
                     nearest(plan, band, &pages, &mut steps);
@@ -45,7 +45,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
                 }
             }
         }
-        if !plan.needs.gather || plan.needs.separate {
+        if !plan.needs.surface.gathers() || plan.needs.surface.separate() {
             steps.push(Step::Stage(resolve::steps(plan, band)));
         }
         steps.extend(of_maps(plan, band).map(Step::Stage));
@@ -86,8 +86,8 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
 /// Returns the stage over all pages or, if inputs are kept apart, one copy per page of `pages`. The
 /// reference does the work of these copies in one go elsewhere; clears stay with the first copy.
 fn on(plan: &Plan, pages: &Range<usize>, stage: Stage) -> impl Iterator<Item = Stage> {
-    let each = if plan.needs.separate { pages.clone() } else { 0..0 };
-    let whole = (!plan.needs.separate).then(|| stage.clone());
+    let each = if plan.needs.surface.separate() { pages.clone() } else { 0..0 };
+    let whole = (!plan.needs.surface.separate()).then(|| stage.clone());
     let first = pages.start;
     let of_page = move |page: usize| {
         let stage = stage.clone().without_twin().of_page(page);
@@ -113,7 +113,7 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
     let of_all = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
-    let before = of_all.into_iter().filter(|_| plan.needs.oit == Some(Oit::Moments));
+    let before = of_all.into_iter().filter(|_| plan.needs.surface.oit() == Some(Oit::Moments));
     let sums = [accumulate::steps(plan, band, true).as_twin(Twin::Oit), accumulate::large(band)];
     let covered = oit::marks(&plan.needs).then(|| oit::mark(band)).into_iter();
     let covered = covered.chain([visibility::occlude(band, Part::All)]);
@@ -124,11 +124,11 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
 /// keep what each individual shows. Tiles that gather make the image too.
 fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     // The visibility pass has already found the colours.
-    if matches!(plan.needs.winner, Some(Winner::Depth | Winner::Once)) {
+    if matches!(plan.needs.surface, Surface::Nearest(Winner::Depth | Winner::Once)) {
         return;
     }
     let looks = plan.looks_for_lists[Listed::Small as usize];
-    if plan.needs.gather {
+    if plan.needs.surface.gathers() {
         steps.extend(looks.then(|| tiles::look(plan, Listed::Small, band, pages.clone())));
         steps.extend(tiles::resolve(plan, band, pages.start).into_iter().map(Step::Stage));
     } else {
@@ -136,11 +136,11 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
         steps.extend(on(plan, pages, accumulate::steps(plan, band, first)).map(Step::Stage));
         let by_workgroups = on(plan, pages, accumulate::large(band)).collect();
         large(plan, (tiles::accumulate(plan, band, pages.clone()), by_workgroups), steps);
-        if plan.needs.separate {
+        if plan.needs.surface.separate() {
             steps.push(Step::Stage(individuals::keep(plan, band, first)));
         }
     }
-    if let (true, Some(Step::Stage(last))) = (plan.needs.separate, steps.last_mut()) {
+    if let (true, Some(Step::Stage(last))) = (plan.needs.surface.separate(), steps.last_mut()) {
         last.twin = plan.individuals.iter().position(|own| own == pages).map(Twin::Individual);
     }
 }
@@ -149,7 +149,7 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
 /// which, the executor decides after a look at the device.
 fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Vec<Stage>), steps: &mut Vec<Step>) {
     // Tiles that gather either have lists, or the frame is retried without gathering.
-    let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.gather;
+    let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.surface.gathers();
     match plan.large_by_tiles {
         true if looks => steps.push(Step::Large { by_tiles, by_workgroups }),
         true => steps.extend(by_tiles.into_iter().map(Step::Stage)),

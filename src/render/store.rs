@@ -9,13 +9,11 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{Band as BandUniform, View};
-use crate::passes::moments::MOMENT_WORDS;
-use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
 use crate::passes::upload::Uploaded;
-use crate::passes::veils::VEIL_WORDS;
-use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, visibility};
+use crate::passes::{asks_for_order, covered, fragments, long_lists, visibility};
+use crate::plan::extra::{MOMENT_WORDS, PEELED_WORDS, VEIL_WORDS, individual_words};
 use crate::plan::known::Listed;
 use crate::plan::{
     Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, page_surfels, splat_words,
@@ -100,7 +98,15 @@ impl Uploading {
         let (surfel, splat_words) = (SurfelLayout::of(needs), splat_words(needs));
         let order = asks_for_order(needs) && !needs.levels;
         let mesh = needs.mesh.is_some();
-        Self { copies: needs.copies, separate: needs.separate, levels: needs.levels, surfel, splat_words, order, mesh }
+        Self {
+            copies: needs.surface.copies(),
+            separate: needs.surface.separate(),
+            levels: needs.levels,
+            surfel,
+            splat_words,
+            order,
+            mesh,
+        }
     }
 }
 
@@ -178,14 +184,15 @@ impl Store {
 
     /// Creates the buffers of `plan` that do not exist yet or have another size.
     pub fn fit(&mut self, gpu: &Gpu, plan: &Plan, known: &Known) -> Result<()> {
-        let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
+        let raster = plan.needs.surface.raster().map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
-        let (samples, lists, veils) = (plan.needs.samples, plan.needs.lists.is_some(), plan.needs.veils);
-        let moments = plan.needs.oit == Some(Oit::Moments);
-        let peels = plan.needs.peels.is_some();
+        let (samples, lists, veils) =
+            (plan.needs.samples, plan.needs.surface.lists().is_some(), plan.needs.surface.veils());
+        let moments = plan.needs.surface.oit() == Some(Oit::Moments);
+        let peels = plan.needs.surface.peels().is_some();
         let mesh = plan.needs.mesh.is_some();
-        let individual_words = individuals::words(&plan.needs);
+        let individual_words = individual_words(&plan.needs);
         let made = Made {
             width,
             samples,
@@ -227,7 +234,7 @@ impl Store {
         for of in [Listed::Large, Listed::Small] {
             let wanted = match of {
                 Listed::Large => plan.large_by_tiles,
-                Listed::Small => plan.needs.gather,
+                Listed::Small => plan.needs.surface.gathers(),
             };
             if wanted && !self.frame.contains_key(list_name(of)) {
                 self.make_lists(gpu, plan, of, known.entries_of(of).unwrap_or(0))?;
@@ -244,7 +251,7 @@ impl Store {
             Buffer::uniform(gpu, "band", &value)
         };
         self.bands = plan.bands.iter().map(uniform).collect::<Result<_>>()?;
-        let nearest = match plan.needs.raster {
+        let nearest = match plan.needs.surface.raster() {
             None => Buffer::indirect(gpu, "nearest depths", most(&visibility::nearest_words))?,
             Some(raster) => {
                 self.targets = Some(Targets::new(gpu, raster, plan)?);
@@ -252,33 +259,34 @@ impl Store {
             }
         };
         self.frame.insert("nearest", nearest);
-        if plan.needs.lists.is_some() {
+        if plan.needs.surface.lists().is_some() {
             let words = most(&fragments::start_words);
             self.frame.insert("starts", Buffer::storage(gpu, "starts of lists", words)?);
         }
-        if plan.needs.veils {
+        if plan.needs.surface.veils() {
             let words = pixels * u64::from(VEIL_WORDS);
             self.frame.insert("veils", Buffer::storage(gpu, "veils", words)?);
         }
-        if plan.needs.oit == Some(Oit::Moments) {
+        if plan.needs.surface.oit() == Some(Oit::Moments) {
             let words = pixels * u64::from(MOMENT_WORDS);
             self.frame.insert("moments", Buffer::storage(gpu, "moments", words)?);
         }
-        if plan.needs.peels.is_some() {
+        if plan.needs.surface.peels().is_some() {
             let words = pixels * u64::from(PEELED_WORDS);
             self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
         }
         if plan.needs.mesh.is_some() {
             // The rasteriser stores them in a texture, so one word serves the binding.
-            let words = if plan.needs.raster.is_some() { 1 } else { pixels * u64::from(NEAREST_TRIANGLE_WORDS) };
+            let words =
+                if plan.needs.surface.raster().is_some() { 1 } else { pixels * u64::from(NEAREST_TRIANGLE_WORDS) };
             self.frame.insert("nearest_triangles", Buffer::storage(gpu, "nearest triangles", words)?);
             let words = most(&triangles::pixel_words);
             self.frame.insert("triangle_pixels", Buffer::storage(gpu, "pixels of triangles", words)?);
             let words = most(&triangles::tile_words);
             self.frame.insert("triangle_tiles", Buffer::indirect(gpu, "tiles of triangles", words)?);
         }
-        if plan.needs.separate {
-            let words = pixels * u64::from(individuals::words(&plan.needs));
+        if plan.needs.surface.separate() {
+            let words = pixels * u64::from(individual_words(&plan.needs));
             self.frame.insert("individuals", Buffer::storage(gpu, "pixels of individuals", words)?);
         }
         if plan.sum_words > 0 {
@@ -320,7 +328,7 @@ impl Store {
                 self.frame.insert(name, Buffer::storage(gpu, what, room * words)?);
             }
         }
-        if plan.needs.long_lists {
+        if plan.needs.surface.long_lists() {
             let words = long_lists::words(count, plan.needs.samples);
             if self.frame.get("long_lists").is_none_or(|kept| kept.len < words) {
                 self.frame.insert("long_lists", Buffer::storage(gpu, "long lists", words)?);

@@ -13,7 +13,7 @@ use epsplat::low_level::plan::pass::Module;
 use epsplat::low_level::plan::steps::Kernel;
 use rayon::prelude::*;
 
-use super::all_needs;
+use super::variants::all_needs;
 
 /// The result of [`reflect`] for a module's text.
 pub struct Reflected {
@@ -56,7 +56,7 @@ struct All {
 static ALL: LazyLock<All> = LazyLock::new(|| {
     let sources = Sources::default();
     let (mut made, mut texts, mut numbers) = (Vec::new(), Vec::new(), HashMap::new());
-    for needs in all_needs() {
+    for &needs in all_needs() {
         for Module { files, kernels } in modules(&needs) {
             let text = *numbers.entry(files.clone()).or_insert_with(|| {
                 texts.push(sources.join(&files));

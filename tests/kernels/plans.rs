@@ -164,7 +164,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
     let (scene, options) = (sphere(1000, 1.5), Settings::default());
     let known = Known { touched_tiles: 3.0, ..Known::default() };
     let gathered = planned(&scene, 256, &software(), &options, &known);
-    assert!(gathered.needs.gather && gathered.sum_words == 0);
+    assert!(gathered.needs.surface.gathers() && gathered.sum_words == 0);
     assert_eq!(
         lines(&gathered)[6..],
         [
@@ -177,13 +177,13 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
     let tiny = Known { touched_tiles: 1.2, ..Known::default() };
     let crowded = Known { crowded: true, ..known.clone() };
     let nothing = Scene { surfels: vec![], colors: Colors::Constant([1.0; 4]), ..scene.clone() };
-    assert!(!planned(&nothing, 256, &software(), &options, &known).needs.gather);
+    assert!(!planned(&nothing, 256, &software(), &options, &known).needs.surface.gathers());
     let card = AdapterDescription { kind: "discrete", ..software() };
-    assert!(!planned(&scene, 256, &software(), &options, &tiny).needs.gather);
-    assert!(!planned(&scene, 256, &software(), &options, &crowded).needs.gather);
-    assert!(!planned(&scene, 256, &card, &options, &known).needs.gather);
+    assert!(!planned(&scene, 256, &software(), &options, &tiny).needs.surface.gathers());
+    assert!(!planned(&scene, 256, &software(), &options, &crowded).needs.surface.gathers());
+    assert!(!planned(&scene, 256, &card, &options, &known).needs.surface.gathers());
     let tile = Settings { organisation: Organisation::Tile, ..options };
-    assert!(planned(&scene, 256, &card, &tile, &tiny).needs.gather);
+    assert!(planned(&scene, 256, &card, &tile, &tiny).needs.surface.gathers());
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn small_buffers_make_bands_and_pages() {
     let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
     let plan = planned(&scene, 64, &small, &options, &known);
     assert_eq!((plan.bands.len(), plan.pages), (4, 3000_u64.div_ceil(page_surfels(&small, &plan.needs)) as usize));
-    assert!(plan.pages > 1 && !plan.needs.gather && !plan.projects_each_band);
+    assert!(plan.pages > 1 && !plan.needs.surface.gathers() && !plan.projects_each_band);
     assert_eq!(plan.bands.iter().map(|band| band.rows).sum::<u32>(), 64);
     let lines = lines(&plan);
     // Bands share projected splats. Pages share the lists, so the lists are built for each page in
@@ -228,10 +228,10 @@ fn copies_are_drawn_once_and_without_tiles() {
     scene.surfels = vec![scene.surfels[0]; 5000];
     scene.colors = Colors::Constant([1.0; 4]);
     let plan = planned(&scene, 64, &software(), &Settings::default(), &Known::default());
-    assert!(plan.needs.copies && !plan.needs.tiles && !plan.needs.cull && !plan.needs.atomics_u64);
+    assert!(plan.needs.surface.copies() && !plan.needs.surface.tiles() && !plan.needs.cull && !plan.needs.atomics_u64);
     assert_eq!(lines(&plan), scattered());
     let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
-    assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.copies);
+    assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.surface.copies());
 }
 
 /// Transparent surfaces are counted and listed; if all are opaque, the plan has no trace of that.
@@ -294,7 +294,7 @@ fn the_rasteriser_projects_draws_and_resolves() {
     let options = Settings { raster: Some(Raster::default()), ..Settings::default() };
     let plan = planned(&scene, 64, &AdapterDescription::core(), &options, &Known::default());
     assert_eq!(lines(&plan), [PROJECT, "draw", RESOLVE, "read back 0"]);
-    assert!(plan.needs.triangles && plan.sum_words == 0);
+    assert!(plan.needs.surface.by_triangles() && plan.sum_words == 0);
 }
 
 #[test]
@@ -303,7 +303,7 @@ fn sums_that_wrapped_are_fixed_from_then_on() {
     let of = |known: &Known| planned(&sphere(1000, 1.5), 64, &software(), &options, known).needs;
     assert_eq!(of(&Known::default()).accumulator, Accumulator::Fixed32);
     let known = Known { overflows: 3, ..Known::default() };
-    assert_eq!((of(&known).accumulator, of(&known).tiles), (Accumulator::Fixed, true));
+    assert_eq!((of(&known).accumulator, of(&known).surface.tiles()), (Accumulator::Fixed, true));
 }
 
 #[test]

@@ -15,7 +15,8 @@ use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::passes;
 use epsplat::low_level::plan::pass::Making;
 use epsplat::low_level::plan::{
-    Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, SceneNeeds, Settings, Winner, color_channels,
+    ACCUMULATORS, Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, Rasterised, SceneNeeds, Settings,
+    Surface, Winner, color_channels,
 };
 use epsplat::low_level::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
 use naga::AddressSpace;
@@ -46,10 +47,11 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     let without = different.par_iter().flat_map_iter(|made| {
         let Made { needs, files, kernels, .. } = made;
         let module = &made.reflected().module;
-        let features = match needs.raster {
-            None if needs.atomics_u64 || needs.winner == Some(Winner::Once) => Features::AtomicsU64,
-            None => needs.accumulator.row().features,
-            Some(_) => Features::None,
+        let features = match needs.surface {
+            Surface::Nearest(Winner::Once) => Features::AtomicsU64,
+            Surface::Raster { .. } => Features::None,
+            _ if needs.atomics_u64 => Features::AtomicsU64,
+            _ => needs.accumulator.row().features,
         };
         let features = if made.of_tiles() { Features::None } else { features };
         let mut needed = capabilities(features);
@@ -65,18 +67,17 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             assert!(is_valid(module, all - capability).is_err(), "{} needs no {capability:?}", needs.accumulator);
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-        let drawn: &[&str] = if needs.raster.is_some() {
-            match needs.winner {
-                None if needs.peels.is_some() => {
-                    &["shape", "shape_to_peel", "shape_with_attributes", "raster_visibility", "raster_attributes"]
-                }
-                None => &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"],
-                Some(_) => &["shape", "shape_with_attributes", "raster_nearest"],
+        let drawn: &[&str] = match needs.surface {
+            Surface::Raster { shown: Rasterised::Layers(_), .. } => {
+                &["shape", "shape_to_peel", "shape_with_attributes", "raster_visibility", "raster_attributes"]
             }
-        } else {
-            &[]
+            Surface::Raster { shown: Rasterised::Blended, .. } => {
+                &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"]
+            }
+            Surface::Raster { shown: Rasterised::Nearest, .. } => &["shape", "shape_with_attributes", "raster_nearest"],
+            _ => &[],
         };
-        let of_mesh: &[&str] = match (needs.raster, needs.mesh) {
+        let of_mesh: &[&str] = match (needs.surface.raster(), needs.mesh) {
             (Some(_), Some(_)) => &["drawn_corner", "drawn_triangle"],
             _ => &[],
         };
@@ -85,12 +86,15 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         // Modules of tiles and of cuts have entry points that other modules use; weights by depth
         // need no visibility pass.
         let shared = entries.difference(&own).count();
-        let leaves = made.of_tiles() || needs.levels || needs.gather || needs.oit == Some(Oit::Weighted);
+        let leaves = made.of_tiles()
+            || needs.levels
+            || needs.surface.gathers()
+            || needs.surface == Surface::OrderFree(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
             // Only the rasteriser's outputs are textures.
-            assert!(buffer || (needs.raster.is_some() && variable.space == AddressSpace::Handle));
+            assert!(buffer || (needs.surface.raster().is_some() && variable.space == AddressSpace::Handle));
         }
         assert!(!made.text().lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
         needed.into_iter().map(move |of| match of {
@@ -106,233 +110,31 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     assert_eq!(Accumulator::Fixed.row().features, Features::None);
 }
 
-/// Names of needs of which a render has at most one.
-const ALTERNATIVES: [&[&str]; 9] = [
-    &["pinhole", "orthographic"],
-    &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
-    &["color-constant", "color-srgb8", "color-linear", "color-textured", "color-harmonics"],
-    &["raster-exact", "raster-offset"],
-    &["epsilon-radius", "epsilon-ray", "oit-weighted", "oit-moments"],
-    &["lowpass-max", "lowpass-ewa", "lowpass-gaussians"],
-    &["lambert", "phong"],
-    &["lists-layers", "lists-sorted"],
-    &["join-corrected", "join-blended"],
-];
-
-/// Needs that exclude triangles.
-const MESHLESS: &[&str] = &[
-    "raster-offset",
-    "lists-layers",
-    "lists-sorted",
-    "oit-weighted",
-    "oit-moments",
-    "peels",
-    "veils",
-    "long-lists",
-    "index",
-    "surfaces",
-];
-
-/// Needs that exclude textures, and maps that exclude multiple samples.
-const PAINTLESS: &[&str] = &[
-    "color-constant",
-    "color-srgb8",
-    "color-linear",
-    "color-harmonics",
-    "copies",
-    "raster-exact",
-    "raster-offset",
-    "nearest",
-    "lists-layers",
-    "lists-sorted",
-    "long-lists",
-    "veils",
-    "oit-weighted",
-    "oit-moments",
-    "peels",
-    "facing",
-    "lit-splats",
-    "samples",
-    "surfaces",
-];
-
-/// Needs that no render combines (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 40] = [
-    ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
-    (
-        "fades",
-        &[
-            "facing",
-            "separate",
-            "index",
-            "color-textured",
-            "color-harmonics",
-            "copies",
-            "texz-map",
-            "surfaces",
-            "nearest",
-        ],
-    ),
-    ("fades", &["lists-layers", "lists-sorted", "long-lists", "veils", "oit-weighted", "oit-moments", "peels"]),
-    ("fades", &["raster-exact", "raster-offset"]),
-    ("node-caps", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
-    ("painted-triangles", MESHLESS),
-    ("doubled-triangles", MESHLESS),
-    ("triangles", MESHLESS),
-    ("join", MESHLESS),
-    ("separate", MESHLESS),
-    ("separate", &["copies", "cull", "nearest", "raster-exact"]),
-    (
-        "veils",
-        &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
-    ),
-    (
-        "long-lists",
-        &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
-    ),
-    ("long-lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
-    ("veils", &["color-textured", "count", "depth", "index", "normal-map", "weight-map", "lists-layers"]),
-    (
-        "peels",
-        &[
-            "wide-sums",
-            "atomics-u64",
-            "copies",
-            "cull",
-            "tiles",
-            "gather",
-            "index",
-            "transmittance",
-            "layers-map",
-            "tail-map",
-            "surfaces",
-        ],
-    ),
-    (
-        "peels",
-        &[
-            "lists-layers",
-            "lists-sorted",
-            "raster-offset",
-            "nearest",
-            "color-textured",
-            "count",
-            "depth",
-            "normal-map",
-            "weight-map",
-        ],
-    ),
-    (
-        "oit",
-        &[
-            "tiles",
-            "gather",
-            "copies",
-            "cull",
-            "raster-exact",
-            "raster-offset",
-            "nearest",
-            "peels",
-            "veils",
-            "long-lists",
-        ],
-    ),
-    ("oit", &["lists-layers", "lists-sorted", "color-textured", "epsilon-radius", "epsilon-ray", "sides"]),
-    ("oit", &["tail-map", "surfaces", "layers-map"]),
-    ("lists-sorted", &["tail-map"]),
-    ("surfaces", &["tiles", "gather", "copies", "cull", "atomics-u64", "nearest", "color-textured"]),
-    ("surfaces", &["count", "depth", "index", "normal-map", "weight-map"]),
-    ("veils", &["tail-map"]),
-    ("texz-map", PAINTLESS),
-    ("oit", &["count", "depth", "index", "normal", "normal-map", "weight-map"]),
-    (
-        "samples",
-        &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map", "tail-map", "surfaces"],
-    ),
-    ("lists", &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest"]),
-    ("lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
-    ("color-textured", &["copies", "raster-exact", "raster-offset"]),
-    ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
-    ("color-constant", &["alpha"]),
-    ("lit-splats", &["color-constant", "color-textured", "facing", "nearest"]),
-    ("facing", &["clips", "color-textured", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"]),
-    ("facing", &["normal", "normal-map", "own-normals", "sides"]),
-    ("outline", &["facing", "lowpass-ewa", "lowpass-max"]),
-    ("sides", &["cull-back", "raster-offset"]),
-    (
-        "nearest",
-        &[
-            "atomics-u64",
-            "color-harmonics",
-            "color-linear",
-            "color-textured",
-            "copies",
-            "gather",
-            "index",
-            "kernel-ellipse",
-            "kernel-gaussian",
-        ],
-    ),
-    (
-        "nearest",
-        &[
-            "kernel-cone",
-            "lambert",
-            "lowpass-ewa",
-            "lowpass-max",
-            "normal",
-            "normal-map",
-            "own-normals",
-            "phong",
-            "sides",
-            "tiles",
-            "wide-sums",
-            "epsilon-radius",
-            "epsilon-ray",
-            "count",
-            "weight-map",
-        ],
-    ),
-    (
-        "raster",
-        &[
-            "wide-sums",
-            "atomics-u64",
-            "copies",
-            "cull",
-            "tiles",
-            "gather",
-            "index",
-            "transmittance",
-            "layers-map",
-            "tail-map",
-            "surfaces",
-        ],
-    ),
-];
-
+/// Each need is set in some pictures and not in others: the pictures that are drawn show what
+/// options can ask for.
 #[test]
-fn all_needs_that_go_together_meet() {
-    let all: Vec<_> = common::all_needs().iter().map(SceneNeeds::names).collect();
-    let names: BTreeSet<&str> = all.iter().flatten().copied().collect();
-    let apart = |a: &str, b: &str| {
-        let listed = |(of, others): &(&str, &[&str])| a.starts_with(of) && others.contains(&b);
-        ALTERNATIVES.iter().any(|group| group.contains(&a) && group.contains(&b)) || EXCLUSIVE.iter().any(listed)
-    };
-    let mut missing = Vec::new();
-    for (a, b) in names.iter().flat_map(|a| names.iter().map(move |b| (*a, *b))).filter(|(a, b)| a < b) {
-        let meet = all.iter().any(|needs| needs.contains(&a) && needs.contains(&b));
-        if meet == (apart(a, b) || apart(b, a)) {
-            missing.push((a, b, meet));
-        }
+fn pictures_meet_every_need_and_its_absence() {
+    let all = common::variants::all_needs();
+    for (place, (_, name)) in all[0].flags().into_iter().enumerate() {
+        let (with, without): (Vec<&SceneNeeds>, _) = all.iter().partition(|needs| needs.flags()[place].0);
+        assert!(with.len() >= 10 && without.len() >= 10, "{name}: {} and {}", with.len(), without.len());
     }
-    assert_eq!(missing, []);
-    assert!(names.len() >= 30, "{names:?}");
+    let names: BTreeSet<&str> = all.iter().flat_map(SceneNeeds::names).collect();
+    let alternatives =
+        ["pinhole", "orthographic", "kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"];
+    let colors = ["color-constant", "color-srgb8", "color-linear", "color-textured", "color-harmonics"];
+    let others =
+        MAPS.iter().filter(|row| row.image_word.is_some()).map(|row| row.need).chain(alternatives).chain(colors);
+    for name in others.chain(["raster-exact", "raster-offset"]) {
+        assert!(names.contains(name), "{name}");
+    }
+    let accumulators: BTreeSet<&str> = all.iter().map(|needs| needs.accumulator.name()).collect();
+    assert_eq!(accumulators, ACCUMULATORS.iter().map(|row| row.of.name()).collect());
 }
 
 #[test]
 fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
-    let needs = common::all_needs()[0];
+    let needs = common::variants::plain();
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
     assert!(reflect(&broken.join(&passes::modules(&needs)[0].files)).is_err());
     let wide =
@@ -434,8 +236,9 @@ fn storage_buffers_stay_within_core_limits() {
             .filter(|(_, v)| matches!(v.space, AddressSpace::Storage { .. }))
             .filter_map(|(_, v)| v.name.as_deref())
             .collect();
-        let dispatched =
-            |stage: &str| made.needs.raster.is_some() || made.kernels.iter().any(|kernel| kernel.name == stage);
+        let dispatched = |stage: &str| {
+            made.needs.surface.raster().is_some() || made.kernels.iter().any(|kernel| kernel.name == stage)
+        };
         for (stage, variables) in bindings.iter().filter(|(stage, _)| dispatched(stage)) {
             let count = variables.iter().filter(|(name, _)| stored.contains(name.as_str())).count();
             assert!(count <= CORE_STORAGE_BUFFERS, "{stage} of {:?} uses {count}", made.needs.names());
@@ -447,18 +250,18 @@ fn storage_buffers_stay_within_core_limits() {
 
 #[test]
 fn the_channels_of_a_pixel_do_not_overlap() {
-    for needs in common::all_needs() {
-        let pixel = PixelLayout::of(&needs);
+    for needs in common::variants::all_needs() {
+        let pixel = PixelLayout::of(needs);
         let ranges = |all: &[(u32, u32)]| all.iter().flat_map(|(first, count)| *first..first + count).collect();
         let of = |needed: bool, count: u32| if needed { count } else { 0 };
         let sums: Vec<u32> = ranges(&[
             (0, 1),
-            (COLOR_CHANNEL, color_channels(&needs)),
+            (COLOR_CHANNEL, color_channels(needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
             (pixel.depth_channel, of(needs.sums_depth(), 1)),
             (pixel.middles_channel, of(needs.compares_depth(), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
-            (pixel.held_back_channel, of(needs.oit.is_some(), 1)),
+            (pixel.held_back_channel, of(needs.surface.oit().is_some(), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 5)),
         ]);
         let maps = MAPS.iter().zip(pixel.map_words).filter(|(row, _)| needs.maps.has(row.map));

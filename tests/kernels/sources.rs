@@ -44,7 +44,7 @@ impl Source for Made {
     }
 
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, _: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
-        assert!(!needs.copies && !needs.doubled);
+        assert!(!needs.surface.copies() && !needs.doubled);
         let part = |first: usize| Part { first, len: most.min(COUNT - first), one: self.one };
         (0..COUNT).step_by(most).map(|first| Box::new(part(first)) as Box<dyn Page>).collect()
     }

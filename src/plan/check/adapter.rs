@@ -10,7 +10,7 @@ use crate::scene::Camera;
 /// # Errors
 /// A sentence that says what is missing and what to do.
 pub fn on_adapter(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
-    match needs.raster {
+    match needs.surface.raster() {
         None => sums(adapter, needs.accumulator),
         Some(_) => rasteriser(adapter, needs, camera),
     }
@@ -33,7 +33,7 @@ pub fn sums(adapter: &AdapterDescription, accumulator: Accumulator) -> Result<()
 }
 
 fn rasteriser(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
-    let Some(raster) = needs.raster else { return Ok(()) };
+    let Some(raster) = needs.surface.raster() else { return Ok(()) };
     let limit = |limit, available: u32, needed: u32, what: &str| match needed > available {
         false => Ok(()),
         true => Err(Error::Limit {

@@ -65,7 +65,7 @@ fn every_binding_has_the_hosts_layout() {
 #[test]
 fn a_changed_layout_is_noticed() {
     // Without culling no kernel uses `middle`, so the module stays valid.
-    let needs = common::all_needs().into_iter().find(|needs| !needs.cull).unwrap();
+    let needs = common::variants::plain();
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
         differences(&first_of(&sources, &needs), needs.accumulator.name()).join("; ")
@@ -148,7 +148,7 @@ fn constants_agree() {
         ] {
             assert_eq!(constant(name), Some(f64::from(value)), "{name}");
         }
-        let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
+        let tile = needs.surface.raster().is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
         let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
@@ -172,7 +172,7 @@ fn constants_agree() {
         let colors = blends && color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
-            _ if !needs.sums_by_compute() && needs.lists.is_none() => None,
+            _ if !needs.surface.sums_by_compute() && needs.surface.lists().is_none() => None,
             Accumulator::Fixed if !needs.wide_sums => Some(f64::from(ONE)),
             _ => None,
         };
@@ -197,8 +197,8 @@ fn constants_agree() {
 
 #[test]
 fn the_hosts_room_for_a_pixels_sums_is_the_devices() {
-    for needs in common::all_needs() {
-        let (channels, row) = (PixelLayout::of(&needs).channels, needs.accumulator.row());
+    for needs in common::variants::all_needs() {
+        let (channels, row) = (PixelLayout::of(needs).channels, needs.accumulator.row());
         let (shapes, halves) = sums_of(row.name);
         let bytes = channels as usize * halves as usize * shapes[0].bytes() / 2;
         assert_eq!(bytes, 4 * (channels * row.words) as usize, "{}", row.name);

@@ -49,11 +49,6 @@ pub fn undecided(reference: &Frame) -> usize {
     reference.map(Map::Decision).unwrap().iter().filter(|decision| **decision < DECIDED).count()
 }
 
-/// Whether each sum is one word, in which small weights have few digits.
-pub fn has_few_digits(accumulator: Accumulator) -> bool {
-    matches!(accumulator, Accumulator::Fixed32 | Accumulator::Packed64)
-}
-
 /// The bound on the error of each pixel's means, by [`AccumulatorRow::error_bound`], in a scene of
 /// `surfels` surfels whose attributes span `span`.
 ///

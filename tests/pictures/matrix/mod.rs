@@ -17,9 +17,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod choices;
 mod judge;
-mod scenes;
 
 use std::collections::BTreeMap;
 
@@ -30,8 +28,8 @@ use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
 
 use crate::common;
-use common::Random;
-use scenes::Sampled;
+use common::any_scene::{self, Sampled};
+use common::{Random, any_options};
 
 /// Frames that the device draws by default.
 const FRAMES: usize = 300;
@@ -114,9 +112,9 @@ fn checked(scene: &Scene, options: &Settings) -> epsplat::Result<()> {
 /// Returns the combination of a seed: draws options until some are accepted.
 fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
     let mut random = Random(seed);
-    let sampled = scenes::sampled(&mut random);
+    let sampled = any_scene::sampled(&mut random);
     for _ in 0..DRAWS {
-        let options = choices::sampled(&sampled.scene, &mut random);
+        let options = any_options::sampled(&sampled.scene, &mut random);
         tally.drawn += 1;
         match checked(&sampled.scene, &options) {
             Ok(()) => return Some(Combination { seed, sampled, options, random }),
@@ -132,7 +130,7 @@ fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static s
     let Combination { sampled: Sampled { scene, .. }, options, random, .. } = combination;
     let (scene, options, whole) = (scene.clone(), options.clone(), devices.whole.clone());
     match random.below(5) {
-        0 => ("another order", scenes::shuffled(&scene, random), options, whole),
+        0 => ("another order", any_scene::shuffled(&scene, random), options, whole),
         1 => ("small buffers", scene, options, whole.with_buffer_limit([300_000, 900_000][random.below(2)])),
         2 => ("core WebGPU", scene, options, devices.core.clone()),
         3 => {
@@ -140,7 +138,7 @@ fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static s
             (lacking.adapter.subgroups, lacking.adapter.atomics_u64) = (random.one_in(2), random.one_in(2));
             ("an adapter that lacks some", scene, options, lacking)
         }
-        _ => ("no optimisations", scene, Settings { without: choices::without(random), ..options }, whole),
+        _ => ("no optimisations", scene, Settings { without: any_options::without(random), ..options }, whole),
     }
 }
 
@@ -234,7 +232,7 @@ fn wrong(
 
 /// The error per pixel that a sum's few digits explain: 0 where sums have many digits.
 fn digits(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Vec<f32>, String> {
-    if !judge::has_few_digits(options.accumulator) {
+    if !any_options::has_few_digits(options.accumulator) {
         return Ok(vec![0.0; camera.pixels()]);
     }
     let Samples { across, down } = options.samples;

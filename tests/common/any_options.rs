@@ -1,4 +1,4 @@
-//! Random options for the matrix.
+//! Random options: for the matrix of pictures, and for the needs of all renders.
 //!
 //! Most options keep their default, so that several features meet in one picture and few pictures
 //! are refused.
@@ -11,10 +11,15 @@ use epsplat::low_level::scene::{
     Shading, ShadingAt, Tail, gaussian,
 };
 
-use super::judge;
-use crate::common::Random;
+use super::Random;
 
-fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
+/// Whether each sum is one word, in which small weights have few digits.
+pub fn has_few_digits(accumulator: Accumulator) -> bool {
+    matches!(accumulator, Accumulator::Fixed32 | Accumulator::Packed64)
+}
+
+/// Returns one of `choices`.
+pub fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
     choices[random.below(choices.len())]
 }
 
@@ -69,7 +74,7 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> Settings {
     if random.one_in(6) {
         options.accumulator = pick(random, &[Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64]);
     }
-    if options.facing.is_some() && judge::has_few_digits(options.accumulator) {
+    if options.facing.is_some() && has_few_digits(options.accumulator) {
         // Points are measured in pixels, so the reference knows what a sample weighs only with one
         // sample per pixel.
         options.samples = Samples::ONE;

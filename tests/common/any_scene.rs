@@ -1,4 +1,4 @@
-//! Random small scenes and views for the matrix, by seed.
+//! Random small scenes and views, by seed.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use epsplat::low_level::scene::{Camera, Cap, Clip, Colors, Harmonics, Lens, Scen
 use epsplat::low_level::surfels::with_triangles;
 use glam::{DMat3, DVec3, Vec3};
 
-use crate::common::scenes::{cases, painted, sphere};
-use crate::common::{Random, meshes};
+use super::scenes::{cases, painted, sphere};
+use super::{Random, meshes};
 
 /// A scene, a view of it, and the names of its features.
 pub struct Sampled {

@@ -1,0 +1,240 @@
+//! The ways in which the fragments of a pixel become its colour. Each picture has one of them.
+
+use super::{Accumulator, Facts, Lists, Oit, Organisation, Raster, Settings};
+use crate::scene::{Blend, Composite};
+
+/// How the fragments of a pixel become its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Surface {
+    /// Compute kernels sum the fragments within epsilon of the nearest one.
+    Blended {
+        /// How the splats are drawn.
+        splats: Splats,
+        /// Inputs are kept separate ([`individuals`](crate::passes::individuals)).
+        separate: bool,
+    },
+    /// Only the nearest fragment shows, and compute kernels find it in this way.
+    Nearest(Winner),
+    /// Pixels have lists of their fragments, which are blended into surfaces
+    /// ([`layers`](crate::passes::layers)).
+    Layers {
+        /// Some lists are sorted and composited in rounds, because they exceed the loop limit of
+        /// one invocation.
+        long_lists: bool,
+    },
+    /// Pixels have lists of their fragments, which are composited one by one
+    /// ([`sorted`](crate::passes::sorted)).
+    Sorted {
+        /// As for [`Surface::Layers`].
+        long_lists: bool,
+        /// Lists end where nothing behind shows; without that some would be too long.
+        veils: bool,
+    },
+    /// All fragments of a pixel are summed in any order, weighted by an estimate of what lies in
+    /// front of each.
+    OrderFree(Oit),
+    /// The rasteriser and its blender draw the splats.
+    Raster {
+        /// The format of its sums, and its depth test.
+        raster: Raster,
+        /// What its fragments become.
+        shown: Rasterised,
+        /// It draws a triangle per splat instead of a quad
+        /// ([`tuning::PIXELS_A_TRIANGLE`](super::tuning::PIXELS_A_TRIANGLE)).
+        triangles: bool,
+    },
+}
+
+/// How splats are drawn that compute kernels sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Splats {
+    /// One by one.
+    Scattered,
+    /// One by one, one for all identical ones. This requires the accumulator `fixed`, a surfel with
+    /// many copies, no texture, and no separate inputs.
+    Copies,
+    /// Tiles draw at least the large ones. This requires the accumulator `fixed`, and options that
+    /// do not ask for scatter.
+    Tiles {
+        /// Tiles sum all splats, large and small, and resolve their pixels directly (or keep what
+        /// an input shows), so no sums are stored.
+        gather: bool,
+        /// The invocations of a subgroup read a splat's record together; a software adapter would
+        /// otherwise read it for each of them.
+        subgroups: bool,
+    },
+}
+
+/// How compute kernels find the only fragment that shows at a pixel
+/// ([`winner`](crate::passes::winner)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Winner {
+    /// All surfels have one colour, so the nearest depth is enough.
+    Depth,
+    /// Depth and colour in one 64-bit number, by one atomic minimum.
+    Once,
+    /// The nearest depth first, then its colour in a second pass.
+    Second,
+}
+
+/// What the fragments that the rasteriser draws become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Rasterised {
+    /// Those within epsilon of the nearest one are blended.
+    Blended,
+    /// The nearest one shows, by the depth test.
+    Nearest,
+    /// So many layers are peeled, one after the other ([`peel`](crate::passes::peel)).
+    Layers(u32),
+}
+
+impl Surface {
+    /// Returns the surface of a picture by any renderer: tiles and the rasteriser's triangles are
+    /// decided later, for an adapter and a number of surfels.
+    pub(super) fn of_picture(facts: &Facts, options: &Settings) -> Self {
+        let Some(raster) = options.raster else { return Self::by_compute(facts, options) };
+        let shown = match (options.blend, options.composite, Lists::of(facts, options)) {
+            (Blend::Nearest, _, _) => Rasterised::Nearest,
+            (_, Composite::Layers(layers), Some(_)) => Rasterised::Layers(layers),
+            _ => Rasterised::Blended,
+        };
+        Self::Raster { raster, shown, triangles: false }
+    }
+
+    /// The surface of a picture by compute kernels or by their twins.
+    pub(super) fn by_compute(facts: &Facts, options: &Settings) -> Self {
+        if options.blend == Blend::Nearest {
+            return Self::Nearest(Winner::Second);
+        }
+        if let Some(oit) = Oit::of(options) {
+            return Self::OrderFree(oit);
+        }
+        match Lists::of(facts, options) {
+            Some(Lists::Layers) => Self::Layers { long_lists: false },
+            Some(Lists::Sorted) => Self::Sorted { long_lists: false, veils: false },
+            None => Self::Blended {
+                splats: match options.accumulator {
+                    Accumulator::Fixed if options.organisation != Organisation::Scatter => {
+                        Splats::Tiles { gather: false, subgroups: false }
+                    }
+                    _ => Splats::Scattered,
+                },
+                separate: options.separate && facts.individuals.len() > 1,
+            },
+        }
+    }
+
+    /// Whether compute kernels make weighted sums, in storage or in a tile's registers.
+    pub fn sums_by_compute(&self) -> bool {
+        matches!(self, Self::Blended { .. } | Self::OrderFree(_))
+    }
+
+    /// Whether compute kernels accumulate fragments after the nearest depths are known.
+    pub fn accumulates(&self) -> bool {
+        self.sums_by_compute() || *self == Self::Nearest(Winner::Second)
+    }
+
+    /// Whether the nearest fragment is the only one that shows, by any renderer.
+    pub fn shows_nearest(&self) -> bool {
+        matches!(self, Self::Nearest(_) | Self::Raster { shown: Rasterised::Nearest, .. })
+    }
+
+    /// How compute kernels find the only fragment that shows.
+    pub fn winner(&self) -> Option<Winner> {
+        match self {
+            Self::Nearest(winner) => Some(*winner),
+            _ => None,
+        }
+    }
+
+    /// How the fragment lists of pixels are composited, if they have any.
+    pub fn lists(&self) -> Option<Lists> {
+        match self {
+            Self::Layers { .. } => Some(Lists::Layers),
+            Self::Sorted { .. } => Some(Lists::Sorted),
+            _ => None,
+        }
+    }
+
+    /// Whether some lists are processed in rounds.
+    pub fn long_lists(&self) -> bool {
+        matches!(self, Self::Layers { long_lists: true } | Self::Sorted { long_lists: true, .. })
+    }
+
+    /// Whether lists end where nothing behind shows.
+    pub fn veils(&self) -> bool {
+        matches!(self, Self::Sorted { veils: true, .. })
+    }
+
+    /// The order-free weight of fragments, if all are summed.
+    pub fn oit(&self) -> Option<Oit> {
+        match self {
+            Self::OrderFree(oit) => Some(*oit),
+            _ => None,
+        }
+    }
+
+    /// The rasteriser's options, if it draws the splats.
+    pub fn raster(&self) -> Option<Raster> {
+        match self {
+            Self::Raster { raster, .. } => Some(*raster),
+            _ => None,
+        }
+    }
+
+    /// Number of layers that the rasteriser peels.
+    pub fn peels(&self) -> Option<u32> {
+        match self {
+            Self::Raster { shown: Rasterised::Layers(layers), .. } => Some(*layers),
+            _ => None,
+        }
+    }
+
+    /// Whether the rasteriser draws a triangle per splat.
+    pub fn by_triangles(&self) -> bool {
+        matches!(self, Self::Raster { triangles: true, .. })
+    }
+
+    /// Whether inputs are kept separate.
+    pub fn separate(&self) -> bool {
+        matches!(self, Self::Blended { separate: true, .. })
+    }
+
+    /// Whether one surfel is drawn for all identical ones.
+    pub fn copies(&self) -> bool {
+        matches!(self, Self::Blended { splats: Splats::Copies, .. })
+    }
+
+    /// Whether tiles draw at least the large splats.
+    pub fn tiles(&self) -> bool {
+        matches!(self, Self::Blended { splats: Splats::Tiles { .. }, .. })
+    }
+
+    /// Whether tiles sum all splats.
+    pub fn gathers(&self) -> bool {
+        matches!(self, Self::Blended { splats: Splats::Tiles { gather: true, .. }, .. })
+    }
+
+    /// Whether the invocations of a subgroup read a splat's record together.
+    pub fn subgroups(&self) -> bool {
+        matches!(self, Self::Blended { splats: Splats::Tiles { subgroups: true, .. }, .. })
+    }
+
+    /// The surface without what depends on how much is drawn.
+    pub fn before_cut(self) -> Self {
+        self.sized(false, false, false)
+    }
+
+    /// The surface for what is drawn: whether tiles gather all splats, lists end early, and some
+    /// are processed in rounds. Each is used by the surfaces that can.
+    pub fn sized(self, gather: bool, veils: bool, long_lists: bool) -> Self {
+        match self {
+            Self::Blended { splats: Splats::Tiles { subgroups, .. }, separate } => {
+                Self::Blended { splats: Splats::Tiles { gather, subgroups }, separate }
+            }
+            Self::Layers { .. } => Self::Layers { long_lists },
+            Self::Sorted { .. } => Self::Sorted { long_lists, veils },
+            other => other,
+        }
+    }
+}

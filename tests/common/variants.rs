@@ -1,0 +1,143 @@
+//! The needs of renders, drawn at random: options that the checks accept, planned for scenes, views
+//! and adapters. So the checks alone say what goes together, and no test repeats them.
+
+use std::collections::HashSet;
+use std::sync::LazyLock;
+
+use epsplat::low_level::gpu::AdapterDescription;
+use epsplat::low_level::plan::{
+    ACCUMULATORS, Accumulator, BlendFormat, ColorNeed, Facts, Known, Organisation, Plan, Raster, RasterDepth,
+    SceneNeeds, Settings, Splats, Surface, check,
+};
+use epsplat::low_level::scene::{Camera, Detail, KernelShape, LevelFacts, Scene};
+
+use super::any_options::{self, pick};
+use super::any_scene::{self, Sampled};
+use super::{Random, any_options::without};
+
+/// Scenes that are drawn.
+const SCENES: u64 = 300;
+
+/// Pictures that are drawn of each scene.
+const PICTURES: usize = 120;
+
+/// Every so many pictures one is kept, whatever others show.
+const REGULAR: usize = 20;
+
+/// The needs of renders: every two values that meet in one of the pictures drawn meet here too.
+pub fn all_needs() -> &'static [SceneNeeds] {
+    static ALL: LazyLock<Vec<SceneNeeds>> = LazyLock::new(|| {
+        let (mut kept, mut known, mut pairs) = (Vec::new(), HashSet::new(), HashSet::new());
+        let mut drawn = 0;
+        for seed in 0..SCENES {
+            let mut random = Random(seed);
+            let Sampled { scene, camera, .. } = any_scene::sampled(&mut random);
+            let facts = Facts::of(&scene);
+            for _ in 0..PICTURES {
+                let Some(needs) = picture(&scene, facts.clone(), &camera, &mut random) else { continue };
+                drawn += 1;
+                let values = values(&needs);
+                let mut news = 0;
+                for (k, a) in values.iter().enumerate() {
+                    news += values[..k].iter().filter(|b| pairs.insert((*a, **b))).count();
+                }
+                if (news > 0 || drawn % REGULAR == 0) && known.insert(needs) {
+                    kept.push(needs);
+                }
+            }
+        }
+        kept
+    });
+    &ALL
+}
+
+/// Needs of the plainest picture: splats are scattered into sums of `fixed`, without a cut.
+pub fn plain() -> SceneNeeds {
+    let is_plain = |needs: &&SceneNeeds| {
+        let scattered = needs.surface == Surface::Blended { splats: Splats::Scattered, separate: false };
+        let fixed = needs.accumulator == Accumulator::Fixed && !needs.wide_sums && !needs.atomics_u64;
+        scattered && fixed && needs.kernel == KernelShape::Ellipse && !needs.cull && !needs.levels
+    };
+    *all_needs().iter().find(is_plain).expect("some picture is plain")
+}
+
+/// The value of each need: alternatives by their names, optional ones by whether they are set.
+fn values(needs: &SceneNeeds) -> Vec<(&'static str, bool)> {
+    let set = needs.names().into_iter().map(|name| (name, true));
+    let left_out = needs.flags().into_iter().filter(|(on, _)| !on).map(|(_, name)| (name, false));
+    set.chain(left_out).chain([(needs.accumulator.name(), true)]).collect()
+}
+
+/// The needs of a random picture of a scene; `None` if its options are refused.
+fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random) -> Option<SceneNeeds> {
+    let mut options = Settings {
+        organisation: pick(random, &[Organisation::Auto, Organisation::Tile, Organisation::Scatter]),
+        ..any_options::sampled(scene, random)
+    };
+    if random.one_in(4) {
+        options.accumulator = ACCUMULATORS[random.below(ACCUMULATORS.len())].of;
+    }
+    if random.one_in(4) {
+        options.without = without(random);
+    }
+    if random.one_in(4) {
+        let (format, depth) = (pick(random, &BlendFormat::ALL).0, pick(random, &RasterDepth::ALL).0);
+        options.raster = Some(Raster { format, depth });
+    }
+    change(&mut facts, &mut options, random);
+    check::options(&options, false).ok()?;
+    check::scene(&facts, &options, false).ok()?;
+    Plan::of(&facts, &adapter(random), camera, &options, &sizes(random)).ok().map(|plan| plan.needs)
+}
+
+/// Gives the scene what small scenes do not have: many surfels, levels of detail, fades, and low
+/// digits of corners.
+fn change(facts: &mut Facts, options: &mut Settings, random: &mut Random) {
+    if random.one_in(2) {
+        let factor = random.scale(1.0, 1e5) as u64;
+        facts.surfels *= factor;
+        facts.individuals.iter_mut().for_each(|surfels| *surfels *= factor);
+    }
+    facts.mesh.doubled = random.one_in(2);
+    facts.copies = random.one_in(4);
+    // Nodes have a colour each, and none is made of inputs that are kept separate.
+    let of_colors = matches!(facts.colors, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
+    if of_colors && facts.surfels > 0 && random.one_in(4) {
+        (options.facing, options.separate) = (None, false);
+        options.detail_fades = random.one_in(2);
+        match random.one_in(8) {
+            true => facts.fades = true,
+            false => {
+                let radius = facts.largest_radius;
+                let levels = LevelFacts { largest_radius: radius, largest_shorter: radius, caps: random.one_in(2) };
+                (facts.levels, options.detail) = (Some(levels), Detail::Pixels(2.0));
+            }
+        }
+    }
+}
+
+/// An adapter with some of the optional features.
+fn adapter(random: &mut Random) -> AdapterDescription {
+    AdapterDescription {
+        kind: pick(random, &["software", "discrete"]),
+        atomics_u64: random.one_in(2),
+        integers_u64: random.one_in(2),
+        subgroups: random.one_in(2),
+        atomics_f32: true,
+        blends_f32: true,
+        vertex_storage: true,
+        max_color_attachment_bytes_per_sample: 128,
+        ..AdapterDescription::core()
+    }
+}
+
+/// Sizes as earlier frames may have measured them.
+fn sizes(random: &mut Random) -> Known {
+    Known {
+        touched_tiles: pick(random, &[0.0, 100.0]),
+        veiled: random.one_in(2),
+        longest_list: pick(random, &[0, 5000]),
+        crowded: random.one_in(4),
+        ..Known::default()
+    }
+}

@@ -10,7 +10,7 @@
 use super::resolve::Surface;
 use super::{Strip, accumulate, covered, resolve, visibility};
 use crate::plan::Plan;
-use crate::plan::extra::individual_words;
+use crate::plan::extra;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
 
@@ -24,7 +24,7 @@ pub const PASS: Pass = Pass {
         false => vec!["individuals_absent.wgsl"],
     },
     kernels: |needs| if needs.surface.separate() { vec![KEEP, LIST] } else { Vec::new() },
-    constants: |making| vec![("INDIVIDUAL_VECTORS", (individual_words(making.needs) / 4).into())],
+    constants: |making| vec![("INDIVIDUAL_VECTORS", (extra::words_of("individuals", making.needs) / 4).into())],
 };
 
 const KEEP: Kernel = Kernel::new("keep_individual");
@@ -43,8 +43,7 @@ pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
 /// The clears before an input's tiles are listed. Before the `first` input they include the
 /// surfaces kept.
 pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
-    let words = plan.bands[band].pixels * u64::from(individual_words(&plan.needs));
-    let kept = first.then(|| Clear::of("individuals", 0, words));
+    let kept = extra::clear("individuals", plan, band).filter(|_| first);
     [covered::restart(plan, band)].into_iter().chain(kept).collect()
 }
 

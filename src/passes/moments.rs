@@ -23,9 +23,6 @@
 
 use super::Strip;
 use super::oit::{held_back, visit};
-use crate::plan::extra::MOMENT_WORDS;
-use crate::plan::steps::Clear;
-use crate::plan::{Oit, Plan};
 
 /// The part of the spread measure that is mixed in.
 const MIXED: f64 = 1.0 / 16384.0;
@@ -130,12 +127,6 @@ pub fn reference(strip: &Strip<'_>) -> Vec<(Moments, f64)> {
         },
     );
     sums.into_iter().map(|(sums, first)| (Moments::of(sums), first)).collect()
-}
-
-/// The clear before moments are summed; `None` if there are no moments.
-pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
-    let words = u64::from(MOMENT_WORDS) * plan.bands[band].pixels;
-    (plan.needs.surface.oit() == Some(Oit::Moments)).then(|| Clear::of("moments", 0, words))
 }
 
 #[cfg(test)]

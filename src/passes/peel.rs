@@ -9,9 +9,9 @@
 //! fragments ends before it has drawn all of them.
 
 use crate::plan::Plan;
-use crate::plan::extra::PEELED_WORDS;
+use crate::plan::extra;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step};
+use crate::plan::steps::{Kernel, Over, Run, Stage, Step};
 
 /// The pass's kernels and files.
 pub const PASS: Pass = Pass {
@@ -25,8 +25,9 @@ const PEEL: Kernel = Kernel::new("peel");
 
 /// The steps of all layers of `plan`, in place of the one step that draws the nearest surface.
 pub fn steps(plan: &Plan, layers: u32) -> Vec<Step> {
-    let words = u64::from(PEELED_WORDS) * plan.bands[0].pixels;
-    let mut steps = vec![Step::Stage(Stage::new("visibility", 0, vec![]).after(vec![Clear::of("peeled", 0, words)]))];
+    let mut steps = vec![Step::Stage(
+        Stage::new("visibility", 0, vec![]).after(extra::clear("peeled", plan, 0).into_iter().collect()),
+    )];
     for _ in 0..layers {
         steps.push(Step::Draw);
         steps.push(Step::Stage(Stage::new("resolve", 0, vec![Run { kernel: PEEL, over: Over::Pixels }])));

@@ -23,9 +23,8 @@
 
 use super::sorted::Rules;
 use crate::plan::Plan;
-use crate::plan::extra::VEIL_WORDS;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
+use crate::plan::steps::{Kernel, Over, Run, Stage};
 
 /// Units per optical depth of 1.
 const UNITS: f64 = 1024.0;
@@ -52,12 +51,6 @@ pub const PASS: Pass = Pass {
 };
 
 const END: Kernel = Kernel::new("end_lists");
-
-/// The clear before fragments are counted.
-pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
-    let words = u64::from(VEIL_WORDS) * plan.bands[band].pixels;
-    plan.needs.surface.veils().then(|| Clear::of("veils", 0, words))
-}
 
 /// The stage that finds where lists end, after fragments were counted.
 pub fn steps(plan: &Plan, band: usize) -> Option<Stage> {

@@ -10,8 +10,9 @@
 
 use super::footprint::footprint;
 use super::splat::Splat;
-use super::{covered, moments, oit, veils, winner};
+use super::{covered, oit, winner};
 use crate::gpu::layout::TILE;
+use crate::plan::extra::{self, EXTRA};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Band, Optimisation, Plan};
@@ -109,8 +110,10 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
         Part::Far => stage,
         Part::All | Part::Near => {
             let nearest = Clear::of("nearest", 0, plan.bands[band].pixels);
-            let clears = [nearest].into_iter().chain(winner::clears(plan, band)).chain(veils::clears(plan, band));
-            stage.after(clears.chain(moments::clears(plan, band)).collect()).as_twin(Twin::Visibility)
+            let clears = [nearest].into_iter().chain(winner::clears(plan, band));
+            let summed = EXTRA.iter().filter(|extra| extra.summed);
+            let summed = summed.filter_map(|extra| extra::clear(extra.name, plan, band));
+            stage.after(clears.chain(summed).collect()).as_twin(Twin::Visibility)
         }
     }
 }

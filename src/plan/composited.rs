@@ -38,6 +38,14 @@ pub enum Oit {
 }
 
 impl Oit {
+    /// Its name among a picture's needs.
+    pub fn need(self) -> &'static str {
+        match self {
+            Self::Weighted => "oit-weighted",
+            Self::Moments => "oit-moments",
+        }
+    }
+
     /// Returns the order-free weight of a picture, if it has one.
     pub(super) fn of(options: &Settings) -> Option<Self> {
         match options.composite {
@@ -49,6 +57,14 @@ impl Oit {
 }
 
 impl Lists {
+    /// Its name among a picture's needs.
+    pub fn need(self) -> &'static str {
+        match self {
+            Self::Layers => "lists-layers",
+            Self::Sorted => "lists-sorted",
+        }
+    }
+
     /// Returns how a picture composites fragment lists, if it has any; the same for all renderers.
     pub(super) fn of(facts: &Facts, options: &Settings) -> Option<Self> {
         match composited(facts, options) {

@@ -1,39 +1,76 @@
-//! Buffers that only some renders have, in u32 words per pixel.
+//! Buffers with words for each pixel that only some renders have: a row each.
 
-use super::{Oit, SceneNeeds};
+use super::steps::Clear;
+use super::{Oit, Plan, SceneNeeds};
 
-/// Words of the buffer `peeled` (`peeled.wgsl`): the layers composited so far.
-pub const PEELED_WORDS: u32 = 8;
-
-/// Words of the moments of transmittance: two per moment.
-pub const MOMENT_WORDS: u32 = 10;
-
-/// Words of the shaded triangles.
-pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
-
-/// The number of steps of depth in which veils sum optical depths ([`veils`](crate::passes::veils)).
-pub const VEILS: u32 = 16;
-
-/// Words of veils: the count and the optical depth of each step.
-pub const VEIL_WORDS: u32 = 2 * VEILS;
-
-/// Words of the nearest surface of the separate inputs so far.
-pub fn individual_words(needs: &SceneNeeds) -> u32 {
-    match needs.surface.separate() {
-        false => 0,
-        true if needs.maps.is_empty() && needs.mesh.is_none() => 8,
-        true => 16,
-    }
+/// A buffer that only some renders have.
+pub struct Extra {
+    /// Its name in WGSL.
+    pub name: &'static str,
+    /// Its name in errors and tools.
+    pub label: &'static str,
+    /// Its u32 words per pixel; 0 if a render does not have it.
+    pub words: fn(&SceneNeeds) -> u32,
+    /// Whether the visibility pass adds to it, so that it starts at 0.
+    pub summed: bool,
 }
 
-/// The most words in any of these buffers.
+/// The number of steps of depth in which veils sum optical depths
+/// ([`veils`](crate::passes::veils)).
+pub const VEILS: u32 = 16;
+
+/// All such buffers.
+pub const EXTRA: [Extra; 4] = [
+    Extra {
+        name: "veils",
+        label: "veils",
+        // The count and the optical depth of each step.
+        words: |needs| if needs.surface.veils() { 2 * VEILS } else { 0 },
+        summed: true,
+    },
+    Extra {
+        name: "moments",
+        label: "moments",
+        // Two per moment.
+        words: |needs| if needs.surface.oit() == Some(Oit::Moments) { 10 } else { 0 },
+        summed: true,
+    },
+    Extra {
+        name: "peeled",
+        label: "peeled layers",
+        words: |needs| if needs.surface.peels().is_some() { 8 } else { 0 },
+        summed: false,
+    },
+    Extra {
+        name: "individuals",
+        label: "pixels of individuals",
+        words: |needs| match needs.surface.separate() {
+            false => 0,
+            true if needs.maps.is_empty() && needs.mesh.is_none() => 8,
+            true => 16,
+        },
+        summed: false,
+    },
+];
+
+/// Words per pixel of the shaded triangles.
+pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
+
+/// The words per pixel of the buffer `name`; 0 if a render with `needs` does not have it.
+pub fn words_of(name: &str, needs: &SceneNeeds) -> u32 {
+    EXTRA.iter().find(|extra| extra.name == name).map_or(0, |extra| (extra.words)(needs))
+}
+
+/// The clear of the buffer `name` in a band; `None` if the render does not have it.
+pub fn clear(name: &'static str, plan: &Plan, band: usize) -> Option<Clear> {
+    let words = plan.bands[band].pixels * u64::from(words_of(name, &plan.needs));
+    (words > 0).then(|| Clear::of(name, 0, words))
+}
+
+/// The most words per pixel in any of these buffers.
 pub(super) fn most_words(needs: &SceneNeeds) -> u32 {
-    let of = |has: bool, words: u32| if has { words } else { 0 };
-    let peeled = of(needs.surface.peels().is_some(), PEELED_WORDS);
-    let moments = of(needs.surface.oit() == Some(Oit::Moments), MOMENT_WORDS);
-    let veils = of(needs.surface.veils(), VEIL_WORDS);
     // Four words per tile of 64 pixels (fewer at the image's edges) are at most one more per pixel,
     // unless the image has only a few pixels.
-    let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS + 1);
-    peeled.max(moments).max(triangles).max(individual_words(needs)).max(veils)
+    let triangles = if needs.mesh.is_some() { TRIANGLE_PIXEL_WORDS + 1 } else { 0 };
+    EXTRA.iter().map(|extra| (extra.words)(needs)).max().unwrap_or(0).max(triangles)
 }

@@ -319,19 +319,15 @@ impl SceneNeeds {
             ColorNeed::Textured => "color-textured",
             ColorNeed::Harmonics(_) => "color-harmonics",
         };
-        let kernel = match self.kernel {
-            KernelShape::Gaussian => "kernel-gaussian",
-            KernelShape::Ellipse => "kernel-ellipse",
-            KernelShape::Cone => "kernel-cone",
-            KernelShape::Constant => "kernel-constant",
-        };
         let raster = self.surface.raster().map(|raster| match raster.depth {
             RasterDepth::Exact => "raster-exact",
             RasterDepth::Offset => "raster-offset",
         });
-        [projection, kernel, color]
+        let oit = self.surface.oit().map(Oit::need);
+        let lists = self.surface.lists().map(Lists::need);
+        [projection, self.kernel.need(), color]
             .into_iter()
-            .chain(raster)
+            .chain(raster.into_iter().chain(oit).chain(lists))
             .chain(self.flags().into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
             .chain(self.maps.iter().map(|map| map.row().need))
             .collect()
@@ -367,10 +363,6 @@ impl SceneNeeds {
             (self.curved, "curved"),
             (self.facing.is_some(), "facing"),
             (self.surface.shows_nearest(), "nearest"),
-            (self.surface.lists() == Some(Lists::Layers), "lists-layers"),
-            (self.surface.lists() == Some(Lists::Sorted), "lists-sorted"),
-            (self.surface.oit() == Some(Oit::Weighted), "oit-weighted"),
-            (self.surface.oit() == Some(Oit::Moments), "oit-moments"),
             (self.surface.peels().is_some(), "peels"),
             (self.mesh.is_some(), "triangles"),
             (self.mesh.is_some_and(|mesh| mesh.textured), "painted-triangles"),

@@ -37,7 +37,7 @@ pub enum Surface {
     Raster {
         /// The format of its sums, and its depth test.
         raster: Raster,
-        /// What its fragments become.
+        /// How its fragments are shown.
         shown: Rasterised,
         /// It draws a triangle per splat instead of a quad
         /// ([`tuning::PIXELS_A_TRIANGLE`](super::tuning::PIXELS_A_TRIANGLE)).
@@ -77,10 +77,10 @@ pub enum Winner {
     Second,
 }
 
-/// What the fragments that the rasteriser draws become.
+/// How the fragments that the rasteriser draws are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rasterised {
-    /// Those within epsilon of the nearest one are blended.
+    /// Fragments within epsilon of the nearest one are blended.
     Blended,
     /// The nearest one shows, by the depth test.
     Nearest,

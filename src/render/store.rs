@@ -13,10 +13,10 @@ use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
 use crate::passes::upload::Uploaded;
 use crate::passes::{asks_for_order, covered, fragments, long_lists, visibility};
-use crate::plan::extra::{MOMENT_WORDS, PEELED_WORDS, VEIL_WORDS, individual_words};
+use crate::plan::extra::EXTRA;
 use crate::plan::known::Listed;
 use crate::plan::{
-    Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, page_surfels, splat_words,
+    Band, FragmentLayout, KEY_WORDS, Known, Plan, Raster, SceneNeeds, SurfelLayout, page_surfels, splat_words,
 };
 use crate::scene::Samples;
 
@@ -68,11 +68,9 @@ struct Made {
     sum_words: u32,
     image_words: u32,
     lists: bool,
-    veils: bool,
-    moments: bool,
-    peels: bool,
+    /// The words per pixel of each buffer that only some renders have.
+    extra: [u32; EXTRA.len()],
     mesh: bool,
-    individual_words: u32,
     raster: Option<(Raster, u32)>,
 }
 
@@ -187,26 +185,10 @@ impl Store {
         let raster = plan.needs.surface.raster().map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
-        let (samples, lists, veils) =
-            (plan.needs.samples, plan.needs.surface.lists().is_some(), plan.needs.surface.veils());
-        let moments = plan.needs.surface.oit() == Some(Oit::Moments);
-        let peels = plan.needs.surface.peels().is_some();
+        let (samples, lists) = (plan.needs.samples, plan.needs.surface.lists().is_some());
+        let extra = EXTRA.each_ref().map(|extra| (extra.words)(&plan.needs));
         let mesh = plan.needs.mesh.is_some();
-        let individual_words = individual_words(&plan.needs);
-        let made = Made {
-            width,
-            samples,
-            bands,
-            sum_words,
-            image_words,
-            lists,
-            veils,
-            moments,
-            peels,
-            mesh,
-            individual_words,
-            raster,
-        };
+        let made = Made { width, samples, bands, sum_words, image_words, lists, extra, mesh, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // Frees the old buffers before new ones are allocated.
@@ -263,17 +245,11 @@ impl Store {
             let words = most(&fragments::start_words);
             self.frame.insert("starts", Buffer::storage(gpu, "starts of lists", words)?);
         }
-        if plan.needs.surface.veils() {
-            let words = pixels * u64::from(VEIL_WORDS);
-            self.frame.insert("veils", Buffer::storage(gpu, "veils", words)?);
-        }
-        if plan.needs.surface.oit() == Some(Oit::Moments) {
-            let words = pixels * u64::from(MOMENT_WORDS);
-            self.frame.insert("moments", Buffer::storage(gpu, "moments", words)?);
-        }
-        if plan.needs.surface.peels().is_some() {
-            let words = pixels * u64::from(PEELED_WORDS);
-            self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
+        for extra in &EXTRA {
+            let words = pixels * u64::from((extra.words)(&plan.needs));
+            if words > 0 {
+                self.frame.insert(extra.name, Buffer::storage(gpu, extra.label, words)?);
+            }
         }
         if plan.needs.mesh.is_some() {
             // The rasteriser stores them in a texture, so one word serves the binding.
@@ -284,10 +260,6 @@ impl Store {
             self.frame.insert("triangle_pixels", Buffer::storage(gpu, "pixels of triangles", words)?);
             let words = most(&triangles::tile_words);
             self.frame.insert("triangle_tiles", Buffer::indirect(gpu, "tiles of triangles", words)?);
-        }
-        if plan.needs.surface.separate() {
-            let words = pixels * u64::from(individual_words(&plan.needs));
-            self.frame.insert("individuals", Buffer::storage(gpu, "pixels of individuals", words)?);
         }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);

@@ -51,6 +51,18 @@ pub enum KernelShape {
     Constant,
 }
 
+impl KernelShape {
+    /// Its name among a picture's needs.
+    pub fn need(self) -> &'static str {
+        match self {
+            Self::Gaussian => "kernel-gaussian",
+            Self::Ellipse => "kernel-ellipse",
+            Self::Cone => "kernel-cone",
+            Self::Constant => "kernel-constant",
+        }
+    }
+}
+
 /// The least weight of any fragment: at least one unit of every accumulator, so that "depth written
 /// implies weight > 0" holds.
 ///

@@ -13,3 +13,4 @@ mod prose;
 mod readme;
 mod release;
 mod report;
+mod rooms;

@@ -11,7 +11,7 @@ const COLUMNS: usize = 100;
 const NO_SUBJECT: [&str; 5] = ["Of", "What", "That", "Those", "Who"];
 
 /// All Rust and WGSL files below `folder`.
-fn files(folder: &Path) -> Vec<PathBuf> {
+pub fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let below = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![path] };
     let is_code = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "rs" || extension == "wgsl");

@@ -2,7 +2,7 @@
 //! decided pixels.
 
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::plan::{Accumulator, AccumulatorRow};
+use epsplat::low_level::plan::AccumulatorRow;
 use epsplat::low_level::scene::Map;
 
 /// The decision margin below which a pixel is left to rounding.

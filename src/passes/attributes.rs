@@ -26,7 +26,6 @@ pub const PASS: Pass = Pass {
                 true if needs.compares_depth() => "depth_middles.wgsl",
                 true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),
             },
-            pick(needs.maps.has(Map::Depth), "depth_map.wgsl", "depth_map_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
         files.extend(needs.normal.then_some("normal.wgsl"));

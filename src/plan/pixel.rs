@@ -24,7 +24,7 @@ pub struct PixelLayout {
     pub place_channel: u32,
     /// u32 words of a pixel in the image; its colour is in the first four.
     pub image_words: u32,
-    /// The first word of each map in the image, in the order of [`MAPS`].
+    /// The first word of each map in the image, in the order of [`MAPS`], or [`NO_MAP`].
     pub map_words: [u32; MAPS.len()],
 }
 
@@ -33,6 +33,9 @@ pub const COLOR_CHANNEL: u32 = 1;
 
 /// u32 words of a pixel's colour in the image.
 const COLOR_WORDS: u32 = 4;
+
+/// The place of a map that is not asked for (`maps.wgsl`).
+pub const NO_MAP: u32 = u32::MAX;
 
 impl PixelLayout {
     /// The layout for `needs`.
@@ -47,8 +50,11 @@ impl PixelLayout {
         let place_channel = (held_back_channel + channels(needs.surface.oit().is_some(), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;
         let map_words = MAPS.each_ref().map(|row| {
+            if !needs.maps.has(row.map) || row.image_word.is_none() {
+                return NO_MAP;
+            }
             let first = image_words;
-            image_words += channels(needs.maps.has(row.map) && row.image_word.is_some(), row.map.width() as u32);
+            image_words += row.map.width() as u32;
             first
         });
         Self {

@@ -345,9 +345,9 @@ fn broken_kernels_are_noticed() {
     });
     for (file, from, to) in [
         ("select_fades_absent.wgsl", "size < held.levels.x", "size < 1.2 * held.levels.x"),
-        ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
+        ("judge.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
         (
-            "select.wgsl",
+            "judge.wgsl",
             "seen_disk(center.z, node.radius * held.unit);",
             "seen_disk(center.z, 1.01 * node.radius * held.unit);",
         ),
@@ -359,7 +359,7 @@ fn broken_kernels_are_noticed() {
         ("select.wgsl", "return page.surfels;", "return page.surfels - 1u;"),
         ("select.wgsl", "run_counts[run] = before;", "run_counts[run] = vec2<u32>(0u);"),
         ("select.wgsl", "counts += left_by", "counts = left_by"),
-        ("select.wgsl", "cuts_that_divide(seen_disk(nearest, radius)) == 0u", "true"),
+        ("judge.wgsl", "cuts_that_divide(seen_disk(nearest, radius)) == 0u", "true"),
         ("select.wgsl", "node.first + select(0u, branch.surfels, kind_of(node) == INNER);", "node.first;"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
@@ -422,7 +422,7 @@ fn children_are_drawn_together_where_each_would_be() {
     const WITHIN: &str = "let within = !is_beside(ball.center, -ball.radius, 0.0);";
     let Some(gpu) = common::gpu() else { return };
     let backend = |from: &str, to: &str| {
-        let sources = Sources::default().replace("select.wgsl", from, to).unwrap();
+        let sources = Sources::default().replace("judge.wgsl", from, to).unwrap();
         Backend::Gpu { gpu: Box::new(gpu.clone()), sources }
     };
     let (together, alone) = (Backend::gpu(gpu.clone()), backend(TOGETHER, "false"));

@@ -197,10 +197,8 @@ fn lists_do_not_show_how_they_came_to_be() {
                 let own = Settings { samples, opacity: 0.6, maps: BOTH_MAPS, ..options(composite) };
                 let first = all_bits(&frame(scene, camera, &own, &backend));
                 let name = format!("{number} {composite:?} {samples:?}");
-                for seed in [3, 4] {
-                    let other = shuffled(scene, seed);
-                    assert!(all_bits(&frame(&other, camera, &own, &backend)) == first, "{name}: order {seed}");
-                }
+                let other = shuffled(scene, 3);
+                assert!(all_bits(&frame(&other, camera, &own, &backend)) == first, "{name}: another order");
                 for (other, what) in [(if number == 0 { &narrow } else { &wide }, "bands"), (&core, "core features")] {
                     assert!(all_bits(&frame(scene, camera, &own, other)) == first, "{name}: {what}");
                 }

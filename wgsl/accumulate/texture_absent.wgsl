@@ -15,3 +15,7 @@ fn accumulate_stored_place(pixel: u32, weight: Term, place: Place, depth: f32) {
 fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     return blended;
 }
+
+fn mean_place(pixel: u32, weight: f32) -> vec2<f32> {
+    return vec2<f32>(0.0);
+}

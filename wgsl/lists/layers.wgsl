@@ -11,11 +11,11 @@
 // #import layer_sums::{clear_sums}
 // #import layout::{WEIGHT_CHANNEL}
 // #import long_lists::{has_rounds, next_round}
+// #import maps::{write_surface}
 // #import normal::{resolve_normal}
 // #import resolve::{shaded}
 // #import resolve_lists::{LEAST_TRANSMITTANCE, with_behind}
 // #import side::{SIDES, SIDE_BIT}
-// #import surfaces_map::{write_surface}
 
 override MOST_LAYERS: u32;
 // Whether everything behind the last layer is drawn as one more, the tail.

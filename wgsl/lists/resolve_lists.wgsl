@@ -3,12 +3,9 @@
 // Twin: src/passes/layers.rs.
 // #import compositing|peeled::{composite}
 // #import image_*::{write_color}
-// #import layers_map::{write_layers}
 // #import layout::{held, held_band}
+// #import maps::{write_layers, write_no_surfaces, write_tail, write_transmittance}
 // #import resolve::{IMAGE_WORDS, over, premultiplied_sample}
-// #import surfaces_map::{write_no_surfaces}
-// #import tail_map::{write_tail}
-// #import transmittance_map::{write_transmittance}
 
 // LEAST_TRANSMITTANCE in src/scene/composite.rs.
 const LEAST_TRANSMITTANCE: f32 = 9.31322574615478515625e-10;

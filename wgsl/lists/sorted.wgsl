@@ -5,10 +5,10 @@
 // #import fragments::{keys, listed_color, listed_normal, listed_weight, record_at}
 // #import layout::{held}
 // #import long_lists::{next_round}
+// #import maps::{write_surface}
 // #import resolve::{shaded}
 // #import resolve_lists::{with_behind}
 // #import side::{side_of}
-// #import surfaces_map::{write_surface}
 // #import vectors::{dot3}
 
 // The fields of Rules in the twin.

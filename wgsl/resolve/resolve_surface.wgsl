@@ -3,21 +3,16 @@
 // Twin: src/passes/resolve.rs.
 // #import *::{resolve_color, show, sum_at, surface_depth, weight_at}
 // #import count::{count_of, write_count}
-// #import depth_map::{write_depth, write_no_depth}
 // #import image_*::{write_color}
 // #import individuals::{blended_at}
 // #import join::{joined}
-// #import layers_map::{write_layers}
 // #import layout::{NOTHING, WEIGHT_CHANNEL, held, held_band}
+// #import maps::{write_depth, write_layers, write_no_depth, write_no_texz, write_normal}
+// #import maps::{write_tail, write_texz, write_transmittance, write_weight}
 // #import normal::{resolve_normal}
-// #import normal_map::{write_normal}
 // #import oit::{with_held_back}
 // #import resolve::{IMAGE_WORDS, over, premultiplied_sample, shaded}
-// #import tail_map::{write_tail}
-// #import texture::{textured}
-// #import texz_map::{place_of_sums, write_no_texz, write_texz}
-// #import transmittance_map::{write_transmittance}
-// #import weight_map::{write_weight}
+// #import texture::{mean_place, textured}
 
 // The surface that a pixel shows.
 struct Surface {
@@ -60,7 +55,7 @@ fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
         surface.depth = surface_depth(sums_of, weight, front);
         surface.weight = weight_at(sums_of);
         surface.count = count_of(sums_of);
-        surface.place = place_of_sums(sums_of, weight);
+        surface.place = mean_place(sums_of, weight);
     }
     return surface;
 }

@@ -1,2 +1,0 @@
-
-fn write_tail(out: u32, weight: f32) {}

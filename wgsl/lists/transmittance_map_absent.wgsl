@@ -1,2 +1,0 @@
-
-fn write_transmittance(out: u32, transmittance: f32) {}

@@ -1,2 +1,0 @@
-
-fn write_normal(out: u32, normal: vec3<f32>) {}

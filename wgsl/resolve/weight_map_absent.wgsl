@@ -1,2 +1,0 @@
-
-fn write_weight(out: u32, weight: f32) {}

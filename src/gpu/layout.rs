@@ -109,8 +109,8 @@ pub const ONE: u32 = u32::MAX - 1023;
 /// Bit of [`Splat::bounds_last`] that is set if s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
 
-/// Camera, options and facts of one render, for the kernels; `wgsl/common/layout.wgsl` explains the
-/// fields.
+/// Camera, options and facts of one render, for the kernels. `src/plan/view.rs` fills it, and
+/// `wgsl/common/layout.wgsl` explains the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]

@@ -23,7 +23,7 @@ pub const PASS: Pass = Pass {
             match needs.surface.shows_nearest() {
                 true => "epsilon_none.wgsl",
                 false => match needs.epsilon {
-                    EpsilonForm::Depth => "epsilon.wgsl",
+                    EpsilonForm::Depth => "epsilon_depth.wgsl",
                     EpsilonForm::Radius => "epsilon_radius.wgsl",
                     EpsilonForm::Ray => "epsilon_ray.wgsl",
                     EpsilonForm::All => "epsilon_all.wgsl",

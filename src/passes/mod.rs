@@ -31,7 +31,7 @@
 //!
 //! # How to add
 //!
-//! - **An accumulator**: write `wgsl/accumulator_NAME.wgsl` with the functions of
+//! - **An accumulator**: write `wgsl/accumulate/accumulator_NAME.wgsl` with the functions of
 //!   `accumulator_fixed32.wgsl` (`quantise`, `term`, `add`, `add_pair`, `settle`, `sum_at`,
 //!   `weight_at`) and a row of [`ACCUMULATORS`](crate::plan::ACCUMULATORS): words per sum, needed
 //!   features, whether the bits are the same in any order, and a proven bound on its error. Tests

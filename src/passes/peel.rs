@@ -1,8 +1,9 @@
 //! Stages 2 to 4 of [`Composite::Layers`] by the rasteriser: depth peeling (Everitt 2001), the
 //! baseline for the lists of [`fragments`](super::fragments).
 //!
-//! The visibility and the attribute pass are drawn once per layer, each time without the fragments
-//! of the layers before, and the result is composited behind those layers.
+//! `render/sequence.rs` takes these steps for `Rasterised::Layers`. The visibility and the attribute
+//! pass are drawn once per layer, each time without the fragments of the layers before, and the
+//! result is composited behind those layers.
 //!
 //! A layer is a window of one epsilon behind its nearest fragment
 //! ([`Parting::Window`](super::layers::Parting::Window)): the rasteriser cannot know where a run of

@@ -10,7 +10,7 @@
 //! [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are drawn so. On a software
 //! adapter, whose atomics are slow, all splats are summed by tiles if they are not tiny
 //! ([`touched`]) and those that blend with each other are in one page
-//! ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)). A tile then resolves its pixels at
+//! ([`Splats::Tiles`](crate::plan::Splats::Tiles)). A tile then resolves its pixels at
 //! once, and no sum is stored. Nearest depths of small splats are found by scatter in any case, and
 //! the nearest depths of all splats are known before any is accumulated. Opaque blending within
 //! epsilon needs no order, so no list is sorted.

@@ -15,7 +15,7 @@ use crate::gpu::layout::TILE;
 use crate::plan::extra::{self, EXTRA};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Band, Optimisation, Plan};
+use crate::plan::{Band, Oit, Optimisation, Plan, Surface, Winner};
 use crate::scene::{Camera, LowPass};
 
 /// The nearest fragment of a pixel.
@@ -73,11 +73,17 @@ pub fn reference<'a>(
 pub const PASS: Pass = Pass {
     name: "visibility",
     files: |needs| {
-        if needs.surface.raster().is_none() {
-            vec!["visibility.wgsl", "occlusion.wgsl", "front.wgsl"]
-        } else {
-            Vec::new()
-        }
+        let nearest = match needs.surface {
+            // The rasteriser has a depth buffer.
+            Surface::Raster { .. } => return Vec::new(),
+            // Moments and lists store something else in place of nearest depths.
+            Surface::OrderFree(Oit::Moments) | Surface::Layers { .. } | Surface::Sorted { .. } => None,
+            Surface::Nearest(Winner::Once) => Some("nearest_color.wgsl"),
+            Surface::Blended { .. } | Surface::OrderFree(Oit::Weighted) | Surface::Nearest(_) => {
+                Some("nearest_depth.wgsl")
+            }
+        };
+        ["visibility.wgsl", "occlusion.wgsl", "front.wgsl"].into_iter().chain(nearest).collect()
     },
     kernels: |needs| match (needs.surface.raster(), needs.cull) {
         (None, false) if oit::marks(needs) => vec![OCCLUDE],

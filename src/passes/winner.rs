@@ -13,7 +13,7 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Clear;
-use crate::plan::{Oit, Plan, Settings, Surface, Winner};
+use crate::plan::{Plan, Settings, Surface, Winner};
 use crate::scene::color::{decoded, srgb8};
 use crate::scene::{Camera, Colors, Scene};
 
@@ -21,17 +21,12 @@ use crate::scene::{Camera, Colors, Scene};
 pub const PASS: Pass = Pass {
     name: "winner",
     files: |needs| match needs.surface {
-        Surface::Blended { .. } | Surface::OrderFree(Oit::Weighted) => vec!["nearest_depth.wgsl"],
-        Surface::Nearest(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],
-        Surface::Nearest(Winner::Once) => vec!["winner.wgsl", "nearest_color.wgsl", "winner_color.wgsl", "srgb.wgsl"],
+        Surface::Nearest(Winner::Depth) => vec!["winner.wgsl", "winner_constant.wgsl"],
+        Surface::Nearest(Winner::Once) => vec!["winner.wgsl", "winner_color.wgsl", "srgb.wgsl"],
         Surface::Nearest(Winner::Second) => {
-            vec!["winner.wgsl", "nearest_depth.wgsl", "winner_second.wgsl", "winner_color.wgsl", "srgb.wgsl"]
+            vec!["winner.wgsl", "winner_second.wgsl", "winner_color.wgsl", "srgb.wgsl"]
         }
-        // Moments and lists store something else in place of nearest depths, and the rasteriser has
-        // a depth buffer.
-        Surface::OrderFree(Oit::Moments) | Surface::Layers { .. } | Surface::Sorted { .. } | Surface::Raster { .. } => {
-            Vec::new()
-        }
+        _ => Vec::new(),
     },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),

@@ -18,7 +18,8 @@
 //! [`Composite::Gaussians`](super::Composite::Gaussians). Two rules of the original code are not
 //! followed, as they come from its tiles and not from its formulas: it sorts surfels by the depth
 //! of their centres, where here each fragment has its own depth, and it cuts a surfel at a box of
-//! three standard deviations, rounded to tiles, where here a surfel ends at an alpha of 1/255.
+//! three standard deviations, rounded to tiles, where here a surfel ends at an alpha of 1/255. Kernels get the constants below as
+//! overrides ([`sorted`](crate::passes::sorted)).
 
 use super::Kernel;
 

@@ -1,4 +1,5 @@
-//! Assigns points to several textures.
+//! Makes surfels of points that may have textures: numbers the points by their textures, and leaves
+//! inputs without images to [`build_within`].
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -209,7 +209,7 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let ray = case("hat", EPSILONS[3], Projection::Pinhole);
     noticed(&ray, row, "epsilon_ray.wgsl", " * along_axis(image)", "");
     let absolute = case("hat", EPSILONS[1], Projection::Pinhole);
-    noticed(&absolute, row, "epsilon.wgsl", "held.epsilon_absolute", "1.05 * held.epsilon_absolute");
+    noticed(&absolute, row, "epsilon_depth.wgsl", "held.epsilon_absolute", "1.05 * held.epsilon_absolute");
 }
 
 #[test]

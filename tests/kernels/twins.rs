@@ -315,7 +315,7 @@ fn a_broken_footprint_or_sum_is_noticed() {
     sums(file, "d.y + splat.a[2]))\n", "d.y + splat.a[2] * 1.001))\n").expect_noticed("row a");
     sums(file, "splat.b[1] * d.y", "splat.b[1] * d.y * 1.001").expect_noticed("row b");
     sums("kernel_ellipse.wgsl", "-KERNEL_A", "-1.0001 * KERNEL_A").expect_noticed("kernel");
-    sums("epsilon.wgsl", "held.epsilon_relative", "held.epsilon_relative * 1.05").expect_noticed("epsilon");
+    sums("epsilon_depth.wgsl", "held.epsilon_relative", "held.epsilon_relative * 1.05").expect_noticed("epsilon");
     sums("normal_flat.wgsl", ") * 0.5 + 0.5;", ") * 0.5 + 0.50001;").expect_noticed("normal");
     sums("color_linear.wgsl", "color.rgb * color.a", "color.rgb * (color.a * 1.0001)").expect_noticed("premultiplied");
     sums(

@@ -4,11 +4,12 @@
 // the order.
 // Twin: src/passes/accumulate.rs.
 // All loops end, by 2, 4 of src/gpu/loops.rs: 0x1c18d5be7c903b06
-// #import *::{front_at, radius_of}
+// #import *::{front_at}
 // #import blend|winner::{attributes_of}
 // #import blend|winner_second::{blend}
 // #import camera_*::{Fragment}
 // #import cull::{slot_of, surfel_in}
+// #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{Rectangle, TILE, footprint, is_large, large_splat, pixel_index, reach}
 // #import layout::{Splat, WORKGROUP, hold}

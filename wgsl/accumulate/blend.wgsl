@@ -1,11 +1,12 @@
 // Adds an accepted fragment to its pixel's sums, in the attribute pass of the compute path
 // (accumulate.wgsl) or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
-// #import *::{Term, accumulate_depth, quantise, radius_of, settle}
+// #import *::{Term, accumulate_depth, quantise, settle}
 // #import camera_*::{Fragment}
 // #import color_*::{accumulate_color, color_of}
 // #import copies::{hold_copies}
 // #import count::{accumulate_count}
 // #import curved|facing|flat::{Bend}
+// #import epsilon_*::{radius_of}
 // #import kernel_*::{kernel_weight}
 // #import layout::{Splat}
 // #import normal::{accumulate_normal}

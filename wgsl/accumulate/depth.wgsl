@@ -2,7 +2,8 @@
 // their position in that interval is summed: its error is 2^-24 of epsilon, not of the scene.
 // Fragments of other cuts, which may lie in front of it (fade.wgsl), count as nearest.
 // Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
-// #import *::{Term, add, deepest_accepted, sum_at, term}
+// #import *::{Term, add, sum_at, term}
+// #import epsilon_*::{deepest_accepted}
 
 override DEPTH_CHANNEL: u32;
 

@@ -2,10 +2,11 @@
 // blended, and composites them from front to back. Same interface as sorted.wgsl.
 // Twin: src/passes/layers.rs.
 // All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
-// #import *::{farthest_shown, quantise, resolve_color, sum_at, surface_depth}
+// #import *::{quantise, resolve_color, sum_at, surface_depth}
 // #import blend::{attributes_without_place, blend_weighted}
 // #import compositing::{Compositing}
 // #import curved|facing|flat::{Bend}
+// #import epsilon_*::{farthest_shown}
 // #import fragments::{Record, keys, listed_color, listed_normal, listed_radius, listed_weight}
 // #import fragments::{record_at}
 // #import layer_sums::{clear_sums}

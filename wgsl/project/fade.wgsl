@@ -2,10 +2,10 @@
 // (src/scene/fade.rs). A fragment's weight is multiplied by the fraction of the cuts in that range.
 // Depths have no weights, so each sample takes the nearest depth of one cut.
 // Same interface as fade_absent.wgsl.
-// #import *::{farthest_shown}
 // #import camera_*::{Fragment}
 // #import clip::{CLIP_ROWS}
 // #import curved|facing|flat::{CAP_ROWS}
+// #import epsilon_*::{farthest_shown}
 // #import fade_own|select_fades::{fade_word}
 // #import filter|lowpass_none::{FILTER_ROWS}
 // #import records::{SplatRecord}

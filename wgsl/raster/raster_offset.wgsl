@@ -2,9 +2,9 @@
 // pass moves its depths away by epsilon (paper 000, section 5.3). The attribute pass can use early
 // depth tests, but their decisions are not exact. `depth_order` is linear over the image of a plane
 // and largest in front.
-// #import *::{farthest_shown, radius_of}
 // #import blend|winner_second::{blend}
 // #import camera_*::{depth_of, depth_order}
+// #import epsilon_*::{farthest_shown, radius_of}
 // #import footprint::{pixel_index}
 // #import layout::{Splat}
 // #import raster::{ShapeCorner, carried, fragment_of}

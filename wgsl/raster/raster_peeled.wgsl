@@ -1,7 +1,7 @@
 // Depth peeling (Everitt 2001): fragments that belong to earlier layers are not drawn again.
 // Host side: src/passes/peel.rs.
-// #import *::{radius_of}
 // #import camera_*::{Fragment}
+// #import epsilon_*::{radius_of}
 // #import footprint::{pixel_index}
 // #import peeled::{PEELED_FRONTS, PEELED_WORDS}
 // #import raster::{ShapeCorner, shape_corner}

@@ -2,7 +2,8 @@
 // middle and stands out from it by the square of the distance from there. So a fragment counts by
 // the square of its weight here: the blended depth is less than two thirds as far out.
 // Same interface as depth.wgsl. Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
-// #import *::{Term, add, deepest_accepted, part_of, sum_at, term}
+// #import *::{Term, add, part_of, sum_at, term}
+// #import epsilon_*::{deepest_accepted}
 
 override DEPTH_CHANNEL: u32;
 // The channel of the weights of depths.

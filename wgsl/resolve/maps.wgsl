@@ -1,5 +1,6 @@
 // The maps of a pixel, which follow its colour in the image. A map that is not asked for has no
-// place, and its values are not written.
+// place, and its values are not written. The numbers of fragments (count.wgsl) and of points
+// (index.wgsl) have files of their own.
 // All loops end, by 1 of src/gpu/loops.rs: 0x80bf639daa06c917
 // #import image_*::{write_value}
 // #import layout::{NOTHING, held}

@@ -3,9 +3,9 @@
 // splats, which touch many, are blocks of tiles. The order within a list depends on the schedule,
 // but no minimum or sum depends on that order. Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xce41422d9aa244b7
-// #import *::{radius_of}
 // #import covered::{TILE_ROWS, TILE_WIDTH}
 // #import cull::{slot_of, surfel_in}
+// #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{Rectangle, is_large, large_splat, reach}
 // #import layout::{Splat, WORKGROUP, held, held_band, hold}

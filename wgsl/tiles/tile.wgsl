@@ -5,13 +5,14 @@
 // the result is that of visibility.wgsl and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0x123395bc59143c44
-// #import *::{Term, deepest_accepted, front_at, show}
+// #import *::{Term, front_at, show}
 // #import accumulator_raster|visibility::{nearest}
 // #import bin::{BLOCK_SIDE, BLOCK_SIZE, LIST_ENDS, cells_across, lists_start}
 // #import blend::{blend_weighted, weight_of}
 // #import blend|winner::{Attributes, attributes_of}
 // #import covered::{TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across, tiles_in_band}
 // #import cull::{surfel_in}
+// #import epsilon_*::{deepest_accepted}
 // #import fade::{takes_sample}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{footprint}

@@ -1,7 +1,7 @@
 // Splats and triangles that lie within epsilon of each other are blended, the nearer with the
 // greater share (after Guennebaud, Barthe and Paulin 2006, who smooth the seam so). Same interface
 // as join_nearest.wgsl.
-// #import *::{deepest_accepted}
+// #import epsilon_*::{deepest_accepted}
 // #import resolve_surface::{Surface}
 
 fn share_of_splats(splats: Surface, triangle: f32) -> f32 {

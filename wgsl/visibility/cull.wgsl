@@ -5,10 +5,10 @@
 // slots, one batch after the other: batches that are left out take no memory.
 // Host side and twin: src/passes/cull.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x116791cebd55d876
-// #import *::{deepest_accepted}
 // #import accumulator_raster|front::{visible}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
 // #import camera_*::{ball_extent}
+// #import epsilon_*::{deepest_accepted}
 // #import footprint::{Rectangle, band_pixels}
 // #import layout::{BATCH, NOTHING, Splat, WORKGROUP, held, held_band, hold, linear_index}
 // #import occlusion::{OCCLUSION_TILE, farthest_in, occlusion_tiles}

@@ -1,4 +1,4 @@
-// Every depth is accepted. Same interface as epsilon.wgsl.
+// Every depth is accepted. Same interface as epsilon_depth.wgsl.
 // #import layout::{held}
 
 fn radius_of(index: u32) -> f32 {

@@ -1,4 +1,4 @@
-// No tolerance: the nearest fragment alone is the surface. Same interface as epsilon.wgsl.
+// No tolerance: the nearest fragment alone is the surface. Same interface as epsilon_depth.wgsl.
 
 fn radius_of(index: u32) -> f32 {
     return 0.0;

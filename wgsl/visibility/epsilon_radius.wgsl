@@ -1,5 +1,5 @@
 // Epsilon as a multiple of the shorter half-axis of the fragment's own surfel. Same interface as
-// epsilon.wgsl. Twin: src/passes/accumulate.rs.
+// epsilon_depth.wgsl. Twin: src/passes/accumulate.rs.
 // #import layout::{held}
 // #import vectors::{norm3}
 // #import words|words_long::{surfel_at}

@@ -1,5 +1,5 @@
 // Epsilon as a length along the pixel's view ray (paper 000, section 5.3), which spans less depth
-// toward the image's corners. Same interface as epsilon.wgsl. Twin: src/passes/accumulate.rs.
+// toward the image's corners. Same interface as epsilon_depth.wgsl. Twin: src/passes/accumulate.rs.
 // #import camera_*::{along_axis}
 // #import layout::{held}
 

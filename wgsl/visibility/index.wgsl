@@ -1,9 +1,10 @@
 // The index map, in words of the image: the greatest weight among the fragments within epsilon of a
 // pixel's nearest depth, and then the place of the surfel that has it. Twin: src/passes/index.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
-// #import *::{front_at, radius_of}
+// #import *::{front_at}
 // #import blend::{fragment_weight}
 // #import cull::{slot_of, surfel_in}
+// #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{TILE, footprint, is_large, large_splat, pixel_index, reach}
 // #import layout::{Splat, WORKGROUP, hold, page}

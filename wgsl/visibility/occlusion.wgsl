@@ -2,11 +2,12 @@
 // skip splats that are hidden completely, without a look at their pixels. No image depends on it.
 // Host side: src/passes/visibility.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xc48f03445918a49c
-// #import *::{farthest_accepted, nearest_at}
+// #import *::{nearest_at}
 // #import accumulator_raster|front::{visible}
 // #import accumulator_raster|visibility::{nearest}
 // #import covered::{TILE_ROWS}
 // #import curved|facing|flat::{nearest_on}
+// #import epsilon_*::{farthest_accepted}
 // #import filter|lowpass_none::{Filter, least_filtered}
 // #import footprint::{Rectangle, band_pixels}
 // #import layout::{NOTHING, Splat, WORKGROUP, held, held_band, hold, linear_index}

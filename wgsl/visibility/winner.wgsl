@@ -1,8 +1,8 @@
 // Pictures in which only the nearest fragment shows: it has weight 1, and nothing is summed. Joined
 // in place of blend.wgsl, the weights of a kernel, an accumulator and the sums of colours.
 // Twin: src/passes/winner.rs.
-// #import *::{radius_of}
 // #import attributes::{attribute_word}
+// #import epsilon_*::{radius_of}
 // #import layout::{Splat}
 
 alias Term = u32;

@@ -1,8 +1,8 @@
 // A pixel shows one side of a surface: that of its nearest fragment. Fragments within epsilon
 // behind it that show the other side, at an outline or in a thin part, are left out.
 // Twin: src/passes/accumulate.rs.
-// #import *::{farthest_shown}
 // #import camera_*::{Fragment}
+// #import epsilon_*::{farthest_shown}
 // #import fade::{meets_front}
 
 // Whether the last bit of a depth stores the fragment's side, so that the nearest depth tells which

@@ -58,7 +58,7 @@ pub use error::{Error, Result};
 pub use io::{Mesh, Points, Texture};
 pub use low_level::frame::Frame;
 pub use low_level::render::Report;
-pub use low_level::scene::{Bounds, Camera, Lens, Map, Maps, Up};
+pub use low_level::scene::{Bounds, Camera, Lens, Map, Maps, Side, Up};
 pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
 pub use stage::{Files, Picture, ReadReport, Renderer, Scene, View, ViewReport};

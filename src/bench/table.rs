@@ -33,10 +33,10 @@ pub fn text(definition: &Definition, study: &Study) -> String {
     if let Some(baseline) = &definition.baseline {
         columns.push((format!("time / {baseline}"), Box::new(|m| optional(relative(definition, study, m), 2))));
     }
-    columns.push(("max error".into(), Box::new(|m| error(m.numeric.map(|n| n.max_abs)))));
-    columns.push(("RMSE".into(), Box::new(|m| error(m.numeric_error()))));
+    columns.push(("max vs f64".into(), Box::new(|m| error(m.numeric.map(|n| n.max_abs)))));
+    columns.push(("RMSE vs f64".into(), Box::new(|m| error(m.numeric_error()))));
     if all.iter().any(|m| m.reconstruction.contains_key("psnr_db")) {
-        columns.push(("PSNR, dB".into(), Box::new(move |m| optional(truth(m, "psnr_db"), 2))));
+        columns.push(("dB vs truth".into(), Box::new(move |m| optional(truth(m, "psnr_db"), 2))));
         columns.push(("SSIM".into(), Box::new(move |m| optional(truth(m, "ssim"), 4))));
         columns.push(("depth, %".into(), Box::new(move |m| percent(m, "depth_relative_mean"))));
         columns.push(("normal, °".into(), Box::new(move |m| optional(truth(m, "normal_degrees_mean"), 2))));
@@ -61,7 +61,21 @@ pub fn text(definition: &Definition, study: &Study) -> String {
     }
     let heads = columns.iter().map(|(head, _)| head.clone()).collect();
     let rows = all.iter().map(|m| columns.iter().map(|(_, cell)| cell(m)).collect());
-    aligned(&std::iter::once(heads).chain(rows).collect::<Vec<Vec<String>>>())
+    let table = aligned(&std::iter::once(heads).chain(rows).collect::<Vec<Vec<String>>>());
+    format!("{table}{}", legend(all))
+}
+
+/// Says against which picture the errors of a table are.
+fn legend(all: &[Measurement]) -> String {
+    let mut text =
+        "\nvs f64: against the f64 reference of the same configuration, which shows rounding alone\n".to_owned();
+    if all.iter().any(|m| m.reconstruction.contains_key("psnr_db")) {
+        text += "vs truth: PSNR against rays that meet the true surface; SSIM to leaks are against them too\n";
+    }
+    if all.iter().any(|m| m.ratio_to_raster.is_some()) {
+        text += "x raster: how many times as fast as the fastest rasteriser whose RMSE vs f64 is no larger\n";
+    }
+    text
 }
 
 /// Formats a Markdown table per scene.
@@ -74,7 +88,7 @@ pub fn markdown(definition: &Definition, study: &Study) -> String {
     for case in study.measurements.chunk_by(same_case) {
         let first = &case[0];
         text += &format!("**{}**, {} surfels, {}x{}\n\n", first.scene, first.surfels, first.width, first.height);
-        text += &format!("| | time / {baseline} | largest error | RMSE | same bits in any order | runs on |\n");
+        text += &format!("| | time / {baseline} | largest error | RMSE vs f64 | same bits in any order | runs on |\n");
         text += "|---|---|---|---|---|---|\n";
         for m in case {
             let time = relative(definition, study, m).map_or(NONE.to_owned(), |ratio| format!("{ratio:.2}"));
@@ -173,7 +187,7 @@ mod tests {
         let (definition, study) = study();
         let text = text(&definition, &study);
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines[0].contains("time / base") && !text.contains("PSNR") && !text.contains("x raster"), "{text}");
+        assert!(lines[0].contains("time / base") && !text.contains("vs truth") && !text.contains("x raster"), "{text}");
         assert!(lines[1].starts_with("s      base ") && lines[1].contains("2.00 ± 0.00"), "{text}");
         assert!(lines[2].contains(" 1.50 ") && lines[2].ends_with("MISSED"), "{text}");
         assert!(lines[1].contains("2.0e-6") && lines[1].contains("1.0e-7"), "{text}");

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
+use crate::scene::Side;
+
 /// The view of a picture. Without an eye the whole scene is in view.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -17,6 +19,12 @@ pub struct CameraOptions {
     /// Position of the camera, world coordinates [default: a view of the whole scene]
     #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true))]
     pub eye: Option<DVec3>,
+    /// Side from which the whole scene is in view: north, east, south, west, above or X,Y,Z
+    ///
+    /// Compass directions are those of maps (north is +y, or -z where y is up), seen from 30 degrees
+    /// above the horizon. X,Y,Z points from the scene to the camera.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "SIDE", allow_hyphen_values = true, conflicts_with = "eye"))]
+    pub from: Option<Side>,
     /// Point that the camera looks at [default: the scene's centre]
     #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true, requires = "eye"))]
     pub target: Option<DVec3>,
@@ -35,7 +43,7 @@ pub struct CameraOptions {
     #[cfg_attr(feature = "cli", arg(long, value_name = "FX,FY,CX,CY", value_parser = super::parse::intrinsics, allow_hyphen_values = true, hide_short_help = true))]
     pub intrinsics: Option<[f64; 4]>,
     /// Camera file (see the guide), in place of all other camera options except --size
-    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
+    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
     /// Smallest depth drawn, world units [default: a millionth of the scene]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]

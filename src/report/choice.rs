@@ -107,11 +107,28 @@ pub(super) fn section(cases: &[Case<'_>]) -> String {
         ),
     };
     format!(
-        "<section><h2>Which to use</h2>{sentence}<div class=\"scroll\"><table class=\"choice\"><thead><tr>\
-         <th>RMSE at most</th><th>the fastest</th><th class=\"n\">ms</th><th class=\"n\">× raster</th>\
+        "<section><h2>Which to use</h2>{}{sentence}<div class=\"scroll\"><table class=\"choice\"><thead><tr>\
+         <th>RMSE against f64 at most</th><th>the fastest</th><th class=\"n\">ms</th><th class=\"n\">× raster</th>\
          <th class=\"n\">its RMSE</th></tr></thead>{rows}\
-         </table></div></section>"
+         </table></div></section>",
+        nearest_to_truth(cases)
     )
+}
+
+/// Names, for each case with a true surface, the configuration whose picture is nearest to it: errors
+/// against the f64 reference of the same configuration do not tell.
+fn nearest_to_truth(cases: &[Case<'_>]) -> String {
+    let item = |case: &Case<'_>| {
+        let known = case.measurements.iter().filter_map(|m| Some((m.reconstruction_error()?, m)));
+        let (error, m) = known.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let (title, config, time) = (escape(&case.title), escape(&m.config), significant(m.total_ms.median, 3));
+        Some(format!("<li>{title}: <strong>{config}</strong> (RMSE {}, {time} ms)</li>", significant(error, 2)))
+    };
+    let items: String = cases.iter().filter_map(item).collect();
+    match items.is_empty() {
+        true => String::new(),
+        false => format!("<p>Nearest to the true surface:</p><ul class=\"answer\">{items}</ul>"),
+    }
 }
 
 fn sentence<'a>(start: &str, answers: impl Iterator<Item = (Limit, &'a str, f64)>) -> String {

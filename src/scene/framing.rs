@@ -1,10 +1,12 @@
-//! The default view: a camera that frames the scene.
+//! Views that frame the scene: the default one, and those from a given side.
+
+use std::str::FromStr;
 
 use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::camera::check_size;
-use super::{Bounds, Camera, Lens, Projection, Scene, Surfel};
+use super::{Bounds, Camera, Lens, Projection, Scene, Surfel, Up};
 use crate::error::{Error, Result};
 
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
@@ -17,6 +19,64 @@ const FILL_OF_DISKS: f64 = 0.98;
 /// depth over its distance.
 const ROUNDS: usize = 4;
 
+/// The side from which a camera frames the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Side {
+    /// A compass direction, seen from [`ELEVATION`] above the horizon: of 0 for north, 90 degrees
+    /// for east and so on. North is +y where z is up, and -z where y is up.
+    Compass(u32),
+    /// Straight from above, with north at the top.
+    Above,
+    /// From this direction, world coordinates of any length.
+    Toward(DVec3),
+}
+
+/// The angle above the horizon of a view from a compass direction, degrees.
+pub const ELEVATION: f64 = 30.0;
+
+impl Side {
+    /// The direction from the scene to the camera, in a scene with this direction of up.
+    fn direction(self, up: Up) -> DVec3 {
+        let (north, east) = match up {
+            Up::Z => (DVec3::Y, DVec3::X),
+            Up::Y => (DVec3::NEG_Z, DVec3::X),
+        };
+        match self {
+            Self::Compass(degrees) => {
+                let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+                let (rise, run) = ELEVATION.to_radians().sin_cos();
+                (north * cos + east * sin) * run + up.axis() * rise
+            }
+            Self::Above => up.axis(),
+            Self::Toward(direction) => direction,
+        }
+    }
+}
+
+impl FromStr for Side {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let vector = || -> Result<DVec3> {
+            let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+            match numbers.as_deref() {
+                Some([x, y, z]) if [x, y, z].iter().all(|number| number.is_finite()) => Ok(DVec3::new(*x, *y, *z)),
+                _ => Err(Error::Usage(format!(
+                    "a side is north, east, south, west, above or a direction X,Y,Z, not {text:?}"
+                ))),
+            }
+        };
+        Ok(match text {
+            "north" => Self::Compass(0),
+            "east" => Self::Compass(90),
+            "south" => Self::Compass(180),
+            "west" => Self::Compass(270),
+            "above" => Self::Above,
+            _ => Self::Toward(vector()?),
+        })
+    }
+}
+
 impl Camera {
     /// A camera that frames the scene's body: centred, and as large as fits in the image.
     ///
@@ -25,32 +85,33 @@ impl Camera {
     /// disk: larger disks move the camera farther away. An orthographic lens keeps its scale, so it
     /// may show less.
     pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Ok(Self::framed(size, lens, scene, near, (None, Of::Disks))?.0)
+        Ok(Self::framed(size, lens, scene, near, (None, None, Of::Disks))?.0)
     }
 
-    /// As [`Camera::framing`], with an optional up direction; also returns the target.
+    /// As [`Camera::framing`], from a side and with an up direction if they are given; also returns
+    /// the target.
     ///
     /// `up` is a world-space direction of any length, by default the scene's. The target is in
     /// world coordinates: [`Camera::look_at`] from the camera's eye to it gives the same camera.
     ///
     /// # Errors
     ///
-    /// As [`Camera::framing`], and [`Error::Usage`] if `up` has no direction.
-    pub fn framing_up(
+    /// As [`Camera::framing`], and [`Error::Usage`] if `up` or the side has no direction.
+    pub fn framing_from(
         size: (u32, u32),
         lens: Lens,
         scene: &Scene,
         near: f64,
-        up: Option<DVec3>,
+        (side, up): (Option<Side>, Option<DVec3>),
     ) -> Result<(Self, DVec3)> {
-        Self::framed(size, lens, scene, near, (up, Of::Disks))
+        Self::framed(size, lens, scene, near, (side, up, Of::Disks))
     }
 
     /// The default view by the surfels' centres alone, for studies in which the view must not
     /// depend on the radius.
     #[cfg(feature = "bench")]
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Ok(Self::framed(size, lens, scene, near, (None, Of::Centers))?.0)
+        Ok(Self::framed(size, lens, scene, near, (None, None, Of::Centers))?.0)
     }
 
     fn framed(
@@ -58,7 +119,7 @@ impl Camera {
         lens: Lens,
         scene: &Scene,
         near: f64,
-        (up, of): (Option<DVec3>, Of),
+        (side, up, of): (Option<Side>, Option<DVec3>, Of),
     ) -> Result<(Self, DVec3)> {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
@@ -71,11 +132,22 @@ impl Camera {
             [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
         };
         let image = [interval(width, cx, fx), interval(height, cy, fy)];
-        let up = up.unwrap_or(scene.up.axis());
-        let Some(unit) = (up / up.abs().max_element()).try_normalize() else {
+        let unit = |direction: DVec3| (direction / direction.abs().max_element()).try_normalize();
+        let (given, mut up) = (up.is_some(), up.unwrap_or(scene.up.axis()));
+        let Some(mut vertical) = unit(up) else {
             return Err(Error::Usage("the direction of up has no length".into()));
         };
-        let framing = Framing::new(scene, projection == Projection::Pinhole, image, unit);
+        let forward = match side {
+            None => forward(vertical),
+            Some(side) => match unit(side.direction(scene.up)) {
+                Some(toward) => -toward,
+                None => return Err(Error::Usage("the direction of --from has no length".into())),
+            },
+        };
+        if !given && forward.cross(vertical).length() <= 1e-3 {
+            (up, vertical) = (scene.up.other(), scene.up.other());
+        }
+        let framing = Framing::new(scene, projection == Projection::Pinhole, image, (forward, vertical));
         let mut eye = framing.eye(FILL, Of::Centers);
         if of == Of::Disks && framing.cuts(eye) {
             eye = framing.eye(FILL_OF_DISKS, Of::Disks);
@@ -140,8 +212,7 @@ impl Disk {
 }
 
 impl<'a> Framing<'a> {
-    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], up: DVec3) -> Self {
-        let forward = forward(up);
+    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], (forward, up): (DVec3, DVec3)) -> Self {
         let right = forward.cross(up).normalize();
         let (body, _) = scene.framed();
         // A scene whose points coincide has only the extent of its surfels.
@@ -299,6 +370,38 @@ mod tests {
                 assert!(off.max_element() < 0.03, "{off}");
             }
         }
+    }
+
+    /// Each side has the whole scene in view, and sees what lies on that side in front.
+    #[test]
+    fn a_scene_is_framed_from_each_side() {
+        let at = |x: f32, y: f32, z: f32| Surfel::disk(glam::Vec3::new(x, y, z), glam::Vec3::Z, 0.1);
+        let surfels: Vec<_> = (0..8).map(|k| at((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32)).collect();
+        for (up, north) in [(Up::Z, DVec3::Y), (Up::Y, DVec3::NEG_Z)] {
+            let scene = Scene { surfels: surfels.clone(), up, ..Scene::default() };
+            let view = |text: &str| {
+                let side = Some(text.parse::<Side>().unwrap());
+                Camera::framing_from((64, 64), Lens::Fov(45.0), &scene, 1e-3, (side, None)).unwrap().0
+            };
+            let elevation = ELEVATION.to_radians();
+            let sides =
+                [("north", north), ("south", -north), ("east", DVec3::X), ("west", -DVec3::X), ("above", up.axis())];
+            for (name, toward) in sides {
+                let camera = view(name);
+                let forward = camera.rotation.row(2);
+                let expected = if name == "above" { 1.0 } else { elevation.cos() };
+                assert!((forward.dot(-toward) - expected).abs() < 1e-9, "{name} {forward}");
+                assert!(surfels.iter().all(|surfel| {
+                    let p = camera.to_camera(DVec3::from_array(surfel.center.map(f64::from)));
+                    let image = [camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy];
+                    p.z > 0.0 && image.iter().all(|at| (0.0..64.0).contains(at))
+                }));
+            }
+            let top = -view("above").rotation.row(1);
+            assert!((top.dot(up.other()) - 1.0).abs() < 1e-9, "{top}");
+            assert!((view("1,0,0").rotation.row(2) + DVec3::X).length() < 1e-9);
+        }
+        assert!("up".parse::<Side>().is_err() && "1,2".parse::<Side>().is_err() && "nan,0,0".parse::<Side>().is_err());
     }
 
     #[test]

@@ -49,6 +49,7 @@ pub use cut::Cut;
 pub use detail::{Detail, DetailMeasure, NodeShape};
 pub use facing::{Facing, PointShape, PointSize};
 pub use fade::Fade;
+pub use framing::Side;
 pub use harmonics::Harmonics;
 pub use hierarchy::Hierarchy;
 pub use join::Join;

@@ -39,6 +39,12 @@ impl Request<'_> {
             );
         }
         if !scene.encoded {
+            if self.hides_what_lies_behind(&settings, scene) {
+                progress.note(
+                    "some colours are translucent, and only the nearest surface shows: --composite layers also draws what \
+                     lies behind",
+                );
+            }
             return Ok(settings);
         }
         let settings = self.settled(true)?;
@@ -50,6 +56,13 @@ impl Request<'_> {
             );
         }
         Ok(settings)
+    }
+
+    /// Whether surfaces are translucent and nobody said how they are composited.
+    fn hides_what_lies_behind(&self, settings: &Settings, scene: &Scene) -> bool {
+        let chosen = self.options.transparency.composite.is_some() || settings.composite != Composite::Opaque;
+        let able = settings.blend != Blend::Nearest && settings.raster.is_none() && scene.triangles.is_empty();
+        !chosen && able && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0)
     }
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {

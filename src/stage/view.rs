@@ -11,7 +11,7 @@ use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
 use crate::options::parse::{up_argument, vector_argument};
 use crate::scene::camera::{DEFAULT_FOV, check_near};
-use crate::scene::{Camera, Lens, Scene, Up};
+use crate::scene::{Camera, Lens, Scene, Side, Up};
 
 /// A view: complete but for values from the scene, such as its centre.
 ///
@@ -36,8 +36,9 @@ struct Given {
 
 #[derive(Clone, Debug)]
 enum Place {
-    /// Framed to show the whole scene, with this direction of up if it is given.
-    Framed(Option<DVec3>),
+    /// Framed to show the whole scene, from this side and with this direction of up if they are
+    /// given.
+    Framed(Option<Side>, Option<DVec3>),
     /// At this eye, looking at the scene's centre, with this direction of up if it is given.
     Eye(DVec3, Option<DVec3>),
     /// A given pose.
@@ -47,7 +48,7 @@ enum Place {
 impl Default for View {
     fn default() -> Self {
         let (size, lens) = (Self::DEFAULT_SIZE, Lens::Fov(DEFAULT_FOV));
-        Self(Kind::Given(Given { size, lens, place: Place::Framed(None), near: None }))
+        Self(Kind::Given(Given { size, lens, place: Place::Framed(None, None), near: None }))
     }
 }
 
@@ -78,7 +79,7 @@ impl View {
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_option(options)?;
         let place = match (options.eye, options.target) {
-            (None, _) => Place::Framed(options.up),
+            (None, _) => Place::Framed(options.from, options.up),
             (Some(eye), None) => Place::Eye(eye, options.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, options.up)),
         };
@@ -142,7 +143,7 @@ impl Given {
     fn checked(self) -> Result<View> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
-            Place::Framed(up) => {
+            Place::Framed(_, up) => {
                 let across = up.filter(|up| *up != DVec3::ZERO).map_or(DVec3::X, |up| up.any_orthogonal_vector());
                 Pose::LookAt(DVec3::ZERO, across, *up)
             }
@@ -165,8 +166,8 @@ impl Given {
     fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or(default_near);
         let (pose, up, by) = match &self.place {
-            Place::Framed(up) => {
-                let (camera, target) = Camera::framing_up(self.size, self.lens, scene, near, *up)?;
+            Place::Framed(side, up) => {
+                let (camera, target) = Camera::framing_from(self.size, self.lens, scene, near, (*side, *up))?;
                 return Ok((camera, Seen { target, up: *up, by: By::Choice }));
             }
             Place::Eye(eye, up) => {

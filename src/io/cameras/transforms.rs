@@ -1,4 +1,5 @@
-//! `transforms.json`: one object, with an object for each picture in `frames`.
+//! `transforms.json`: one object, with an object for each picture in `frames`. A frame may have the
+//! keys of a camera file instead, and a list of frames may stand alone.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -8,7 +9,7 @@ use serde_json::Value;
 
 use super::{NamedCamera, name_of};
 use crate::error::Result;
-use crate::io::camera::{CameraFile, Pose, rigid};
+use crate::io::camera::{CameraFile, Pose, of_value, rigid};
 use crate::io::fault::Fault;
 use crate::io::input::text;
 use crate::io::values::{one_line, shown};
@@ -26,7 +27,7 @@ pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
 
 fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
     let file: Value = serde_json::from_str(text).map_err(|e| format!("not JSON: {}", one_line(&e.to_string())))?;
-    let Some(Value::Array(frames)) = file.get("frames") else {
+    let ((Value::Array(frames), _) | (_, Some(Value::Array(frames)))) = (&file, file.get("frames")) else {
         return Err("it has no list 'frames', as a transforms.json has; a single camera is given with --camera".into());
     };
     let of_frame = |(index, own): (usize, &Value)| {
@@ -48,6 +49,9 @@ impl Frame<'_> {
             None | Some(Value::Null) => format!("{index:04}"),
             Some(path) => path.as_str().and_then(name_of).ok_or("its file_path is not a valid file name")?,
         };
+        if let Some(camera) = self.of_camera_file() {
+            return Ok(NamedCamera { name, camera: camera?, distortion: None });
+        }
         if let Some(model) = self.value("camera_model")
             && !model.as_str().is_some_and(|model| PINHOLES.contains(&model))
         {
@@ -76,6 +80,14 @@ impl Frame<'_> {
         Ok(NamedCamera { name, camera, distortion })
     }
 
+    /// The camera of a frame that has the keys of a camera file; `None` for other frames.
+    fn of_camera_file(&self) -> Option<Result<CameraFile, String>> {
+        let keys = ["eye", "target", "camera_to_world", "world_to_camera"];
+        let mut object = self.own.as_object().filter(|own| keys.iter().any(|key| own.contains_key(*key)))?.clone();
+        object.remove("file_path");
+        Some(of_value(Value::Object(object)))
+    }
+
     /// The lens from focal lengths in pixels, or else from angles. Pixels are square if only one of
     /// fx and fy is known.
     fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
@@ -98,7 +110,7 @@ impl Frame<'_> {
     }
 
     fn pose(&self) -> Result<Pose, String> {
-        let matrix = self.own.get("transform_matrix").ok_or("it has no transform_matrix")?;
+        let matrix = self.own.get("transform_matrix").ok_or("it has neither a transform_matrix nor eye and target")?;
         let rows: [[f64; 4]; 4] =
             serde_json::from_value(matrix.clone()).map_err(|_| "its transform_matrix is not 4 rows of 4 numbers")?;
         let (to_world, eye) = rigid(rows)?;
@@ -170,6 +182,17 @@ mod tests {
     }
 
     #[test]
+    fn frames_may_be_cameras_of_a_camera_file() {
+        let own = r#"{"eye": [0,-5,2], "target": [0,0,0], "up": [0,0,1], "fov": 40, "width": 64, "height": 48}"#;
+        for text in [format!("[{own}, {own}]"), format!(r#"{{"frames": [{own}, {own}]}}"#)] {
+            let cameras = parse(&text, (8, 8)).unwrap();
+            let CameraFile { size, lens, pose, .. } = &cameras[1].camera;
+            assert_eq!((cameras[1].name.as_str(), *size, *lens), ("0001", Some((64, 48)), Lens::Fov(40.0)));
+            assert_eq!(*pose, Pose::LookAt(DVec3::new(0.0, -5.0, 2.0), DVec3::ZERO, Some(DVec3::Z)));
+        }
+    }
+
+    #[test]
     fn what_is_no_set_of_pinholes_is_said() {
         for (shared, own, said) in [
             ("", "", "neither fl_x nor camera_angle_x"),
@@ -190,10 +213,15 @@ mod tests {
         }
         for (text, said) in [
             ("", "not JSON"),
-            ("[]", "no list 'frames'"),
+            ("5", "no list 'frames'"),
+            (r#"[{"eye": [1,2,3]}]"#, "frame 1: the camera needs eye and target"),
+            (r#"[{"eye": [1,2,3], "target": [0,0,0], "fl_x": 5}]"#, "unknown field"),
             (r#"{"frames": 5}"#, "no list 'frames'"),
             (r#"{"frames": [5]}"#, "frame 1: it gives neither"),
-            (r#"{"camera_angle_x": 1, "frames": [{}]}"#, "frame 1: it has no transform_matrix"),
+            (
+                r#"{"camera_angle_x": 1, "frames": [{}]}"#,
+                "frame 1: it has neither a transform_matrix nor eye and target",
+            ),
             (r#"{"camera_angle_x": 1, "frames": [{"file_path": 7}]}"#, "not a valid file name"),
             (r#"{"camera_angle_x": 1, "frames": [{"transform_matrix": [[1]]}]}"#, "not 4 rows"),
         ] {

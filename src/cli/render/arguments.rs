@@ -60,7 +60,7 @@ pub struct Arguments {
 #[derive(Args)]
 #[command(next_help_heading = "Camera")]
 pub(super) struct ViewArguments {
-    /// Many cameras: a transforms.json, or a folder with COLMAP's cameras.txt and images.txt
+    /// Many cameras: a transforms.json, a list of cameras, or a folder of COLMAP's text files
     ///
     /// A transforms.json is one of NeRF, instant-ngp or nerfstudio. Each camera names its image,
     /// folders included

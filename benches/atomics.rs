@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Scatter kernels add every fragment to the sums of its pixel, so they are as fast as the
-//! adapter's atomics. The rows tell which accumulator (`src/passes/accumulate.rs`) is the fastest:
+//! adapter's atomics. The rows show which accumulator (`src/passes/accumulate.rs`) is the fastest:
 //!
 //! - **u32 add**: the cost of each sum with `fixed32`, and the measure for the other rows.
 //! - **u32 add, carry**: `fixed`, with two words per sum and an add to the second where the first
@@ -184,8 +184,8 @@ impl Operation {
     }
 }
 
-/// The distance of consecutive workgroups' tiles in addresses: apart in the column *spread*, else
-/// all at 0.
+/// Distance between the tiles of consecutive workgroups, in addresses. Only in the column *spread*
+/// the tiles are apart; in the others all start at 0.
 fn tile_stride(mask: u32, invocations: u32) -> u32 {
     if mask == SPREAD - 1 { SPREAD / (invocations / GROUP) } else { 0 }
 }
@@ -248,8 +248,8 @@ impl Bench {
         });
         let ones = buffer(Usage::COPY_SRC | Usage::COPY_DST, bytes);
         queue.write_buffer(&ones, 0, &vec![0xff; bytes as usize]);
-        // A graphics card is so fast that the cost of a launch would count, so it does more. f32
-        // stays exact up to 2^24 additions.
+        // On a fast graphics card the cost of a launch would count, so a card does more operations.
+        // f32 stays exact up to 2^24 additions.
         let operations = 1 << if quick { 20 } else { 22 + 2 * u32::from(chosen.kind != "software") };
         Ok(Self {
             name: format!("{} ({}, {})", chosen.name, chosen.api, chosen.kind),

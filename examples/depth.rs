@@ -14,7 +14,7 @@ fn main() -> Result<()> {
     options.maps.aov = vec![Map::Depth];
     let mut renderer = Renderer::new(&scene, &options, &DeviceOptions::default(), &())?;
     let frame = renderer.frame(&View::default(), &())?.frame;
-    // Depth is the distance along the camera's axis; it is infinite where nothing is.
+    // Depth is the distance along the camera's axis; it is infinite in pixels that show no surface.
     let depths = frame.map(Map::Depth).unwrap_or_default().iter().filter(|depth| depth.is_finite());
     let (count, nearest) = depths.fold((0, f32::INFINITY), |(count, nearest), depth| (count + 1, nearest.min(*depth)));
     println!("{count} of {} pixels show the scene, the nearest at {nearest}", frame.color.len());

@@ -26,7 +26,7 @@ fn main() -> Result<()> {
     let rendered = |backend: &str, options: &RenderOptions| -> Result<Frame> {
         let device = DeviceOptions { backend: backend.parse()?, ..DeviceOptions::default() };
         let picture = Renderer::new(&scene, options, &device, &())?.frame(&view, &())?;
-        // A weight that is NaN, infinite, negative or above 1 would be counted here.
+        // The report counts weights that are NaN, infinite, negative or above 1.
         if let Some(wrong) = picture.report.kernel.and_then(|faults| faults.sentence()) {
             println!("{wrong}");
         }

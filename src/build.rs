@@ -1,4 +1,4 @@
-//! Lists the kernels of `wgsl/`, so that a new one is a file and nothing else.
+//! Lists the WGSL files in `wgsl/`, so that a new kernel needs only its file.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -15,7 +15,7 @@ fn main() -> io::Result<()> {
         }
     }
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "wgsl"));
-    // Modules name files without their folders.
+    // Sorted by name alone, as modules refer to files without their folders.
     paths.sort_by(|one, other| one.file_name().cmp(&other.file_name()));
     let mut list = String::from("/// Every file of `wgsl/`: name and text.\npub const FILES: &[(&str, &str)] = &[\n");
     for path in &paths {

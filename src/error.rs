@@ -1,4 +1,4 @@
-//! Failures of a run, each one sentence that names the file, adapter or limit and says what to do.
+//! Errors. Each is one sentence that names the file, adapter or limit and says what to do.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// A file was read, but is not what its format says.
+    /// A file was read, but its content violates its format.
     #[error("{path}: {what}", path = shown(path))]
     Malformed {
         /// The file.
@@ -24,7 +24,7 @@ pub enum Error {
         /// The fault, and its place.
         what: String,
     },
-    /// An output file could not be written; nothing was left behind.
+    /// An output file could not be written; no partial file is left.
     #[error("cannot write {path}: {source}", path = shown(path))]
     Write {
         /// The file that was asked for.
@@ -38,9 +38,9 @@ pub enum Error {
     /// The system has too little memory.
     #[error("the system has no memory for {what}: about {mebibytes} MiB are needed")]
     NoMemory {
-        /// The thing that would take it.
+        /// The data that would need the memory.
         what: String,
-        /// How much that would be, MiB.
+        /// The size of that data, MiB.
         mebibytes: u64,
     },
     /// The inputs together hold nothing to draw.
@@ -56,11 +56,11 @@ pub enum Error {
         adapter: String,
         /// The limit as WebGPU names it.
         limit: &'static str,
-        /// The adapter's limit.
+        /// The adapter's value of the limit.
         available: u64,
-        /// The size that the render needs.
+        /// The value that the render needs.
         needed: u64,
-        /// The use of that size, and what to change.
+        /// The use of that value, and what to change.
         what: String,
     },
     /// The graphics stack failed: out of memory, lost device, rejected shader.
@@ -79,34 +79,34 @@ pub enum Error {
         /// Why there is none.
         source: Box<Error>,
     },
-    /// A benchmark study ran to its end, but its configurations did not do what it says they do.
+    /// A benchmark study ran to its end, but a configuration did not do what the study states.
     #[error("the study {name} failed: {what}")]
     Study {
         /// The study's name.
         name: String,
-        /// Which configuration on which scene, and in what.
+        /// The configuration and scene that failed, and how.
         what: String,
     },
 }
 
-/// A path as a message has it: names may come from a file's content, and hold characters that a
-/// terminal obeys.
+/// Formats a path for a message, without control characters. Paths may come from a file's content,
+/// and a terminal would obey control characters in them.
 fn shown(path: &Path) -> String {
     path.display().to_string().replace(char::is_control, "\u{fffd}")
 }
 
 impl Error {
-    /// A file that is not what its format says.
+    /// Returns the error of a file whose content violates its format.
     pub fn malformed(path: &Path, what: impl Into<String>) -> Self {
         Self::Malformed { path: path.to_owned(), what: what.into() }
     }
 
-    /// A file that could not be read.
+    /// Returns the error of a file that could not be read.
     pub fn read(path: &Path, source: std::io::Error) -> Self {
         Self::Read { path: path.to_owned(), source }
     }
 
-    /// A file that could not be written.
+    /// Returns the error of a file that could not be written.
     pub fn write(path: &Path, source: std::io::Error) -> Self {
         Self::Write { path: path.to_owned(), source }
     }
@@ -120,7 +120,7 @@ impl Error {
         }
     }
 
-    /// This failure, of the picture at `path` of many.
+    /// Wraps this error as that of the picture at `path`, which is one of many.
     pub fn of_view(self, path: &Path) -> Self {
         Self::View { path: path.to_owned(), source: Box::new(self) }
     }

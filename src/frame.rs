@@ -17,17 +17,17 @@ pub struct Frame {
     pub height: u32,
     /// Linear RGB, straight alpha.
     pub color: Vec<[f32; 4]>,
-    /// [`Map::width`] values a pixel.
+    /// The values of each map, [`Map::width`] per pixel.
     maps: BTreeMap<Map, Vec<f32>>,
 }
 
-/// The host memory of a frame while it is encoded and written, bytes per pixel: 48, and 8 for each
+/// The host memory of a frame while it is encoded and written, bytes per pixel: 48, plus 8 for each
 /// value of a map.
 pub fn pixel_bytes(maps: Maps) -> u64 {
     48 + 8 * maps.iter().map(|map| map.width() as u64).sum::<u64>()
 }
 
-/// Numbers are equal by their bits, which may be those of no f32.
+/// Integer maps are compared by their bits, because some are NaN when read as f32.
 impl PartialEq for Frame {
     fn eq(&self, other: &Self) -> bool {
         let same = |map: Map| match map.row().numbers {
@@ -41,14 +41,15 @@ impl PartialEq for Frame {
 }
 
 impl Frame {
-    /// A frame of zeros with `maps`.
+    /// Creates a frame of zeros with `maps`.
     pub fn new(camera: &Camera, maps: Maps) -> Self {
         let pixels = camera.pixels();
         let maps = maps.iter().map(|map| (map, vec![0.0; pixels * map.width()])).collect();
         Self { width: camera.width, height: camera.height, color: vec![[0.0; 4]; pixels], maps }
     }
 
-    /// A frame of no rows, to [`append`](Self::append) to and to extend.
+    /// Creates a frame without rows. It reserves memory for all rows of `camera`, which
+    /// [`append`](Self::append) and `extend` add.
     pub fn empty(camera: &Camera, maps: Maps) -> Self {
         let mut frame = Self::new(&Camera { height: 0, ..camera.clone() }, maps);
         let pixels = camera.pixels();
@@ -57,50 +58,50 @@ impl Frame {
         frame
     }
 
-    /// An image of linear RGB and straight alpha without maps.
+    /// Creates an image of linear RGB and straight alpha, without maps.
     pub fn of_colors(width: u32, height: u32, color: Vec<[f32; 4]>) -> Self {
         Self { width, height, color, maps: BTreeMap::new() }
     }
 
-    /// This frame with a map of [`Map::width`] `values` a pixel.
+    /// Adds a map with its `values`, [`Map::width`] per pixel.
     pub fn with(mut self, map: Map, values: Vec<f32>) -> Self {
         self.maps.insert(map, values);
         self
     }
 
-    /// This frame without a map.
+    /// Removes a map.
     pub fn without(mut self, map: Map) -> Self {
         self.maps.remove(&map);
         self
     }
 
-    /// The maps that there are.
+    /// Returns the maps that the frame has.
     pub fn maps(&self) -> Maps {
         self.maps.keys().fold(Maps::NONE, |maps, map| maps.and(&[*map]))
     }
 
-    /// A map's values, [`Map::width`] of them a pixel.
+    /// A map's values, [`Map::width`] per pixel.
     pub fn map(&self, map: Map) -> Option<&[f32]> {
         self.maps.get(&map).map(Vec::as_slice)
     }
 
-    /// A map's values, to be changed.
+    /// Returns the values of a map for changes; `None` if the frame lacks the map.
     pub fn map_mut(&mut self, map: Map) -> Option<&mut [f32]> {
         self.maps.get_mut(&map).map(Vec::as_mut_slice)
     }
 
-    /// The values of the map of normals, pixel by pixel.
+    /// Returns the normal of each pixel; `None` if the frame has no normals.
     pub fn normals(&self) -> Option<&[[f32; 3]]> {
         self.map(Map::Normal).map(bytemuck::cast_slice)
     }
 
-    /// The values of a map of whole numbers, [`Map::width`] of them a pixel.
+    /// The values of a map of integers, [`Map::width`] per pixel.
     pub fn numbers(&self, map: Map) -> Option<&[u32]> {
         self.map(map).filter(|_| map.row().numbers).map(bytemuck::cast_slice)
     }
 
-    /// Appends pixels with these `colors`, and zeros in each map. Returns the index of the first.
-    /// The height stays.
+    /// Appends pixels with these `colors` and zeros in each map. Returns the index of the first new
+    /// pixel. The caller sets the height.
     pub(crate) fn extend(&mut self, colors: impl IndexedParallelIterator<Item = [f32; 4]>) -> usize {
         let first = self.color.len();
         // Colours are written once: filling an image with zeros first takes as long as the rest of
@@ -110,7 +111,7 @@ impl Frame {
         first
     }
 
-    /// Puts the rows of `below` under these; both have the same width and maps.
+    /// Appends the rows of `below`, which has the same width and maps.
     pub fn append(&mut self, below: Self) {
         self.height += below.height;
         self.color.extend(below.color);

@@ -1,8 +1,8 @@
 //! Headless rendering of surfels and point clouds with compute kernels only.
 //!
-//! A surfel is an oriented elliptical disk. Rendering blends the disks that make up the nearest
-//! surface at each pixel (Pajarola et al. 2003, Botsch et al. 2005), in four stages, each a file of
-//! [`low_level::passes`] with a kernel and an f64 twin:
+//! A surfel is an oriented elliptical disk. At each pixel, rendering blends the disks that make up
+//! the nearest surface (Pajarola et al. 2003, Botsch et al. 2005). It has four stages. Each stage
+//! is a file of [`low_level::passes`] with a kernel and an f64 twin:
 //!
 //! ```text
 //! splats = project(surfels, camera)             (u, v, 1)/z = [s t p]^-1 K^-1 (x, y, 1)
@@ -13,13 +13,14 @@
 //!
 //! Four rules make it one design:
 //!
-//! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in
-//!    any order.
-//! 2. Kernels contain only what a scene needs: [`low_level::plan::SceneNeeds`] chooses the files
-//!    that are joined.
-//! 3. WGSL states a layout, [`low_level::gpu::layout`] mirrors it, a test decides.
-//! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend
-//!    without an adapter.
+//! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits,
+//!    in any order of its surfels.
+//! 2. Kernels contain only what a scene needs: [`low_level::plan::SceneNeeds`] chooses the WGSL
+//!    files that are joined.
+//! 3. WGSL defines each struct that host and device share, [`low_level::gpu::layout`] mirrors
+//!    it, and a test compares the two.
+//! 4. Every kernel has an f64 twin. Error figures are measured against the twins, which also
+//!    render where there is no adapter.
 //!
 //! ```
 //! use epsplat::{DeviceOptions, Map, Points, Renderer, RenderOptions, Scene, SceneOptions, View};
@@ -63,7 +64,7 @@ pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
 pub use stage::{Files, Picture, ReadReport, Renderer, Scene, View, ViewReport};
 
-// Inside the library modules are named from the root.
+// Modules inside the library import these as `crate::...`, without `low_level`.
 #[cfg(feature = "bench")]
 use low_level::{bench, hardcases, metrics, report};
 use low_level::{frame, gpu, passes, plan, render, scene, surfels, truth};

@@ -1,8 +1,8 @@
-//! All else: the stages, the data and the measures that the front door is made of.
+//! The parts that the [crate root](crate) is built from: stages, data and measurements.
 //!
 //! These modules are for research and for tests: a kernel, a plan or a pass can be looked at and
 //! replaced. They change from version to version without notice. Programs that want pictures use
-//! the items of the [crate root](crate).
+//! the crate root.
 
 #[cfg(feature = "bench")]
 #[path = "bench/mod.rs"]

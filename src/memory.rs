@@ -1,14 +1,14 @@
-//! Memory that is asked for before it is taken in many parts, each of which would end the program
-//! where there is none.
+//! Checks that memory is available before it is allocated in many parts. A failed allocation of a
+//! part would end the program.
 
 use crate::{Error, Result};
 
-/// Makes sure that the system gives about so many bytes, which `what` is about to take. They are
-/// given back at once.
+/// Checks that the system can provide this many bytes, by one allocation that is freed at once.
+/// `what` names in the error what needs the memory.
 ///
 /// # Errors
 ///
-/// [`Error::NoMemory`].
+/// [`Error::NoMemory`] if the allocation fails.
 pub(crate) fn check(bytes: u64, what: impl FnOnce() -> String) -> Result<()> {
     let room = Vec::<u8>::new().try_reserve_exact(usize::try_from(bytes).unwrap_or(usize::MAX));
     room.map_err(|_| Error::NoMemory { what: what(), mebibytes: bytes.div_ceil(1 << 20) })

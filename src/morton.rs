@@ -1,6 +1,6 @@
 //! Morton codes: the bits of three coordinates, interleaved.
 
-/// Puts two zeros before each of the lower 21 bits.
+/// Inserts two zeros before each bit of a number, which is clamped to 21 bits.
 pub(crate) fn spread(x: u64) -> u64 {
     let mut x = x.min(0x1f_ffff);
     x = (x | x << 32) & 0x1f_0000_0000_ffff;
@@ -10,7 +10,8 @@ pub(crate) fn spread(x: u64) -> u64 {
     (x | x << 2) & 0x1249_2492_4924_9249
 }
 
-/// The code of a cell.
+/// The Morton code of a cell: x in the lowest bit, then y, then z. Coordinates are clamped to 21
+/// bits.
 pub(crate) fn code([x, y, z]: [u64; 3]) -> u64 {
     spread(x) | spread(y) << 1 | spread(z) << 2
 }

@@ -3,9 +3,9 @@
 /// Receives the progress of work that may take seconds. Stages follow each other; `advance` may be
 /// called from any thread.
 pub trait Progress: Sync {
-    /// A stage begins: `what` it does, and how many `units` it will take (0 if that is not known).
+    /// A stage begins. `what` describes it, and `units` is its amount of work (0 if unknown).
     fn begin(&self, what: &str, units: u64);
-    /// So many units more are done.
+    /// This many more units are done.
     fn advance(&self, units: u64);
     /// The stage is over.
     fn end(&self);
@@ -14,7 +14,7 @@ pub trait Progress: Sync {
     fn note(&self, _line: &str) {}
 }
 
-/// Nobody watches.
+/// Ignores all progress.
 impl Progress for () {
     fn begin(&self, _what: &str, _units: u64) {}
     fn advance(&self, _units: u64) {}

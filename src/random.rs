@@ -1,10 +1,11 @@
-//! Seeded numbers, the same on every machine: SplitMix64 (Steele, Lea and Flood 2014).
+//! Pseudorandom numbers from a seed, the same on every machine: SplitMix64 (Steele, Lea and Flood
+//! 2014).
 
-/// A stream of numbers.
+/// A stream of pseudorandom numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct Random(u64);
 
-/// Spreads the bits of a word over all of it: the generator's finaliser.
+/// The generator's finaliser: mixes all bits of a word.
 pub(crate) fn mixed(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -27,7 +28,7 @@ impl Random {
         mixed(self.0)
     }
 
-    /// In [0, 1).
+    /// The next number of the stream, in [0, 1).
     pub(crate) fn number(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }

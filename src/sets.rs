@@ -1,15 +1,16 @@
-//! Sets of numbers that are united until all that belong together are one.
+//! Disjoint sets of numbers, which can be united (union-find).
 
-/// Each of the numbers from 0 is in one set.
+/// The numbers from 0 on, each in one set. An entry is the number itself or a smaller one of its
+/// set.
 pub(crate) struct Sets(Vec<u32>);
 
 impl Sets {
-    /// Each of so many numbers by itself.
+    /// Puts each number below `count` into a set of its own.
     pub fn new(count: usize) -> Self {
         Self((0..count as u32).collect())
     }
 
-    /// The least number of the set that a number is in.
+    /// Returns the least number of the set that contains `number`.
     pub fn least(&mut self, mut number: u32) -> u32 {
         while self.0[number as usize] != number {
             self.0[number as usize] = self.0[self.0[number as usize] as usize];
@@ -18,7 +19,7 @@ impl Sets {
         number
     }
 
-    /// Makes the sets of two numbers one.
+    /// Unites the sets that contain two numbers.
     pub fn unite(&mut self, a: u32, b: u32) {
         let [a, b] = [a, b].map(|number| self.least(number));
         self.0[a.max(b) as usize] = a.min(b);

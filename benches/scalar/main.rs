@@ -6,9 +6,9 @@
 //!
 //! [`program`] renders the same picture of an opaque, unlit sphere of 8-bit colours as `epsplat`:
 //! the kernels must be worth their cost on a machine that has only a processor. The program's
-//! surfels lie in the renderer's order, and its buffers stay from frame to frame as the renderer's
-//! do, so both times are those of a frame alone, from the scene to the image in host memory. Both
-//! alternate, so that a busy machine slows both alike; the medians are printed.
+//! surfels lie in the renderer's order. Its buffers stay from frame to frame, as the renderer's do,
+//! so both times are those of a frame alone, from the scene to the image in host memory. Frames of
+//! both alternate, so that a busy machine slows both alike; the medians are printed.
 //!
 //! Before timing, two images are compared with the renderer's: the program's, which must match, and
 //! one with a wrong kernel, which must not. Otherwise the benchmark fails.
@@ -70,7 +70,7 @@ fn error(found: &Frame, expected: &Frame) -> Result<[f64; 2]> {
     Ok([compare(&a, &b)?.rmse, compare(found, expected)?.coverage_mismatch])
 }
 
-/// Whether the errors are those of the same image.
+/// Whether the errors are small enough for images of the same scene.
 fn passes([rmse, mismatch]: [f64; 2]) -> bool {
     rmse < MOST_RMSE && mismatch < MOST_MISMATCH
 }

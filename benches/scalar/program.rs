@@ -5,7 +5,7 @@
 //! 1. **project**, in f32: each thread turns half of the surfels into splats, and puts each splat
 //!    into the buckets of all strips of [`ROWS`] rows that it may touch. The disk is exact in
 //!    perspective, as in `src/passes/homography.rs`.
-//! 2. **visibility**: a thread takes the next strip and finds the largest 1/z at each pixel. It is
+//! 2. **visibility**: a thread takes the next strip and finds the largest 1/z at each pixel. 1/z is
 //!    linear along a row, so nothing is divided. The pixels of a row that a disk covers lie between
 //!    the roots of a quadratic, so no pixel is tested. Splats that face away come last, and are
 //!    skipped where every tile under them is nearer already.
@@ -15,7 +15,7 @@
 //! 4. **resolve**: divides by the weight.
 //!
 //! Another way to share the work took 1.3 times as long for 100,000 and 1,000,000 surfels: each
-//! thread draws half of the splats into depths and sums of the whole image, which are merged after
+//! thread drew half of the splats into depths and sums of the whole image, which were merged after
 //! each pass. Strips of 8 to 128 rows took the same time within a tenth.
 
 use std::sync::Mutex;
@@ -100,8 +100,8 @@ struct Bucket {
 
 /// Pass 1: returns the splat of a surfel and whether it faces away.
 ///
-/// Returns `None` if it touches no pixel, is seen edge-on, or reaches the near depth, which no
-/// surfel of these scenes does.
+/// Returns `None` if the surfel touches no pixel, is seen edge-on, or reaches the near depth, which
+/// no surfel of these scenes does.
 fn project(surfel: &Surfel, color: [u8; 4], view: &View) -> Option<(bool, Splat)> {
     let p = view.rotation * (Vec3::from_array(surfel.center) - view.eye);
     let s = view.rotation * Vec3::from_array(surfel.s);

@@ -10,7 +10,7 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::timing::Timing;
 use crate::report::Summary;
 
-/// Target duration of a timed run in seconds; makes submission and waiting negligible.
+/// Target duration of a timed run, seconds: long enough that submission and waiting are negligible.
 const RUN: f64 = 0.1;
 
 /// The largest number of copies in a timed run.
@@ -34,14 +34,15 @@ pub struct CopyBandwidth {
     pub runs: u32,
     /// Bytes read and written per second, in GB/s (10^9 bytes), by [`clock`](Self::clock).
     pub gb_per_second: Summary,
-    /// The same by the host's clock, from submission until the device is idle.
+    /// The same bandwidth by the host's clock, from submission until the device is idle.
     pub wall_gb_per_second: Summary,
     /// The clock of `gb_per_second`: `timestamps` (of the device) or `wall`.
     pub clock: &'static str,
 }
 
 impl CopyBandwidth {
-    /// Measures `gpu` in `runs` runs on a buffer of `bytes`, or of the adapter's limit if smaller.
+    /// Measures `gpu` in `runs` runs on a buffer of `bytes` bytes, or of the adapter's buffer limit
+    /// if that is smaller.
     ///
     /// # Errors
     /// Any error of the device, and a copy that differs from its source.
@@ -76,7 +77,7 @@ fn trusted(wall: f64, device: Option<f64>) -> Option<f64> {
     device.filter(|device| (TRUSTED[0] * wall..=TRUSTED[1] * wall).contains(device))
 }
 
-/// A buffer, and the one that it is copied to.
+/// A buffer and the buffer that it is copied to.
 struct Pair {
     from: Buffer<u32>,
     into: Buffer<u32>,

@@ -9,7 +9,7 @@ use crate::frame::Frame;
 use crate::plan::Settings;
 use crate::render::{Backend, DeviceBytes};
 
-/// One scene of a study's sweep, with the backend of the configurations that need an adapter.
+/// One point of a scene's sweep, with the backend of the configurations that need an adapter.
 pub(super) struct Case<'a> {
     pub definition: &'a Definition,
     pub entry: &'a SceneEntry,
@@ -28,7 +28,7 @@ pub(super) struct Timed<'a> {
     /// Frames of the last run, one per camera.
     pub frames: Vec<Frame>,
     pub bytes: DeviceBytes,
-    /// Surfels and octree nodes in the cut that is drawn, mean over the cameras; `None` without
+    /// Number of surfels and octree nodes in the drawn cut, mean over the cameras; `None` without
     /// levels of detail.
     pub cut: Option<f64>,
     /// Whether the frames of the last run are bit-identical to those of the warm-up.

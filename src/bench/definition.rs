@@ -46,7 +46,7 @@ pub struct Definition {
     /// The configurations, `[[config]]` in the file.
     #[serde(rename = "config", default)]
     pub configs: Vec<Config>,
-    /// The folder of the definition, which paths in it are relative to.
+    /// The folder of the definition's file. Paths in the definition are relative to this folder.
     #[serde(skip)]
     pub(super) folder: PathBuf,
 }
@@ -67,14 +67,14 @@ pub struct Quick {
 pub struct SceneEntry {
     /// The name, unique in the study.
     pub name: String,
-    /// A point cloud or mesh, relative to the definition's folder. Needs no `shape` beside it.
+    /// The path of a point cloud or mesh, relative to the definition's folder; excludes `shape`.
     pub file: Option<PathBuf>,
     /// The place to download the file from, shown if the file is missing.
     pub source: Option<String>,
     /// How surfels are made from the file; by default as `epsplat render` does.
     #[serde(default)]
     pub surfels: Making,
-    /// The priority by which voxels are given samples of a mesh, as for `epsplat sample`.
+    /// Which voxels get more samples of a mesh: the priority of `epsplat sample`.
     #[serde(default, deserialize_with = "parsed")]
     pub priority: Option<Priority>,
     /// Whether surfels keep their clip lines and curvature; by default both.
@@ -100,7 +100,7 @@ pub struct SceneEntry {
     /// triangles meet is compared with the true one.
     #[serde(default, deserialize_with = "parsed")]
     pub triangles: Option<Beside>,
-    /// Number of surfels of the shape, or to sample from the mesh.
+    /// Number of surfels of the shape, or of samples of the mesh.
     pub count: Option<OneOrMany<u64>>,
     /// Disk radius of a shape's surfels in mean spacings; by default as in `epsplat generate`.
     pub radius: Option<f64>,
@@ -185,15 +185,16 @@ pub enum Making {
     Projected,
     /// As [`Sample`](Self::Sample), with the mesh's curvature around each sample.
     Caps,
-    /// From `count` samples of a mesh or shape with only their normals, as `epsplat render` does.
+    /// From positions and normals of `count` samples of a mesh or shape, as `epsplat render` does.
     Scanned,
-    /// From `count` random points of a mesh with its normals; ellipses contain their cells.
+    /// From `count` random points on a mesh and the mesh's normals; ellipses contain the points'
+    /// cells.
     Uniform,
     /// As `epsplat hybrid` does: samples of a mesh, and the triangles that remain.
     ///
-    /// The mesh's diagonal is seen as `count` pixels long.
+    /// The pixel size is chosen so that the mesh's diagonal is `count` pixels long.
     Hybrid,
-    /// The surfels and nodes in the configurations' cuts of a file of `epsplat lod`, read in parts.
+    /// From a file of `epsplat lod`: only surfels and nodes in the configurations' cuts are read.
     Levels,
     /// No surfels: `count` triangles approximate a shape.
     ///

@@ -1,4 +1,5 @@
-//! Scenes from files of `epsplat lod` that do not fit in memory: only the cuts of a study are read.
+//! Prepares scenes from files of `epsplat lod` that do not fit in memory: only the cuts that a
+//! study draws are read.
 
 use std::path::Path;
 
@@ -36,12 +37,13 @@ pub(super) fn stage(
     let views: Vec<_> =
         cameras.iter().flat_map(|camera| options.iter().map(move |options| (camera, options))).collect();
     let (scene, _) = taken(&levels, &views, |_| Ok(()), progress)?;
-    // The mean over the surfels that were read, not over the whole file.
+    // This mean is over the surfels that were read, not over the whole file.
     let footprint_px = footprint(&scene, &cameras);
     Ok(Staged { scene, cameras, surface: None, dressed: false, footprint_px })
 }
 
-/// Adds the maps of the f64 reference, so that the cut also holds what the reference draws.
+/// Adds the maps that the f64 reference renders with, so that the part has all that the reference
+/// draws.
 ///
 /// The reference may take one sample where the configuration takes several, and may draw back faces
 /// that the configuration culls.

@@ -16,7 +16,8 @@ use crate::truth::{Surface, Truth};
 /// The longer side of the report's pictures, pixels.
 const PICTURE_SIDE: usize = 512;
 
-/// The maps of the reference that errors need: fragment counts, and pixels to excuse.
+/// The maps of the reference that errors need: fragment counts, and decisions, which mark excused
+/// pixels.
 pub(super) const OF_REFERENCE: [Map; 2] = [Map::Count, Map::Decision];
 
 /// The error of a configuration against the f64 reference.
@@ -29,7 +30,8 @@ pub(super) struct Errors {
     pub picture: ImageSet,
 }
 
-/// Groups equal keys: each key with the indices of its items, in order of first occurrence.
+/// Groups items by key. Returns each key with the indices of its items, in order of first
+/// occurrence.
 fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> {
     let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
     for (index, key) in keys.enumerate() {
@@ -43,14 +45,14 @@ fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> 
 
 /// Compares all configurations with the f64 reference.
 ///
-/// Configurations that differ only in how sums are kept share one render of the reference.
+/// Configurations that differ only in how they store sums share one render of the reference.
 pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
     let default = Settings::default();
     let maps = Maps::of(&OF_REFERENCE);
     let key = |timed: &Timed<'_>| Settings {
         accumulator: default.accumulator,
-        // Peeled layers differ from those of fragment lists, so the rasteriser has a reference of
-        // its own.
+        // The rasteriser's peeled layers differ from layers of fragment lists, so they need another
+        // reference.
         raster: timed.options.raster.filter(|_| matches!(timed.options.composite, Composite::Layers(_))),
         maps,
         ..timed.options.clone()
@@ -116,8 +118,8 @@ pub(super) fn against_truth(
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];
-            // Points that face the camera have no normals of their own, and without blending no
-            // normal is stored.
+            // Normals are compared only if surfels have normals, which points turned to the camera
+            // lack, and if blending stores them.
             let normals = timed.options.facing.is_none() && timed.options.blend == Blend::Weighted;
             let wanted: &[Map] = if normals { &[Map::Depth, Map::Normal] } else { &[Map::Depth] };
             let maps = timed.options.maps.and(wanted);
@@ -135,9 +137,10 @@ pub(super) fn against_truth(
     Ok(worst)
 }
 
-/// Measures where surfels and triangles meet: wrong pixels and the offset of the visible curve.
+/// Measures errors where surfels and triangles meet: wrong pixels and the offset of the visible
+/// curve.
 ///
-/// The worst over the cameras, as `wrong_winner_rate` and `curve_offset_px`.
+/// Stores the worst values over the cameras as `wrong_winner_rate` and `curve_offset_px`.
 fn beside_joint(
     case: &Case<'_>,
     timed: &Timed<'_>,
@@ -165,9 +168,9 @@ fn beside_joint(
     Ok(())
 }
 
-/// Measures the share of covered pixels that blend the first input with another, as `mixed_rate`.
+/// Measures the share of covered pixels that blend the first input with another input.
 ///
-/// The worst over the cameras.
+/// Stores the worst value over the cameras as `mixed_rate`.
 fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<String, f64>) -> Result<()> {
     let scene = &case.staged.scene;
     let all = 0..scene.surfels.len() as u64;
@@ -201,8 +204,8 @@ fn in_own_colors(options: &Settings) -> Settings {
 
 /// Returns `apart_rmse` and `apart_psnr_db` of configurations that approximate another.
 ///
-/// The error against the f64 reference of the other configuration, the worst over the cameras. No
-/// pixel is excused: detail that the approximation omits or adds is part of its error.
+/// Both state the error against the f64 reference of the other configuration, the worst over the
+/// cameras. No pixel is excused: detail that the approximation omits or adds is part of its error.
 pub(super) fn against_approximated(
     case: &Case<'_>,
     timed: &[Timed<'_>],
@@ -225,7 +228,7 @@ pub(super) fn against_approximated(
     Ok(apart)
 }
 
-/// Measures whose smaller value is the worse one.
+/// The measures for which a smaller value is worse.
 const LESS_IS_WORSE: [&str; 3] = ["psnr_db", "ssim", "silhouette_iou"];
 
 fn join_worst(worst: &mut BTreeMap<String, f64>, error: &Reconstruction) {
@@ -267,7 +270,8 @@ pub(super) fn compare_with_raster(measurements: &mut [Measurement]) {
 
 /// Shrinks the colours of both images by an integer factor to at most [`PICTURE_SIDE`].
 ///
-/// Both keep the pixel of each block in which they differ most, so that no error is averaged away.
+/// Both images keep that pixel of each block in which they differ most, so that no error is
+/// averaged away.
 fn small_pair(image: &Frame, reference: &Frame) -> (Frame, Frame) {
     let (width, height) = (image.width as usize, image.height as usize);
     let factor = width.max(height).div_ceil(PICTURE_SIDE).max(1);

@@ -34,7 +34,8 @@ fn commit(folder: &Path) -> Option<String> {
     let is_own =
         read(root.join("Cargo.toml")).is_some_and(|text| text.lines().any(|line| line == "name = \"epsplat\""));
     let git = Some(root.join(".git")).filter(|_| is_own)?;
-    // In a further work tree `.git` is a file that names the folder; branches lie in the first.
+    // In a linked worktree, `.git` is a file that names the worktree's Git folder. Branches lie in
+    // the Git folder of the main worktree.
     let own = match read(git.clone()) {
         Some(text) => root.join(text.strip_prefix("gitdir: ")?),
         None => git,

@@ -258,7 +258,7 @@ impl Config {
     }
 }
 
-/// Formats a TOML error with the line and the key of `text` that it is in.
+/// Formats a TOML error with its line and its key in `text`.
 fn located(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', ", ");
     let Some(span) = error.span() else { return message };

@@ -31,9 +31,10 @@ pub struct Outcome {
 
 /// Renders every configuration on every scene.
 ///
-/// Times are of whole frames, from the uploaded scene to the frame in host memory. Errors are the
-/// worst over the cameras against the f64 reference with the same options; the pixels that it
-/// excuses do not count ([`Comparison::rmse_decided`](crate::metrics::Comparison::rmse_decided)).
+/// Times are of whole frames, from the uploaded scene to the frame in host memory. Errors are those
+/// against the f64 reference with the same options, the worst over the cameras. Pixels that the
+/// reference excuses do not count
+/// ([`Comparison::rmse_decided`](crate::metrics::Comparison::rmse_decided)).
 ///
 /// All configurations of a scene hold their device buffers at the same time. Configurations that
 /// the adapter cannot run are skipped with a note.
@@ -92,7 +93,7 @@ impl<'a> Case<'a> {
         scene.part_of.as_ref().map_or(scene.surfels.len() as u64, |whole| whole.surfels.into())
     }
 
-    /// Number of surfels on the device, plus the nodes that were read of a scene read in parts.
+    /// Number of surfels on the device, plus octree nodes if the scene is read in parts.
     fn held(&self) -> u64 {
         let Scene { surfels, hierarchy, part_of, .. } = &self.staged.scene;
         let nodes = hierarchy.as_ref().filter(|_| part_of.is_some()).map_or(0, |tree| tree.nodes.len());
@@ -146,7 +147,8 @@ impl<'a> Case<'a> {
         Ok(())
     }
 
-    /// Renders a warm-up turn of each configuration, then the timed runs, in which they take turns.
+    /// Renders one warm-up per configuration, then the timed runs, in which configurations take
+    /// turns.
     fn time<'p>(
         &self,
         plans: &'p [(&'p Config, Settings)],
@@ -157,7 +159,8 @@ impl<'a> Case<'a> {
             .begin(&format!("timing {}", self.entry.name), plans.len() as u64 * u64::from(1 + self.definition.runs));
         let mut runners = Vec::new();
         for (config, options) in plans {
-            // A configuration that the adapter cannot draw is left out; a kernel file is mended.
+            // A configuration that the adapter cannot draw is skipped. With a kernel file of the
+            // user, any error ends the study, as the file may be at fault.
             let unfit = |error| if options.sources.is_empty() { Unfit::Adapter(error) } else { Unfit::Failed(error) };
             let renderer = Renderer::new(&self.staged.scene, options, self.backend(config)).map_err(unfit);
             let warm_up = renderer.and_then(|mut renderer| {
@@ -245,7 +248,8 @@ impl<'a> Case<'a> {
         Ok(lap)
     }
 
-    /// Adds to a graphics error the configuration and how many others hold device buffers.
+    /// Adds the configuration, and the number of others that hold device buffers, to a graphics
+    /// error.
     fn failed(&self, config: &Config, beside: usize, error: Error) -> Error {
         match error {
             Error::Gpu { adapter, what } => {
@@ -307,7 +311,7 @@ struct Lap {
 
 /// The reason why a configuration does not run.
 enum Unfit {
-    /// The adapter lacks a feature or exceeds a limit: the configuration is skipped.
+    /// The adapter lacks a feature, or its limits are too low: the configuration is skipped.
     Adapter(Error),
     /// Any other error, which ends the study.
     Failed(Error),

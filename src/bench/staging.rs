@@ -42,7 +42,7 @@ pub(super) struct Staged {
     pub scene: Scene,
     /// The cameras; at least one.
     pub cameras: Vec<Camera>,
-    /// The true surface of the surfels and the triangles beside them; `None` without ground truth.
+    /// The true surface of surfels and triangles; `None` without ground truth.
     pub surface: Option<Surface>,
     /// Whether a second input lies over the first ([`SceneEntry::shirt`]).
     pub dressed: bool,
@@ -50,7 +50,8 @@ pub(super) struct Staged {
     pub footprint_px: f64,
 }
 
-/// Memory in bytes: per surfel of a shape until it is in a scene, and per pixel of a frame.
+/// Estimated memory, bytes: per surfel of a shape while the scene is built, and per pixel of a
+/// frame.
 const OF_SURFEL: u64 = 250;
 const OF_PIXEL: u64 = 16;
 
@@ -85,7 +86,7 @@ pub(super) fn stage(
     })
 }
 
-/// Points, the surface that they stand for where ground truth is asked for, and triangles.
+/// Points, their true surface if the scene asks for ground truth, and triangles to draw.
 type Made = (Points, Option<Surface>, Option<Mesh>);
 
 fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dyn Progress) -> Result<Staged> {
@@ -140,7 +141,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
 }
 
-/// The points of a scene before they are simplified, their surface, and the triangles that stay.
+/// Returns the points of a scene before simplification, their true surface, and triangles to draw.
 fn source(
     definition: &Definition,
     entry: &SceneEntry,
@@ -169,7 +170,8 @@ fn source(
             let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
             (Points { radii, ..points }, surface, None)
         }
-        // Unreachable: a definition without file and shape is refused. Here it is an empty scene.
+        // Unreachable, as a definition with neither file nor shape is refused; gives an empty
+        // scene.
         (None, None) => (Points::default(), None, None),
     })
 }
@@ -302,7 +304,7 @@ fn of_file(
     Ok((points, surface, left))
 }
 
-/// Reads a file's points with all that they have.
+/// Reads a file's points with all their attributes.
 fn as_they_are(file: &Path, entry: &SceneEntry, progress: &dyn Progress) -> Result<Points> {
     let classes = entry.classes.unwrap_or_default();
     let points = io::read_with(file, ReadOptions { classes, strict: true, ..ReadOptions::default() }, progress)?;

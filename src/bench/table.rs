@@ -14,10 +14,10 @@ const NONE: &str = "-";
 /// Formats a table with one line per measurement.
 ///
 /// Columns: scene, configuration, surfels, footprint, ms per frame (median ± median absolute
-/// deviation), time over the baseline's, largest error and RMSE against the f64 reference; against
-/// ground truth PSNR, SSIM, mean errors of depth and normal, holes and leaks; PSNR against the
-/// approximated configuration, surfels of a cut, speed over the fastest rasteriser of at most the
-/// same error, and error limit. Columns that would be empty are left out.
+/// deviation), time divided by the baseline's, largest error and RMSE against the f64 reference;
+/// against ground truth PSNR, SSIM, mean errors of depth and normal, holes and leaks; PSNR against
+/// the approximated configuration, surfels of a cut, speed over the fastest rasteriser of at most
+/// the same error, and error limit. Columns that would be empty are left out.
 pub fn text(definition: &Definition, study: &Study) -> String {
     let all = &study.measurements;
     let optional = |value: Option<f64>, digits: usize| value.map_or(NONE.to_owned(), |v| format!("{v:.digits$}"));
@@ -80,7 +80,7 @@ fn legend(all: &[Measurement]) -> String {
 
 /// Formats a Markdown table per scene.
 ///
-/// Columns: configuration, time over the baseline's, largest error and RMSE against the f64
+/// Columns: configuration, time divided by the baseline's, largest error and RMSE against the f64
 /// reference, whether the bits are the same in any surfel order, and which adapters run it.
 pub fn markdown(definition: &Definition, study: &Study) -> String {
     let baseline = definition.baseline.as_deref().unwrap_or("baseline");
@@ -120,7 +120,7 @@ fn same_case(a: &Measurement, b: &Measurement) -> bool {
     a.scene == b.scene && a.surfels == b.surfels && a.footprint_px == b.footprint_px
 }
 
-/// Returns the median time over the baseline's in the same case; `None` without a baseline.
+/// Returns the median time divided by the baseline's in the same case; `None` without a baseline.
 pub(super) fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
     let baseline = definition.baseline.as_ref()?;
     let base = study.measurements.iter().find(|m| m.config == *baseline && same_case(m, of))?;

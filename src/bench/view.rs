@@ -36,7 +36,7 @@ pub(super) fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Sce
     Ok((0..entry.views).map(turned).collect())
 }
 
-/// The mean footprint: the longer half-axis of a splat in pixels, over all surfels and cameras.
+/// Returns the mean of a splat's longer half-axis in pixels, over all surfels and cameras.
 ///
 /// Each surfel is taken as seen face-on at the depth of its centre. Surfels nearer than the near
 /// depth are skipped. The sum is in a fixed order, so the result is reproducible.

@@ -18,8 +18,8 @@ use super::{note, outputs, print};
 /// Run a study of speed beside error: every configuration on every scene of a TOML file.
 ///
 /// Runs of the configurations alternate, so a machine that slows down slows all of them. Errors are
-/// against the f64 reference with the same options, over the pixels that it does not excuse, and
-/// against ray-cast ground truth for scenes that ask for it.
+/// measured against the f64 reference with the same options, except in pixels that the reference
+/// excuses. Scenes that ask for it are also compared with ray-cast ground truth.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat bench benches/accumulators.toml --quick --out report\n\n\
     Exits with 1, after everything is written, if a configuration misses its error limit or, where its bits must not\n\
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Run the definition's quick form, which takes some seconds
     #[arg(long)]
     quick: bool,
-    /// Print Markdown instead: times relative to the baseline, errors, equal bits, adapters
+    /// Print a Markdown table instead: times relative to the baseline, errors, equal bits, adapters
     #[arg(long)]
     table: bool,
     /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Folder for the records
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Run a short form of less than a minute, which tries every step before a long run
+    /// Try every step in less than a minute, before a long run
     #[arg(long)]
     quick: bool,
     /// Time limit in minutes; a frame or scene that has started is finished

@@ -19,7 +19,7 @@ use super::{outputs, print, write_json};
 pub struct Arguments {
     /// Image to measure: .png or .exr
     a: PathBuf,
-    /// Image that it is compared with, which counts as exact: .png or .exr
+    /// Image to compare A with, which counts as exact: .png or .exr
     b: PathBuf,
     /// Write the measures as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Err(Error::malformed(&arguments.a, what))
 }
 
-/// Printed in place of an error if a value is not finite and differs in the other image.
+/// Text in place of an error, if a value is not finite in one image and differs in the other.
 const NOT_FINITE: &str = "not finite";
 
 fn read(path: &Path) -> Result<Frame> {

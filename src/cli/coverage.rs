@@ -1,4 +1,5 @@
-//! `epsplat coverage`: measures holes of surfels that represent a mesh, and their distance to it.
+//! `epsplat coverage`: measures holes between surfels that represent a mesh, and distances to the
+//! mesh.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -17,12 +18,12 @@ use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print, write_json};
 
-/// Measure holes of surfels that represent a mesh, and their distance from it.
+/// Measure holes between surfels that represent a mesh, and the surfels' distance from the mesh.
 ///
-/// Rays are cast at the mesh from all directions. A ray is covered if it hits a disk within the
-/// disk's radius of the point where the ray first meets the mesh. An uncovered ray is an edge if it
-/// lies at an outline or a step in depth, which flat disks cut off, and otherwise a hole. Nothing
-/// is rendered, so no filter and no epsilon hides a hole.
+/// Rays are cast at the mesh from all directions. A ray is covered if it hits a disk near the point
+/// where the ray first meets the mesh, at most the disk's radius away. An uncovered ray counts as
+/// an edge if it lies at an outline or a step in depth, which flat disks cut off, and otherwise as
+/// a hole. Nothing is rendered, so no filter and no epsilon hides a hole.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
 pub struct Arguments {

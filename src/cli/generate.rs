@@ -13,9 +13,9 @@ use super::{note, outputs};
 /// Write an analytic shape as PLY: surfels with exact normals, radii and colours.
 ///
 /// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1
-/// and 0.4), crossing (two squares), plane (a square of side 2, one colour), checkerboard (the same
-/// with 32x32 squares) or text (the same with lines of text, each half as high as the one above).
-/// Radii are 1.5 times the spacing.
+/// and 0.4), crossing (two squares), plane (a square of side 2, one colour), checkerboard (the
+/// plane with 32x32 squares) or text (the plane with lines of text, each line half as high as the
+/// line above). Radii are 1.5 times the spacing.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
     epsplat generate torus --count 20000 --texture -o torus.ply\n  \
@@ -28,14 +28,14 @@ pub struct Arguments {
     count: u64,
     /// Also write texture coordinates, for render --texture
     ///
-    /// On spheres and the torus they are turns around the upward axis and, upward, latitudes or
-    /// turns around the tube; on squares positions across and up
+    /// On spheres they are the angle around the upward axis and the latitude, on the torus the
+    /// angles around the axis and around the tube, and on squares the positions across and up
     #[arg(long)]
     texture: bool,
     /// Write Gaussian surfels instead, in the format of 2D Gaussian splatting
     ///
-    /// They have opacities of 0.1 to 0.95, and colours as harmonics of degree 3 of a light beside
-    /// the eye
+    /// The Gaussians have opacities of 0.1 to 0.95. Their colours are spherical harmonics of degree
+    /// 3, which show a light beside the eye
     #[arg(long, conflicts_with = "texture")]
     gaussians: bool,
     /// Output file: .ply
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     bars.begin("writing surfels", arguments.count);
     let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {
-        // Not for each surfel, as the progress bar takes a lock.
+        // The progress bar takes a lock, so it does not advance for each surfel.
         if index % 65_536 == 65_535 {
             bars.advance(65_536);
         }

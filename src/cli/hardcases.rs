@@ -16,9 +16,9 @@ use super::{note, outputs, print, write_json};
 /// Render hard scenes with every accumulator and judge each pixel by a derived bound.
 ///
 /// Each row is a case with an accumulator. It gives the errors of the map that came closest to its
-/// bound, as fractions of the map's range; the used share of the bound (which follows from the
-/// pixel's own fragments and is that of `fixed`); the pixels that only the reference covers (lost)
-/// or only the device (invented); and the verdict.
+/// bound, as fractions of the map's range, and the used share of the bound. The bound follows from
+/// the pixel's own fragments and is that of `fixed`. The row also counts the pixels that only the
+/// reference covers (lost) and those that only the device covers (invented), and gives the verdict.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat hardcases --accumulator fixed --json hardcases.json\n\n\
     Exits with 1 if a row fails that is not expected to.")]

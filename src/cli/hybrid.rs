@@ -16,9 +16,9 @@ use super::{note, outputs, print, write_json};
 /// Divide a mesh into surfels, where its triangles are tiny, and triangles elsewhere.
 ///
 /// Triangles smaller than a twentieth of a square pixel become surfels, four for each pixel; larger
-/// ones are kept. Surfels are written to OUT.ply, triangles to OUT.mesh.ply beside it, and images
-/// to OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Existing files with these
-/// names are replaced, or removed if they are not needed, only if an earlier run wrote them.
+/// triangles are kept. Surfels are written to OUT.ply, triangles to OUT.mesh.ply beside it, and
+/// images to OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. An existing file with
+/// such a name is replaced, or removed if it is not needed, but only if an earlier run wrote it.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat hybrid dragon.ply -o far.ply --pixels 400\n  epsplat render far.ply -o far.png"
@@ -52,7 +52,7 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
 struct Outcome {
     #[serde(flatten)]
     report: Report,
-    /// The file of the kept triangles, if there are any, and those of their images.
+    /// The file of the kept triangles, if there are any, and the files of their images.
     files: Vec<PathBuf>,
 }
 
@@ -123,7 +123,7 @@ fn image(output: &Path, k: usize) -> PathBuf {
 
 /// Files of triangles and images that an earlier run wrote beside the output.
 ///
-/// No option names such files, so only those of an earlier run may be replaced.
+/// No option names these files, so the command replaces them only if an earlier run wrote them.
 struct Earlier(Vec<PathBuf>);
 
 impl Earlier {
@@ -148,7 +148,8 @@ impl Earlier {
         if known || path.symlink_metadata().is_err() { Ok(()) } else { Err(not_ours(path)) }
     }
 
-    /// Removes the files that are not written again, as no file names them any more.
+    /// Removes the files of the earlier run that this run did not write, as no PLY file names them
+    /// any more.
     fn remove_but(&self, written: &[PathBuf]) -> Result<()> {
         for file in self.0.iter().filter(|file| !written.contains(file) && file.symlink_metadata().is_ok()) {
             std::fs::remove_file(file).map_err(|error| Error::write(file, error))?;

@@ -30,7 +30,8 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// A surface counts as covered if at least this share of its surfels has no open gap beside it.
+/// A surface counts as closed if at least this share of its surfels has no open gap to their
+/// neighbours.
 const COVERED: f64 = 0.9;
 
 #[derive(Serialize)]
@@ -358,7 +359,7 @@ fn held(text: &mut String, info: &Info) {
             _ => writeln!(text, "  colours   {}", info.colors),
         };
     }
-    // A single class is mostly a default value.
+    // A single class is usually just the default value.
     if info.classes.len() > 1 {
         let named = |(class, count): (&u8, &u64)| match class_name(*class) {
             Some(name) => format!("{class} ({name}): {count}"),

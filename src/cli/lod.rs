@@ -20,10 +20,10 @@ use super::{note, outputs, print, write_json};
 /// Build levels of detail for `render --lod`, written as PLY with the surfels.
 ///
 /// Points are divided at their mean into octants until eight or fewer are left (Pajarola 2003).
-/// Each node of this octree is a surfel: the smallest ellipse with the shape of the points'
-/// covariance that bounds the disks below it, with their mean colour and normal. The surfels are
-/// written as the file's points, in the order of the tree, so other programs read the file as a
-/// cloud.
+/// Each node of this octree is a surfel with the mean colour and normal of the disks below it. Its
+/// ellipse has the shape of the points' covariance, and is the smallest that bounds these disks.
+/// The surfels are written as the file's points, in the order of the tree, so other programs read
+/// the file as a cloud.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply\n  epsplat lod tiles/*.ply -o city.lod.ply --memory 4GiB"
@@ -41,10 +41,10 @@ pub struct Arguments {
     /// Write a cut of the tree in place of the tree: nodes of up to this radius, world units
     ///
     /// A node replaces the surfels below it if all of them fit into a ball of this radius. A node
-    /// whose surfels deviate from its cap counts as larger, up to twice
+    /// whose surfels deviate from its cap counts as larger, up to twice as large
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
-    /// Limit the memory, such as 4GiB, by sorting the points in temporary files
+    /// Limit the memory to a size such as 4GiB, by sorting the points in temporary files
     ///
     /// Inputs must be binary PLY files with normals and radii, or half-axes. The temporary files
     /// are beside the output and up to twice its size. The output is the same as without the option

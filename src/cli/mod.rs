@@ -127,7 +127,7 @@ mod tests {
 
     use super::Arguments;
 
-    /// Clap looks for arguments of one name only in debug builds: one would take the other's text.
+    /// Clap detects duplicate names only in debug builds. A duplicate would take the other's text.
     #[test]
     fn no_two_arguments_of_a_command_have_one_name() {
         for command in Arguments::command().get_subcommands() {

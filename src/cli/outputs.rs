@@ -1,4 +1,4 @@
-//! Checks of outputs before anything is read: they can be written and overwrite neither inputs nor
+//! Checks, before anything is read, that outputs can be written and overwrite neither inputs nor
 //! each other.
 
 use std::collections::HashMap;
@@ -51,7 +51,7 @@ pub(super) fn check<'a, O: AsRef<Path>>(
     outputs.iter().try_for_each(|output| try_output(output.as_ref()))
 }
 
-/// Fails if the output cannot be written. `-`, stdout, always can.
+/// Fails if the output cannot be written. Stdout (`-`) passes always.
 pub(super) fn try_output(output: &Path) -> Result<()> {
     if output == Path::new("-") { Ok(()) } else { atomic::try_output(output) }
 }
@@ -88,7 +88,7 @@ pub(super) fn check_distinct<'a, O: AsRef<Path>>(
     named.iter().try_for_each(|named| written.check_against(named))
 }
 
-/// Returns the files that these inputs name, such as textures, and that are read with them.
+/// Returns the files that are read because these inputs name them, such as textures.
 pub(super) fn all_named<'a>(inputs: impl IntoIterator<Item = Source<'a>>) -> Result<Vec<PathBuf>> {
     let mut named = Vec::new();
     for input in inputs {
@@ -113,8 +113,8 @@ pub(super) fn check_named_in_ply(path: &Path) -> Result<()> {
 
 /// Returns the name of the mesh whose triangles are drawn with the surfels of `output`.
 ///
-/// It is the mesh that the only input names, if that lies in the folder of `output`. Otherwise the
-/// meshes are left out, with a warning for each.
+/// A mesh is returned if there is a single input, which names the mesh, and the mesh lies in the
+/// folder of `output`. Otherwise the meshes are left out, with a warning for each.
 pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>> {
     let meshes: Vec<&PathBuf> = inputs.iter().filter_map(|points| points.beside.as_ref()).collect();
     if let ([mesh], [_], Some(name)) = (meshes.as_slice(), inputs, meshes.first().and_then(|mesh| mesh.file_name())) {
@@ -151,8 +151,8 @@ impl Written {
     /// Adds a file. If it is there already, returns the path under which it was added.
     fn add(&mut self, path: &Path) -> Option<PathBuf> {
         let Some(place) = atomic::place_of(path) else {
-            // A stream such as a redirected stdout may end in a file. Several outputs may be
-            // written to it one after the other, but it must not be an input.
+            // A stream such as a redirected stdout may end in a file. Several outputs may go to
+            // that file one after the other, but the file must not be an input.
             self.streams.extend(node_of(path).map(|node| (node, path.to_owned())));
             return None;
         };
@@ -189,7 +189,8 @@ impl Written {
         place.or_else(|| self.nodes.get(&node_of(path)?)).map(PathBuf::as_path)
     }
 
-    /// Returns a file and another one that would lie in it as in a folder, if there are such.
+    /// Finds an output file that would be a folder of another output. Returns both, that file
+    /// first.
     fn file_as_folder(&self) -> Option<(&Path, &Path)> {
         self.places.iter().find_map(|(place, inside)| {
             let file = place.ancestors().skip(1).find_map(|folder| self.places.get(folder))?;
@@ -209,7 +210,7 @@ fn node_of(path: &Path) -> Option<Node> {
     std::fs::metadata(path).ok().filter(Metadata::is_file).and_then(|there| node(path, &there))
 }
 
-/// Returns the identity of the file that standard input is redirected from, if it is one.
+/// Returns the identity of the file that standard input is redirected from, if it is redirected.
 #[cfg(unix)]
 fn standard_input() -> Option<Node> {
     use std::os::fd::AsFd;

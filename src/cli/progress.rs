@@ -53,7 +53,7 @@ impl Progress for Bars {
     }
 }
 
-/// Notes without progress bars.
+/// Prints notes, but no progress bars.
 pub struct Notes;
 
 impl Progress for Notes {

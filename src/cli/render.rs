@@ -51,12 +51,12 @@ struct Outcome<'a> {
     #[serde(flatten)]
     report: &'a Report,
     view: ViewReport,
-    /// Counts of what was read; None if the inputs were read whole.
+    /// Numbers of nodes, points and bytes that were read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<ReadReport>,
 }
 
-/// Fails if maps are asked for that the format does not hold.
+/// Fails if the arguments ask for maps that the format cannot store.
 fn check_format(arguments: &Arguments, format: Format) -> Result<()> {
     if !arguments.options.maps.aov.is_empty() && format == Format::Png {
         return Err(Error::Usage("a PNG holds no maps: use an .exr output with --aov".into()));

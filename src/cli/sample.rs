@@ -119,13 +119,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Returns a path quoted for a shell if it has characters that need it.
+/// Returns a path, in quotes if it has characters that a shell interprets.
 fn quoted(path: &Path) -> String {
     let path = path.display().to_string();
     if path.contains([' ', '(', ')', '&', '$']) { format!("'{path}'") } else { path }
 }
 
-/// Returns the image files of a mesh's textures, in the order of their numbers.
+/// Returns the image files of a mesh's textures, in the order of the textures' numbers.
 fn images(mesh: &Mesh) -> Vec<PathBuf> {
     let (textures, _) = mesh.textures();
     let image = |texture: &Arc<Texture>| {

@@ -1,4 +1,4 @@
-//! Signals that end a run: its temporary files are removed.
+//! Removes temporary files when a signal ends the run.
 
 #[cfg(unix)]
 use std::sync::{Arc, atomic::AtomicBool};
@@ -8,7 +8,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 /// - SIGINT, SIGTERM, SIGHUP and SIGXCPU (limit of processor time) remove the temporary files and
 ///   end the run with the exit code that a shell gives them: 130, 143, 129, 152. Signals that were
 ///   ignored at the start, as with `nohup`, stay ignored.
-/// - SIGXFSZ (limit of file size) would end the run at once: instead, writing fails.
+/// - SIGXFSZ (limit of file size) makes writing fail, in place of ending the run at once.
 /// - SIGABRT, as when memory runs out, exits with 1.
 #[cfg(unix)]
 pub fn watch() {
@@ -17,7 +17,7 @@ pub fn watch() {
 
     // A failed allocation prints a message and aborts. Like every failed run it must exit with 1.
     let _ = signal_hook::flag::register_conditional_shutdown(SIGABRT, 1, Arc::new(AtomicBool::new(true)));
-    // The flag is never read: with any handler the system call returns an error.
+    // The flag is never read. With any handler, the write call returns an error.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     let ignored = ignored();
     let watched = [SIGHUP, SIGINT, SIGTERM, SIGXCPU].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
@@ -38,7 +38,7 @@ pub fn watch() {}
 
 /// Returns the mask of ignored signals: bit `n - 1` for signal `n`.
 ///
-/// Without `/proc/self/status` it has SIGHUP (1), which `nohup` may have set to be ignored.
+/// If `/proc/self/status` cannot be read, SIGHUP (1) counts as ignored, as under `nohup`.
 #[cfg(unix)]
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

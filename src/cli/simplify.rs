@@ -19,9 +19,9 @@ use super::{note, outputs, print, write_json};
 
 /// Replace surfels by fewer, larger ones within a tolerance, without holes.
 ///
-/// A disk grows around each point while all of its points lie within the tolerance of it, and a few
-/// of these disks are selected that together cover the surface. Flat parts have few surfels left,
-/// edges and details most of theirs. Texture coordinates and their slopes are kept, and no surfel
+/// A disk grows around each point as long as all points that it covers lie within the tolerance.
+/// Then a few disks are selected that together cover the surface. Flat parts keep few surfels,
+/// edges and details keep most. Texture coordinates and their slopes are kept, and no surfel
 /// replaces points on both sides of a seam.
 #[derive(Args)]
 #[command(
@@ -43,7 +43,7 @@ pub struct Arguments {
     /// Shape of surfels
     #[arg(long, value_enum, default_value_t = ShapeName::Disk)]
     shape: ShapeName,
-    /// Rounds in which surfels move so that some are not needed; more than 3 hardly change anything
+    /// Rounds in which surfels move so that fewer are needed; more than 3 hardly change anything
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     relax: u32,
     /// Selection of surfels: cells (without holes) or thesis:R (as in Tien 2008, a baseline)

@@ -16,8 +16,8 @@ use super::{note, outputs};
 
 /// Make surfels from points and write them as PLY: oriented normals, ellipses without gaps.
 ///
-/// The inputs are joined to one cloud. Normals in the files are used; missing ones are those of a
-/// plane fitted to 16 neighbours.
+/// The inputs are joined to one cloud. Normals in the files are used; missing normals are those of
+/// a plane fitted to 16 neighbours.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
@@ -32,10 +32,10 @@ pub struct Arguments {
     /// Size and shape of surfels: knn, ellipse, bsp, qsplat, ... (all in --help)
     ///
     /// knn: the smallest ellipse that holds the point's Voronoi cell in the tangent plane; ellipse:
-    /// the one that bounds 8 neighbours in the tangent plane; bsp, bsp:circumsphere: disks from
-    /// clusters of three points, by their mean edge or circumsphere; bsp:global,
-    /// bsp:global-circumsphere: one radius for all disks, the mean over such clusters; qsplat: at
-    /// each vertex of a mesh, a disk as large as the largest triangle there
+    /// it bounds 8 neighbours in the tangent plane, along the axes of their covariance; bsp,
+    /// bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere;
+    /// bsp:global, bsp:global-circumsphere: one radius for all disks, the mean over such clusters;
+    /// qsplat: at each vertex of a mesh, a disk as large as the largest triangle there
     #[arg(long, default_value = "knn")]
     size: Size,
     /// Side of estimated normals: outward (propagate), up, or toward a scanner at X,Y,Z
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if there are several and one of them is not the position of a scanner.
+/// [`Error::Usage`] if there are several options and one of them is not the position of a scanner.
 fn orientation(given: &[Orientation]) -> Result<Orientation> {
     if let [one] = given {
         return Ok(one.clone());

@@ -121,8 +121,8 @@ impl AdapterDescription {
         self.max_storage_buffer_binding_size.min(self.max_buffer_size)
     }
 
-    /// Elements of `stride` bytes that fit a page. If several buffers are paged together, `stride`
-    /// is the largest of theirs.
+    /// Returns how many elements of `stride` bytes fit a page. If several buffers are paged
+    /// together, `stride` must be the largest size of their elements.
     pub fn page_len(&self, stride: usize) -> u64 {
         let invocations = u64::from(self.max_compute_workgroups_per_dimension).pow(2) * u64::from(WORKGROUP);
         (self.buffer_limit() / stride as u64).min(invocations).min(u64::from(u32::MAX))
@@ -165,8 +165,8 @@ impl AdapterDescription {
 }
 
 /// The most storage buffers that a kernel binds; core WebGPU grants no more. The kernel that lists
-/// the fragments of large splats binds the queue, splats, surfels, attributes, the count of
-/// fragments that did not fit, list starts, keys and records.
+/// the fragments of large splats binds all eight: the queue, splats, surfels, attributes, the count
+/// of fragments that did not fit, list starts, keys and records.
 pub const STORAGE_BUFFERS: u32 = 8;
 
 #[cfg(test)]

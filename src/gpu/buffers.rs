@@ -43,7 +43,7 @@ impl<T: Pod> Buffer<T> {
         Self::open(gpu, what, len, wgpu::BufferUsages::MAP_WRITE)
     }
 
-    /// Creates a storage buffer with the usages `maps`, if the device can map storage buffers.
+    /// Creates a storage buffer, which has the usages `maps` if the device can map storage buffers.
     fn open(gpu: &Gpu, what: &str, len: u64, maps: wgpu::BufferUsages) -> Result<Self> {
         let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
         let maps = if lies_open { maps } else { wgpu::BufferUsages::empty() };

@@ -6,8 +6,8 @@ use super::adapter::AdapterDescription;
 use super::program::Compiled;
 use crate::error::{Error, Result};
 
-/// Features that are enabled where an adapter has them: timestamps, the 64-bit integers, f32
-/// atomics and subgroups of some kernels, and blending into 32-bit floats.
+/// Features that are enabled where an adapter has them: timestamps; 64-bit integers, f32 atomics
+/// and subgroups, which some kernels use; and blending into 32-bit floats.
 const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
@@ -20,8 +20,8 @@ fn of_spirv(adapter: &AdapterDescription) -> wgpu::Features {
     if adapter.api == "vulkan" { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
 }
 
-/// Features of software adapters only: the host maps their buffers directly. On a graphics card,
-/// such buffers would lie in slow memory.
+/// Features that only software adapters use: the host maps their buffers directly. On a graphics
+/// card, mappable buffers would lie in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
 /// Advice for a missing adapter.
@@ -30,12 +30,13 @@ pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu wit
 
 /// Whether wgpu validates the workgroup counts of indirect dispatches.
 ///
-/// Validation adds a dispatch before each indirect one, which takes a fifth of the time of small
-/// cuts of levels of detail (1.9 ms instead of 1.5). No count here is too large. Most grids come
-/// from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than 2^30, so they have at most
-/// 65,535 groups per row and 2^14 rows. The others have one row per batch of a page, and a page has
-/// at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows it stays on: Direct3D 12
-/// passes these counts to kernels only if they are validated.
+/// Validation adds a dispatch before each indirect dispatch. This takes a fifth of the frame time
+/// of small cuts of levels of detail (1.9 ms instead of 1.5). No workgroup count of the renderer is
+/// too large. Most grids come from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than
+/// 2^30, so they have at most 65,535 groups per row and 2^14 rows. The others have one row per
+/// batch of a page, and a page has at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On
+/// Windows validation stays on: Direct3D 12 passes the counts to kernels only if they are
+/// validated.
 fn counts_are_checked() -> bool {
     cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")
 }
@@ -60,8 +61,8 @@ fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
     described
 }
 
-/// All adapters, in the order in which `auto` prefers them. The environment variable `WGPU_BACKEND`
-/// (vulkan, gl, ...) restricts them.
+/// Lists all adapters, in the order in which `auto` prefers them. The environment variable
+/// `WGPU_BACKEND` (vulkan, gl, ...) restricts them.
 pub fn adapters() -> Vec<AdapterDescription> {
     let mut all: Vec<_> = [false, true].into_iter().flat_map(enumerate).map(|(description, _)| description).collect();
     all.sort_by_key(AdapterDescription::rank);
@@ -89,8 +90,9 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     })
 }
 
-/// An open device. Clones share the device and the cache of compiled kernels. They also share its
-/// reported error and its loss: the first caller that checks gets the error.
+/// An open device. Clones share the device and the cache of compiled kernels. They also share the
+/// error that the device reported, such as its loss: only the first clone that checks gets the
+/// error.
 #[derive(Clone)]
 pub struct Gpu {
     /// The adapter of the device.
@@ -102,9 +104,9 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the best adapter. With a `name`, opens the best adapter of the API of that name
-    /// (vulkan, gl or opengl, metal, dx12), or, for any other name, the best adapter whose own name
-    /// contains it. Case does not matter.
+    /// Opens the best adapter, or the best among those that `name` selects. The name of an API
+    /// (vulkan, gl or opengl, metal, dx12) selects its adapters. Any other name selects adapters
+    /// whose names contain it. Case does not matter.
     ///
     /// # Errors
     /// [`Error::NoAdapter`] if no usable adapter matches, or [`Error::Gpu`] if the device cannot be
@@ -117,9 +119,9 @@ impl Gpu {
         Self::of(adapter, &handle, features, limits)
     }
 
-    /// Opens the adapter that [`open`](Self::open) chooses with the capabilities of core WebGPU
-    /// only, like a browser or a phone: core limits, and no optional feature except SPIR-V, so that
-    /// kernels are compiled in the same way.
+    /// Opens the adapter that [`open`](Self::open) chooses, but only with the capabilities of core
+    /// WebGPU, as in a browser or on a phone. The limits are those of core WebGPU. SPIR-V is the
+    /// only optional feature, so that kernels are compiled in the same way.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;

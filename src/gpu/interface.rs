@@ -19,12 +19,13 @@ pub(super) struct Invalid {
 }
 
 impl Invalid {
-    /// The line and column of the fault, and the sentence.
+    /// Returns the line and column of the fault, and the sentence.
     pub fn parts(self) -> (Option<(u32, u32)>, String) {
         (self.at.map(|at| (at.line_number, at.line_position)), self.sentence)
     }
 
-    /// The sentence, after the place that `place_of` gives for a line of the text.
+    /// Returns the sentence, preceded by the place of the fault. `place_of` maps a line of the text
+    /// to a file and a line in that file.
     pub fn told<'a>(&self, place_of: impl Fn(u32) -> Option<(&'a str, u32)>) -> String {
         let at = self.at.as_ref();
         let place = at.and_then(|at| Some((place_of(at.line_number)?, at.line_position)));
@@ -62,12 +63,12 @@ impl Interface {
         Ok(Self { module, info })
     }
 
-    /// The names of its overrides.
+    /// Returns the names of the module's overrides.
     pub fn overrides(&self) -> Vec<String> {
         self.module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect()
     }
 
-    /// The bindings of its entry points.
+    /// Returns the bindings of the module's entry points.
     pub fn bindings(&self) -> Bindings {
         let variables = &self.module.global_variables;
         let named = |handle: Handle<naga::GlobalVariable>| {
@@ -79,7 +80,7 @@ impl Interface {
         self.module.entry_points.iter().enumerate().map(of).collect()
     }
 
-    /// The variables with a binding that the entry point of index `entry` uses.
+    /// Returns the variables with a binding that the entry point of index `entry` uses.
     fn bound(&self, entry: usize) -> impl Iterator<Item = Handle<naga::GlobalVariable>> + '_ {
         let uses = self.info.get_entry_point(entry);
         let bound = |(handle, variable): &(Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
@@ -89,7 +90,7 @@ impl Interface {
     }
 
     /// Returns the variables that one pipeline binds, with names and layout, in the order of their
-    /// binding numbers. `entries` are its entry points, each with its stage.
+    /// binding numbers. `entries` are the pipeline's entry points, each with its stage.
     ///
     /// # Errors
     /// A message if an entry point is missing, two variables have the same number, or a variable
@@ -123,7 +124,7 @@ impl Interface {
     /// outputs match `targets`.
     ///
     /// # Errors
-    /// A message that says which does not fit.
+    /// A message about the input or output that does not match.
     pub fn check_stages(
         &self,
         [vertex, fragment]: [&str; 2],
@@ -162,8 +163,8 @@ impl Interface {
         if made == wanted { Ok(()) } else { Err("the fragment shader's outputs do not match the targets".into()) }
     }
 
-    /// The locations and types of the values that a result or an argument passes between stages: of
-    /// the value itself or of the members of a struct.
+    /// Returns location and type of each value that a result or an argument passes between stages:
+    /// the value itself, or the members of a struct.
     fn places(&self, ty: Handle<naga::Type>, binding: Option<&naga::Binding>) -> Vec<(u32, Handle<naga::Type>)> {
         let place = |binding: Option<&naga::Binding>| match binding {
             Some(naga::Binding::Location { location, .. }) => Some(*location),

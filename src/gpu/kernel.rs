@@ -1,4 +1,5 @@
-//! Pipelines of kernels: compiled in parallel, and dispatched by name with what they bind.
+//! Pipelines of kernels: compiled in parallel, and dispatched by name with the resources that they
+//! bind.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,8 +14,8 @@ use super::sources::{Sources, Text};
 use crate::error::{Error, Result};
 
 impl Compiled {
-    /// Returns the program of the module of `files` with the entry points `stages` and with
-    /// `draws`, compiled or from the cache.
+    /// Returns the program that has the entry points `stages` and the `draws` of the module of
+    /// `files`. Compiles it unless the cache has it.
     pub(crate) fn get(
         &self,
         gpu: &Gpu,
@@ -25,13 +26,13 @@ impl Compiled {
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
         let key = (sources.join(files), bits, format!("{stages:?} {draws:?} {}", sources.all_end(files)));
-        // A poisoned lock means that another thread panicked while it held it; the cache itself is
-        // whole.
+        // A poisoned lock means that another thread panicked while it held the lock. The cache is
+        // intact.
         let programs = || self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs().get(&key) {
             return Ok(program);
         }
-        // Other threads can compile meanwhile; at worst, two compile the same program.
+        // Other threads can compile meanwhile; at worst, two threads compile the same program.
         let program = Arc::new(Program::compile(gpu, sources.text(files), stages, draws, constants)?);
         programs().insert(key, Arc::clone(&program));
         Ok(program)
@@ -60,8 +61,9 @@ const COMPILER_STACK: usize = 8 << 20;
 
 /// Returns the result of `make` for each of `things`, in order, computed on several new threads.
 ///
-/// Threads of a pool would not do: while one waits it takes up other work, on top of the driver's
-/// and on a stack of 2 MiB, and that work may wait for these very kernels.
+/// Threads of a pool are not suitable. While such a thread waits, it takes up other work, on a
+/// stack of 2 MiB that already holds the driver's frames. That work may wait for these very
+/// kernels.
 fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -> Vec<M> {
     let (next, made) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
@@ -76,7 +78,7 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     thread::scope(|scope| {
         let spawned = |_| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, work).ok();
         let spawned: Vec<_> = (0..threads).filter_map(spawned).collect();
-        // If no thread can be started, this one does all the work.
+        // If no thread can be started, the current thread does all the work.
         if spawned.is_empty() {
             work();
         }
@@ -91,8 +93,8 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
-/// Runs `compile` on a new thread while this one runs `other`, which uses the device. If no thread
-/// can be started, `compile` runs first.
+/// Runs `compile` on a new thread while the current thread runs `other`, which uses the device. If
+/// no thread can be started, `compile` runs first.
 pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
     // In OpenGL, a thread that compiles holds the context, and other threads give up waiting for it
     // after a short time.
@@ -108,8 +110,8 @@ pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, othe
 }
 
 impl Draw {
-    /// Compiles this draw from `module`, with `constants` and its own. Returns the pipeline, and
-    /// the names and binding numbers of its variables.
+    /// Compiles this draw from `module`, with `constants` and the draw's own constant. Returns the
+    /// pipeline, and the names and binding numbers of its variables.
     fn pipeline(
         &self,
         gpu: &Gpu,
@@ -197,7 +199,8 @@ impl Program {
     ) -> Result<Self> {
         let mut program = Self { counts_loops: text.counts_loops, ..Self::default() };
         let module = watched(gpu, || Module::of(gpu, text))?;
-        // Compiles in parallel; sequentially, this would be half the time of a first frame.
+        // Compiles in parallel: sequentially, compilation would take half the time of a first
+        // frame.
         let compiled = side_by_side(stages, |&stage| watched(gpu, || compute(gpu, &module, stage, constants)));
         for (&stage, compiled) in stages.iter().zip(compiled) {
             let (pipeline, variables) = compiled?;
@@ -277,9 +280,9 @@ impl Program {
 
 /// The workgroups of a dispatch.
 pub(crate) enum Grid<'a> {
-    /// Their number in x and y.
+    /// The number of workgroups in x and y.
     Of((u32, u32)),
-    /// Written by the device, at this byte offset of a buffer.
+    /// The device writes the number, at this byte offset of a buffer.
     In(&'a wgpu::Buffer, u64),
 }
 

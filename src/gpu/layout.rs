@@ -36,10 +36,10 @@ pub const TILE_ROWS_PLAIN: u32 = 8;
 /// workgroups (`wgsl/visibility/covered.wgsl`).
 pub const COVERED_LIST: u32 = 8;
 
-/// First word of that list's grid with one workgroup per tile.
+/// First word of the grid with one workgroup per tile, in the list of covered tiles.
 pub const COVERED_GRID: u32 = 1;
 
-/// First word of that list's grid with one workgroup per eight tiles.
+/// First word of the grid with one workgroup per eight tiles, in the list of covered tiles.
 pub const COVERED_GRID_OF_EIGHTS: u32 = 4;
 
 /// Words at the start of the tile lists: the greatest length so far of all lists together, and of
@@ -49,7 +49,7 @@ pub const LIST_ENDS: u32 = 2;
 /// Side of the blocks of tiles that share a list of large splats, pixels.
 pub const BLOCK_SIDE: u32 = 16;
 
-/// The most workgroups per dimension that every adapter grants.
+/// The number of workgroups per dimension that every adapter grants.
 pub const MOST_GROUPS: u32 = 65_535;
 
 /// The most pixels that one invocation may visit for one splat: llvmpipe ends loops after 65,535
@@ -62,14 +62,14 @@ pub const TILE: u32 = 16;
 /// Surfels of a batch: consecutive in memory, and culled together (`wgsl/visibility/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
-/// Surfels of a run, a number of whole batches that are dealt out together. Of 64, 512 and 4096,
-/// this gave the shortest frames on a software adapter.
+/// Surfels of a run: consecutive whole batches. Runs are shuffled over a page, and keep their inner
+/// order. Of 64, 512 and 4096, this gave the shortest frames on a software adapter.
 pub const RUN: u32 = 512;
 
-/// First word of the grid over the nodes to judge, in the state of a cut
-/// (`wgsl/levels/select.wgsl`).
+/// First word of the grid of select_judge(), in the state of a cut (`wgsl/levels/select.wgsl`).
 pub const JUDGE_GRID: u32 = 4;
-/// First word of the grid over the nodes to spread, the last in that state; see [`JUDGE_GRID`].
+/// First word of the grid of select_spread(), the last grid in the state of a cut; see
+/// [`JUDGE_GRID`].
 pub const SPREAD_GRID: u32 = 7;
 
 /// Nodes that one invocation judges (`wgsl/levels/select.wgsl`). Of 1, 4, 8, 16 and 32 on a
@@ -95,7 +95,7 @@ pub const PART_OF_LEAF: u32 = 3;
 /// far batches (`wgsl/visibility/cull.wgsl`).
 pub const LIST_START: u32 = 6;
 
-/// First word of that list's grid over the far batches.
+/// First word of the grid over the far batches, in a list of batches.
 pub const LIST_FAR: u32 = 3;
 
 /// Side of the tiles of the occlusion test, pixels (`wgsl/visibility/occlusion.wgsl`).
@@ -204,7 +204,8 @@ pub struct TreeNode {
     pub cone: f32,
 }
 
-/// A branch, neighbouring subtrees of a tree; `wgsl/common/layout.wgsl` explains the fields.
+/// A branch of a tree, which consists of neighbouring subtrees; `wgsl/common/layout.wgsl` explains
+/// the fields.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]

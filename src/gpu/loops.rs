@@ -6,28 +6,28 @@
 //! loops end by the proof below; every other check of wgpu stays.
 //!
 //! 1. A **counter** starts anywhere and grows by 1, or by a constant step of at most 256, in every
-//!    round, and the loop ends once it passes a limit that no round changes. The loop ends if the
-//!    counter cannot wrap before it passes the limit, that is, if the limit is at most
-//!    2^32 - 1 - 256. The limits are: constants; sides of the image, which have 15 bits
-//!    ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
-//!    and lengths of lists. A list is a range within a binding (`column_of` keeps its start below
-//!    `arrayLength`, and its end is its start plus the number of entries that were placed), so it
-//!    is shorter than 2^30 words; a tile has two lists. If the counter grows by 1 while it is below
-//!    its limit, any limit will do: the counter reaches it before it wraps.
+//!    round. The loop ends once the counter passes a limit that no round changes. The loop ends if
+//!    the counter cannot wrap before it passes the limit, that is, if the limit is at most 2^32 - 1
+//!    - 256. The limits are: constants; sides of the image, which have 15 bits
+//!      ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
+//!      and lengths of lists. A list is a range within a binding, so it is shorter than 2^30 words:
+//!      `column_of` keeps its start below `arrayLength`, and its end is its start plus the number
+//!      of entries that were placed. A tile has two lists. If the counter grows by 1 while it is
+//!      below its limit, any limit will do: the counter reaches it before it wraps.
 //! 2. A **rectangle** is traversed row by row by a pixel that moves by a step in every round:
-//!    `at.x` grows, and when it passes the last column it restarts with `at.y` grown. Columns and
-//!    rows come from a splat's bounds, whose numbers have 15 and 16 bits, so each of at most 2^16
-//!    rows has at most 2^16 rounds.
+//!    `at.x` grows, and past the last column it restarts and `at.y` grows. Columns and rows come
+//!    from a splat's bounds, whose numbers have 15 and 16 bits, so each of at most 2^16 rows has at
+//!    most 2^16 rounds.
 //! 3. A set of **bits** in a word loses one bit in every round, and the loop ends when none is
 //!    left: at most 32 rounds.
 //! 4. The outer loops of `accumulate_splat` and `list_splat` continue only if the inner loop
 //!    advanced in its rectangle (2).
-//! 5. A counter **shrinks** by 1 in every round, and the loop ends at 0 or at a limit, not below 0,
-//!    that no round changes; or it grows to more than twice its value (`sink`), and the loop ends
+//! 5. A counter **shrinks** by 1 in every round, and the loop ends at a limit of 0 or more that no
+//!    round changes. Or the counter grows to more than twice its value (`sink`), and the loop ends
 //!    past the length of a list, which is shorter than 2^30.
-//! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, or consumes the fragment at
-//!    `first`, as its surface reaches at least that deep, or is the last round. The inner loop
-//!    moves `first`, which is a counter (1), past all consumed fragments.
+//! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, is the last round, or consumes
+//!    the fragment at `first`, as the round's surface reaches at least to that depth. The inner
+//!    loop moves `first`, which is a counter (1), past all consumed fragments.
 //!
 //! A file whose loops end says so in a comment, which names the rules above and the [`code_hash`]
 //! of the code that was proven. Whoever changes the code must prove it again. Two kinds of text are
@@ -49,14 +49,14 @@ fn code_hash(text: &str) -> u64 {
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
-/// The hash in a kernel's comment that claims that all loops end.
+/// Returns the hash in the comment by which a kernel claims that all its loops end.
 fn proven(text: &str) -> Option<u64> {
     let claim = text.lines().find_map(|line| line.strip_prefix("// All loops end, by "))?;
     let (_, hash) = claim.split_once(" of src/gpu/loops.rs: 0x")?;
     u64::from_str_radix(hash, 16).ok()
 }
 
-/// Whether all loops of a built-in kernel are proven to end, or it has none.
+/// Whether a built-in kernel has no loops, or all of them are proven to end.
 pub(super) fn all_end(text: &str) -> bool {
     proven(text).map_or_else(|| loops(text) == 0, |hash| code_hash(text) == hash)
 }

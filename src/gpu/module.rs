@@ -90,8 +90,8 @@ impl Module {
         let (mut variables, mut entries) = (Vec::new(), Vec::new());
         for (place, (name, mut entry)) in layout.into_iter().enumerate() {
             if self.text.is_none() {
-                // Vulkan binding numbers must have no gaps; so they are the same whether or not
-                // wgpu renumbers them.
+                // Numbers bindings without gaps: then they are the same whether or not wgpu
+                // renumbers them.
                 entry.binding = place as u32;
             }
             variables.push((name, entry.binding));

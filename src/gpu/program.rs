@@ -35,7 +35,8 @@ const MOST_PROGRAMS: usize = 16;
 /// Pipelines in the cache. On a CPU, Mesa needs about 3 MB for each.
 const MOST_PIPELINES: usize = 128;
 
-/// The least recently used caches of what was compiled for a device.
+/// The caches of compiled programs and pipelines of a device. A full cache drops the least recently
+/// used entry.
 pub(crate) struct Compiled {
     /// Programs by source and constants.
     pub(super) programs: Mutex<Recent<ProgramKey, Arc<Program>>>,

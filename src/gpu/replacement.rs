@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 
-/// A WGSL text in place of the built-in file of the name `file`, such as `kernel_ellipse.wgsl`.
+/// A WGSL text that replaces the built-in file of the name `file`, such as `kernel_ellipse.wgsl`.
 ///
-/// As text it is `FILE=PATH`: the built-in file's name and the path of the text.
+/// It is parsed from `FILE=PATH`: the built-in file's name and the path of the text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Replacement {
     file: String,
@@ -23,18 +23,18 @@ enum By {
 }
 
 impl Replacement {
-    /// Puts `text` in the place of `file`.
+    /// Creates a replacement of `file` by `text`.
     pub fn new(file: impl Into<String>, text: impl Into<Arc<str>>) -> Self {
         let file = file.into();
         Self { by: By::Text(text.into(), file.clone()), file }
     }
 
-    /// The name of the built-in file.
+    /// Returns the name of the built-in file.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The path of a text that is not read yet.
+    /// Returns the path of a text that is not read yet; `None` for a text in memory.
     pub fn path(&self) -> Option<&Path> {
         match &self.by {
             By::Path(path) => Some(path),
@@ -42,7 +42,8 @@ impl Replacement {
         }
     }
 
-    /// The same with its text in memory, so that later changes of the file change nothing.
+    /// Returns this replacement with its text in memory, so that later changes of the file have no
+    /// effect.
     ///
     /// # Errors
     /// [`Error::Read`] for a file that cannot be read.
@@ -50,7 +51,7 @@ impl Replacement {
         Ok(Self { file: self.file.clone(), by: By::Text(self.text()?, self.shown()) })
     }
 
-    /// The name of the text in errors: its path, or the name of the built-in file.
+    /// Returns the name of the text in errors: its path, or the name of the built-in file.
     pub fn shown(&self) -> String {
         match &self.by {
             By::Path(path) => path.display().to_string(),
@@ -58,7 +59,7 @@ impl Replacement {
         }
     }
 
-    /// The same with a relative path counted from `folder`.
+    /// Returns this replacement with a relative path resolved against `folder`.
     #[must_use]
     pub fn within(self, folder: &Path) -> Self {
         let by = match self.by {
@@ -68,7 +69,7 @@ impl Replacement {
         Self { by, ..self }
     }
 
-    /// Returns the text, which is read if it is a file's.
+    /// Returns the text. Reads it if it is not in memory.
     ///
     /// # Errors
     /// [`Error::Read`] for a file that cannot be read.

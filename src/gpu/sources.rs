@@ -14,17 +14,18 @@ pub(crate) struct Text {
     pub joined: String,
     /// Whether every loop gets a counter that ends it.
     pub counts_loops: bool,
-    /// The name of each joined file for people, and the number of its lines.
+    /// The name of each joined file in messages, and its number of lines.
     files: Vec<(String, u32)>,
 }
 
 impl Text {
-    /// A module of one text, whose loops are counted.
+    /// Creates a module of one text, in which every loop gets a counter.
     pub fn alone(text: &str) -> Self {
         Self { joined: text.to_owned(), counts_loops: true, files: Vec::new() }
     }
 
-    /// The file and the line in it of a line of the joined text; both start at 1.
+    /// Maps a line of the joined text to its file and the line in that file. Both line numbers
+    /// start at 1.
     pub fn place_of(&self, line: u32) -> Option<(&str, u32)> {
         let mut first = 1;
         self.files.iter().find_map(|(name, lines)| {
@@ -35,12 +36,12 @@ impl Text {
     }
 }
 
-/// The WGSL files of the kernels. They are the built-in ones, parts of which a researcher (or a
-/// test that must fail) can replace.
+/// The WGSL files of the kernels: the built-in files, which a researcher (or a test that must fail)
+/// can replace in part.
 #[derive(Clone, Debug)]
 pub struct Sources {
     texts: BTreeMap<&'static str, Cow<'static, str>>,
-    /// Names for people of files that a user wrote.
+    /// Names in messages of the files that a user wrote.
     shown: BTreeMap<&'static str, String>,
     counts_loops: bool,
 }
@@ -69,7 +70,7 @@ impl Sources {
         Ok(self)
     }
 
-    /// Puts the texts of a user in the place of built-in files.
+    /// Replaces built-in files by texts of a user.
     ///
     /// # Errors
     /// [`Error::Usage`] if there is no such file, and errors of reading.
@@ -87,7 +88,7 @@ impl Sources {
         Ok(self)
     }
 
-    /// The text of a file that is not the built-in one, and its name for people.
+    /// Returns the text of a replaced file and its name in messages; `None` for a built-in file.
     pub(crate) fn replaced(&self, file: &str) -> Option<(&str, &str)> {
         match self.texts.get_key_value(file) {
             Some((file, Cow::Owned(text))) => Some((text, self.shown.get(file).map_or(file, String::as_str))),

@@ -3,11 +3,11 @@
 //! Vulkan lets a driver compute `a * b + c` with one rounding, and replace `(a + b) - a` by `b`.
 //! Whether it does depends on the surrounding code: the same lines give different bits in the tile
 //! kernel and in the scatter kernel, and with pages and with one buffer. NVIDIA's driver does both.
-//! The decoration `NoContraction` forbids it, but WGSL has no word for it. So kernels are
+//! The decoration `NoContraction` forbids both, but WGSL has no word for it. So kernels are
 //! translated here, by the translator that wgpu itself uses, and decorated. Sums, differences and
 //! products are then those of IEEE 754 on every Vulkan adapter that rounds to nearest, except that
-//! numbers below the smallest normal one may become 0. Quotients, roots, powers and exponentials
-//! are as exact as the driver makes them.
+//! subnormal numbers may become 0. Quotients, roots, powers and exponentials are as exact as the
+//! driver makes them.
 
 use std::ops::RangeInclusive;
 
@@ -26,7 +26,8 @@ const TYPES: RangeInclusive<u32> = 19..=39;
 /// Number of the decoration NoContraction.
 const NO_CONTRACTION: u32 = 42;
 
-/// Whether an instruction does floating-point arithmetic; its result is then its third word.
+/// Whether an instruction does floating-point arithmetic. Its third word is then the id of its
+/// result.
 ///
 /// These are FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod, and the products of vectors and matrices
 /// up to Dot.
@@ -83,7 +84,7 @@ fn check_workgroup(module: &naga::Module, limits: &wgpu::Limits) -> Result<(), S
     Ok(())
 }
 
-/// The capabilities that WGSL may use on a device with `features`.
+/// Returns the capabilities that WGSL may use on a device with `features`.
 pub(super) fn capabilities(features: wgpu::Features) -> Capabilities {
     let granted = [
         (wgpu::Features::SHADER_INT64, Capabilities::SHADER_INT64),
@@ -99,9 +100,9 @@ pub(super) fn capabilities(features: wgpu::Features) -> Capabilities {
 
 /// Returns the translator's options for a device with `features`.
 ///
-/// The module may use what these features grant. All checks are on, except those of buffer accesses
-/// and, unless `counts_loops`, of loops. `numbers` maps binding numbers of the source to those of
-/// the pipeline.
+/// The module may use what these features grant. All checks are on, except those of buffer
+/// accesses. Loops get counters only if `counts_loops`. `numbers` maps binding numbers of the
+/// source to those of the pipeline.
 pub(super) fn options(
     features: wgpu::Features,
     numbers: impl Iterator<Item = (u32, u32)>,
@@ -216,7 +217,7 @@ mod tests {
             .filter(|(_, of)| of.get(1).is_some_and(|id| decorated.contains(id)))
             .map(|(op, _)| *op)
             .collect();
-        // A store has the result at the same operand.
+        // A store has the id of a result as the same operand.
         opcodes.retain(|op| ![DECORATE, STORE].contains(op));
         opcodes.sort_unstable();
         assert_eq!(opcodes, [127, 129, 129, 131, 136, 142, 142]);

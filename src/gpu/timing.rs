@@ -24,8 +24,9 @@ pub struct Timing {
 impl Timing {
     /// Creates a timing without stages.
     pub fn new(gpu: &Gpu) -> Self {
-        // A software adapter runs one pass at a time, so wall time is as good; and Mesa's, once it
-        // has drawn triangles, writes the timestamps of compute passes before they run.
+        // A software adapter runs one pass at a time, so wall time is as good. Mesa's software
+        // adapter, once it has drawn triangles, even writes the timestamps of compute passes before
+        // they run.
         Self::by(gpu.adapter.timestamps && gpu.adapter.kind != "software")
     }
 
@@ -52,7 +53,7 @@ impl Timing {
         self.queries.is_some()
     }
 
-    /// Records a compute pass that counts as `stage`; `before` records what precedes it.
+    /// Records a compute pass that counts as `stage`; `before` records commands before the pass.
     pub(crate) fn pass(
         &mut self,
         gpu: &Gpu,

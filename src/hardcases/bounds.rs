@@ -1,8 +1,8 @@
 //! Bounds on each pixel's error, derived from the pixel's own fragments. No number is fitted to a
 //! result.
 //!
-//! With u = 2^-24, for the fragments that the device may accept by
-//! [`Precision`](super::precision::Precision):
+//! The bounds cover all fragments that the device may accept by
+//! [`Precision`](super::precision::Precision). With u = 2^-24:
 //!
 //! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls
 //!   with rho), and by the errors that WGSL allows its functions: 3 + 2 x units in the last place
@@ -11,20 +11,21 @@
 //!   of the pixel's attributes times `sum |dw| / sum w`. Wrong attributes add `sum w da / sum w`.
 //!   The accumulator adds its own bound times the range that it maps to [0, 1]: the scene's
 //!   colours, 2 for normals, the accepted interval of depths.
-//! - **Colour** is then unpremultiplied and put over nothing: three more relative errors of
+//! - **Colour** is then unpremultiplied and put over nothing, which adds three relative errors of
 //!   divisions and products.
-//! - **Samples**: the colour of a pixel with several samples is the mean of theirs, and so is its
-//!   bound.
+//! - **Samples**: the colour of a pixel with several samples is the mean of the samples' colours,
+//!   and its bound is the mean of their bounds.
 //! - **Lines** at which a disk ends: the distance inside a line errs by the line's length times the
 //!   error of (u, v), and by 10 u of itself.
 //! - **Caps** turn the normal by the slopes times the error of (u, v), and by 30 u of the slopes.
-//! - **Points** that face the camera come nearer by their heights, which err by their change over
-//!   the error of rho.
+//! - **Points** that face the camera come nearer by a height that depends on rho. The height errs
+//!   by its change over the error of rho.
 //! - **Normal**: s x t errs by 6 u |s||t|; normalising and mapping it and normalising the mean add
 //!   12 u. The error of the mean is divided by the mean's length.
 //!
-//! A pixel is **open** if these errors leave undecided whether some fragment belongs to it, or
-//! which side is nearest. There f32 may rightly decide otherwise, and the pixel is excused.
+//! A pixel is **open** if these errors leave undecided whether some fragment belongs to the pixel,
+//! or which side is nearest. An open pixel is excused, as f32 may rightly decide otherwise than
+//! f64.
 
 use glam::{DVec3, Vec3};
 
@@ -42,7 +43,7 @@ pub(super) const DIVISION: f64 = 5.0 * U;
 /// Error terms of a pixel, independent of the accumulator. Sums are over accepted fragments.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
-    /// Whether some fragment may rightly be decided otherwise.
+    /// Whether the device may rightly decide otherwise about some fragment.
     pub open: bool,
     /// Number of accepted fragments.
     pub count: u32,
@@ -186,7 +187,7 @@ impl Pixel {
     }
 }
 
-/// Returns the bound on straight colour and alpha of a premultiplied mean with an error.
+/// Converts a premultiplied mean and its error to bounds on straight colour and alpha.
 pub(super) fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
     let alpha = mean[3] - error[3];
     std::array::from_fn(|k| {
@@ -200,11 +201,11 @@ pub(super) fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
     })
 }
 
-/// Returns the bound on straight colour and alpha of a pixel with several samples: the mean of
-/// theirs.
+/// Returns the bounds on straight colour and alpha of a pixel with several samples: the mean of the
+/// samples' bounds.
 ///
-/// Each sample is unpremultiplied and premultiplied again before it is added, with the relative
-/// errors of two divisions and products, and the sum of n samples adds n relative roundings.
+/// Each sample is unpremultiplied and premultiplied again before it is added, which adds the
+/// relative errors of two divisions and products. The sum of n samples adds n relative roundings.
 pub fn color_of_samples(samples: &[&Pixel], accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [f64; 4] {
     let count = samples.len() as f64;
     let (mut mean, mut error) = ([0.0; 4], [0.0; 4]);
@@ -224,10 +225,10 @@ struct Depths {
     surfel: u32,
     first: f64,
     second: f64,
-    /// For fronts and for backs: the smallest depth that one may have, and the smallest that one
-    /// surely has.
+    /// For fronts and for backs: the smallest depth that a fragment may have, and the depth that
+    /// the nearest fragment surely does not exceed.
     sides: [[f64; 2]; 2],
-    /// The nearest fragment of the twin.
+    /// The nearest fragment in the f64 twin.
     found: Nearest,
 }
 
@@ -271,8 +272,9 @@ impl Depths {
         !nearer(front, back) && !nearer(back, front)
     }
 
-    /// The smallest possible depth of the other surfels' fragments: a fragment is never too far
-    /// behind itself, however uncertain its depth is.
+    /// Returns the smallest possible depth among the fragments of other surfels. The surfel's own
+    /// fragment does not count: no fragment is too far behind itself, however uncertain its depth
+    /// is.
     fn beside(&self, surfel: u32) -> f64 {
         if surfel == self.surfel { self.second } else { self.first }
     }
@@ -296,7 +298,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<Pixel> 
     fragments(&splats, scene, view, |pixel, splat, surface, f| {
         let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
         let behind = |front: f64| options.epsilon.farthest(front, surface.radius, along);
-        // The slope of a ray takes an inverse root and three roundings of its argument.
+        // The slope of a ray takes an inverse square root, whose argument has three roundings.
         let of_ray = if let Epsilon::Ray(length) = options.epsilon { 10.0 * U * length } else { 0.0 };
         let rounding = 4.0 * U * f.depth.abs() + of_ray;
         let (near, front) = (&depths[pixel], depths[pixel].found);

@@ -177,8 +177,8 @@ fn edge_on_nearly(stage: &Stage) -> Filling {
         surfels.push(standing(stage, 8.0 + 5.0 * k as f64, 24.0, 3.0, tilt));
         surfels.push(standing(stage, 40.0 + 4.0 * k as f64, 20.0, 3.0, -tilt));
     }
-    // Up to a tilt of 1e-5, the depth's error exceeds epsilon: in nine of fifteen columns, of 11 to
-    // 16 pixels each.
+    // At tilts of up to 1e-5, the depth's error exceeds epsilon. This concerns nine of fifteen
+    // columns, each of 11 to 16 pixels.
     Filling { excused: 0.05, ..Filling::of(surfels, (0.02, 0.2)) }
 }
 
@@ -188,7 +188,7 @@ fn edge_on_askew(stage: &Stage) -> Filling {
         let (x, y) = ((64.0 * fraction(k, 0)).floor(), (48.0 * fraction(k, 1)).floor());
         surfels.push(standing(stage, x, y, 2.0 + fraction(k, 2), tilt));
     }
-    // The same holds for twelve of twenty columns.
+    // As in edge_on_nearly(), the depth's error exceeds epsilon, in twelve of twenty columns.
     Filling { excused: 0.08, ..Filling::of(surfels, (1.0, 1.0)).with_lone_rims() }
 }
 
@@ -253,7 +253,7 @@ fn hundredth_of_a_pixel(stage: &Stage) -> Filling {
         let (x, y) = ((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
         let z = 3.0 + 0.02 * fraction(k, 0);
         let angle = TAU * fraction(k, 1);
-        // Half of them lie beside the pixel's centre.
+        // Half of the disks lie beside the pixel's centre.
         let from_center = if (k / width + k % width).is_multiple_of(2) { 0.005 } else { 0.3 };
         let center = stage.at(x + from_center * angle.cos(), y + from_center * angle.sin(), z);
         surfels.push(stage.disk(center, DVec3::new(0.2, 0.1, -1.0), 0.01 * stage.pixel(z)));

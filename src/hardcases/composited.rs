@@ -1,19 +1,19 @@
 //! Bounds on each pixel's error if surfaces show through each other. They combine the bounds of
 //! each surface or fragment ([`bounds`](super::bounds)) by the rules of compositing.
 //!
-//! From front to back, a pixel's transmittance T starts at 1. A surface of alpha a, with error da,
-//! and premultiplied colour p, with error dp, adds T p to the colour and leaves T (1 - a). With
-//! errors dT of T and dC of the colour, and u = 2^-24:
+//! From front to back, a pixel's transmittance T starts at 1. A surface has the alpha a with error
+//! da, and the premultiplied colour p with error dp. It adds T p to the colour and leaves the
+//! transmittance T (1 - a). With errors dT of T and dC of the colour, and u = 2^-24:
 //!
 //! - `dC += dT |p| + T dp + T |p| (d + 6 u)`, as p is divided by a and multiplied again, with the
 //!   error d of a division and six roundings;
 //! - `dT <- dT (1 - a) + (T + dT) da + 4 u T`.
 //!
 //! A pixel is **open** if these errors leave undecided whether a front or a back is nearer, where a
-//! gap of epsilon lies, or which fragments lie within epsilon of a surface's nearest one. With
-//! sorted fragments it is open if they leave undecided which of two fragments is nearer. Fragments
-//! of disks in the same place are exempt: their depths are the same numbers, and the order of the
-//! surfels decides.
+//! gap of epsilon lies, or which fragments lie within epsilon of a surface's nearest fragment. With
+//! sorted fragments, a pixel is open if the errors leave undecided which of two fragments is
+//! nearer. Fragments of disks in the same place are exempt: their depths are the same numbers, and
+//! the order of the surfels decides.
 
 use super::bounds::{ColorRange, DIVISION, NOTHING, Pixel, straight};
 use super::fragment_bounds::{Fragment, Surface, fragments, weight_error};
@@ -26,7 +26,7 @@ use crate::scene::{Camera, Composite, Scene, Tail};
 /// The bound on a pixel's colour.
 #[derive(Clone, Copy, Debug)]
 pub struct Composited {
-    /// Whether something may rightly be decided otherwise.
+    /// Whether the device may rightly decide otherwise about something.
     pub open: bool,
     /// Bounds on straight linear RGB, and on alpha.
     pub color: [f64; 4],
@@ -67,7 +67,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<Composi
     lists.into_iter().map(known).collect()
 }
 
-/// A premultiplied colour and alpha, and its error.
+/// A premultiplied colour with its alpha, and the error of each channel.
 type Known = [[f64; 4]; 2];
 
 /// The composite so far, with the error of the device.
@@ -99,8 +99,8 @@ impl Shown {
     }
 }
 
-/// Composites the fragments one by one, and returns whether the pixel is **open**. It is also open
-/// if it is undecided by the rules whether a fragment is listed, or whether it is the last.
+/// Composites the fragments one by one, and returns whether the pixel is **open**. A pixel is also
+/// open if errors leave undecided whether a fragment is listed, or which fragment is the last.
 fn sorted(list: &[Listed], options: &Settings) -> (bool, Shown) {
     let (mut open, mut shown) = (false, Shown::NOTHING);
     let (rules, opacity) = (Rules::of(options), f64::from(options.opacity));

@@ -14,8 +14,8 @@
 //!   by 4 e of itself.
 //! - The errors of the quadratic's coefficients follow from its derivatives, plus 12 e of the terms
 //!   that each coefficient sums.
-//! - The discriminant Q then errs by some dQ. If |Q| > dQ, the number of roots is certain, and a
-//!   root errs by at most 2 dF / sqrt(Q - dQ), if that is less than half the distance to the other
+//! - The discriminant Q then errs by some dQ. If |Q| > dQ, the number of roots is certain. A root
+//!   then errs by at most 2 dF / sqrt(Q - dQ), if that is less than half the distance to the other
 //!   root. Here dF is the error of the polynomial at the twin's root; the stable formula adds 12 e
 //!   of the polynomial's terms to it.
 
@@ -70,7 +70,7 @@ impl Precision {
             return Bound { rho: 0.0, depth: 0.0 };
         }
         let slope = (discriminant - unknown).sqrt();
-        // Uses the larger root: for each of the two it must be certain whether it is a hit.
+        // Uses the larger root, as it must be certain for both roots whether they are hits.
         let far = -0.5 * (b + discriminant.max(0.0).sqrt().copysign(b));
         let sigma = [far / a, c / far].map(f64::abs).into_iter().fold(0.0, f64::max).min(FARTHEST_HIT);
         let terms = a.abs() * sigma * sigma + b.abs() * sigma + c.abs();
@@ -180,8 +180,8 @@ const LIST: &[Entry] = &[
     },
 ];
 
-/// The `k`th of some caps at depths around 3: round, or long if `thin` is less than 1. `height` is
-/// in units of the longer half-axis.
+/// Returns cap number `k` of a series at depths around 3: round, or long if `thin` is less than 1.
+/// `height` is in units of the longer half-axis.
 fn scattered(stage: &Stage, k: usize, pixels: f64, thin: f64, height: f64) -> (crate::scene::Surfel, Cap) {
     let (width, rows) = stage.size();
     let z = 3.0 + 0.2 * fraction(k, 0);

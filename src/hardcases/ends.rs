@@ -115,7 +115,8 @@ fn samples(across: u32, down: u32, filling: Filling) -> Filling {
     filling
 }
 
-/// The `k`th of some disks over the image, at about the depth `z`, with a radius of `pixels`.
+/// Returns disk number `k` of a series over the image, at about depth `z`, with a radius of
+/// `pixels`.
 fn scattered(stage: &Stage, k: usize, z: f64, pixels: f64) -> Surfel {
     let (width, height) = stage.size();
     let z = z + 0.02 * fraction(k, 0);
@@ -139,7 +140,7 @@ fn cut_disks(stage: &Stage) -> Filling {
             // A sliver between two nearly equal lines.
             2 => Clip([line(angle, 0.1), line(angle + PI, -0.12)]),
             3 => Clip([line(angle, -0.5), line(angle + 2.0, -0.3)]),
-            // Past the rim, on one side or the other: the whole disk, or nothing.
+            // Lines past the rim, on one side or the other, keep the whole disk or nothing.
             4 => Clip([line(angle, -1.5), line(angle, if k % 12 == 4 { 1.5 } else { -2.0 })]),
             _ => Clip::NONE,
         });

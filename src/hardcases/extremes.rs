@@ -234,7 +234,7 @@ fn depth_ratio(stage: &Stage) -> Filling {
     }
 }
 
-/// The sheet of [`rough`] in an image too small for a pixel that only rims reach.
+/// The sheet of [`rough`] in an image so small that no pixel is reached by rims only.
 fn without_rims(stage: &Stage) -> Filling {
     Filling { expected: Vec::new(), ..rough(stage) }
 }
@@ -245,7 +245,7 @@ fn rough(stage: &Stage) -> Filling {
         .with_lone_rims()
 }
 
-/// One colour for each disk of [`rough`]; `value` takes the disk's index and an axis of
+/// Returns a colour for each disk of [`rough`]; `value` takes the disk's index and an axis of
 /// [`fraction`].
 fn colors(stage: &Stage, value: impl Fn(usize, usize) -> f64) -> Vec<[f32; 4]> {
     let count = rough(stage).surfels.len();
@@ -288,7 +288,7 @@ fn tail(stage: &Stage, kernel: Kernel) -> Filling {
     for k in 0..width * height * 4 {
         let (x, y) = ((k / 4 % width) as f64 + 0.5, (k / 4 / width) as f64 + 0.5);
         let (dx, dy) = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)].get(k % 4).copied().unwrap_or_default();
-        // The next pixel's centre is 0.5125 pixels away: outside.
+        // The next pixel's centre is 0.5125 pixels from the disk's centre: outside the disk.
         let center = stage.at(x + 0.4875 * dx, y + 0.4875 * dy, 3.0);
         let normal = DVec3::NEG_Z;
         surfels.push(stage.disk(center, normal, 0.49 * stage.pixel(3.0)));

@@ -44,7 +44,7 @@ impl Fragment {
     }
 
     pub(super) fn may_hit(&self, camera: &Camera) -> bool {
-        // With NaN as an error, the fragment may hit.
+        // If an error is NaN, the fragment may hit.
         !(self.rho - self.rho_error > 1.0
             || self.inside + self.inside_error < 0.0
             || self.depth + self.depth_error < camera.near * (1.0 - U))
@@ -81,7 +81,7 @@ pub(super) fn fragments(
                     rho,
                     rho_error: known(bound.rho),
                     inside: at.inside,
-                    // For a cap, this may be the distance by which the ray's other intersection
+                    // For a cap, `inside` may be the distance by which the ray's other intersection
                     // misses.
                     inside_error: known(
                         line_error(&splat.clip, rho, bound.rho)
@@ -101,8 +101,8 @@ pub(super) fn fragments(
 /// Bounds the error of the distance inside the lines of `clip`, for a point that is `rho` from the
 /// centre, with the error `rho_error`.
 ///
-/// The distance changes with (u, v) by the line's length. The line is turned with the disk, with a
-/// relative error of 6 u, and each of its products has an error of 4 u.
+/// The distance changes by the line's length per unit of (u, v). The line is turned with the disk,
+/// with a relative error of 6 u, and each of its products has an error of 4 u.
 fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
     let of_line = |[x, y, z]: [f32; 3]| {
         let (length, z) = (f64::from(x).hypot(y.into()), f64::from(z).abs());
@@ -111,7 +111,7 @@ fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
     if clip.is_none() { 0.0 } else { of_line(clip.0[0]).max(of_line(clip.0[1])) }
 }
 
-/// Bounds the error of a cap's normal, for an error of (u, v): the slopes times it, and 30 u of the
+/// Bounds the error of a cap's normal: the slopes times the error of (u, v), plus 30 u of the
 /// slopes.
 fn turned_error(splat: &Splat, rho_error: f64) -> f64 {
     splat.curve.map_or(0.0, |curve| curve.slopes.map(DVec3::length).iter().sum::<f64>() * (rho_error + 30.0 * U))

@@ -39,9 +39,9 @@ pub struct MapError {
     pub rms: f64,
     /// Largest bound of any pixel, as a fraction of the range.
     pub bound: f64,
-    /// Largest ratio of a pixel's error to its bound by the case; above 1, the bound is exceeded.
+    /// Largest ratio of a pixel's error to the case's bound; above 1, the bound is exceeded.
     pub used: f64,
-    /// Largest ratio of a pixel's error to its bound by the row's own accumulator.
+    /// Largest ratio of a pixel's error to the bound of the row's own accumulator.
     pub used_of_own: f64,
 }
 
@@ -75,8 +75,8 @@ pub struct Row {
     pub covered: f64,
     /// Number of one-word sums that wrapped; if there are any, the image is that of `fixed`.
     pub overflows: u64,
-    /// If `fixed` has a larger RMSE than f32 sums by more than one rounding of the output: the map,
-    /// and both values.
+    /// The map and both values, if the RMSE of `fixed` exceeds that of f32 sums by more than one
+    /// rounding of the output.
     pub over_float: Option<String>,
     /// Milliseconds of the render on the device, without compilation.
     pub device_ms: f64,
@@ -321,8 +321,8 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
 }
 
 /// Fails the row of `fixed` if f32 sums have a smaller RMSE, in any map, by more than one rounding
-/// of the output: `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. The row also notes the
-/// values. `rows` must be those of one case.
+/// of the output: `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. Also stores the values in
+/// [`Row::over_float`]. `rows` must be those of one case.
 pub fn compare_rmse(rows: &mut [Row]) {
     let rounding = 1.0 / 16_777_216.0;
     let floats = |row: &&Row| [Accumulator::Float, Accumulator::Cas].map(Accumulator::name).contains(&row.accumulator);

@@ -2,12 +2,13 @@
 //!
 //! A case is rendered by the f64 reference and, with each accumulator, on the device. Its bound is
 //! derived pixel by pixel from the fragments that the reference blends there ([`bounds`]), for the
-//! accumulator `fixed`. An accumulator that is expected to exceed it has a stated reason, and must
-//! still keep the bound of its own row in [`ACCUMULATORS`]. A verdict checks:
+//! accumulator `fixed`. An accumulator that is expected to exceed this bound has a stated reason,
+//! and must still keep the bound of its own row in [`ACCUMULATORS`]. A verdict checks:
 //!
 //! - every value of every map: none is NaN, and each differs from the reference by no more than its
 //!   bound;
-//! - pixels that only one of the two covers, and counts of fragments: none differ;
+//! - coverage and count of fragments of every pixel: they are the same in the image and the
+//!   reference;
 //! - excused pixels, where a fragment lies within
 //!   [`DECISION_MARGIN`](crate::metrics::DECISION_MARGIN) of a decision, or within its own derived
 //!   error of one: no more than the case allows;
@@ -96,7 +97,7 @@ pub struct Truth {
     pub frame: Frame,
     /// The error terms at each pixel's centre.
     pub pixels: Vec<bounds::Pixel>,
-    /// The error terms of each sample, in rows of the finer grid, if a pixel has several.
+    /// The error terms of each sample, in rows of the finer grid, if a pixel has several samples.
     pub samples: Vec<bounds::Pixel>,
     /// The bounds on each pixel's colour, if surfaces show through each other; the maps are still
     /// those of the nearest surface.
@@ -128,7 +129,7 @@ impl HardCase {
             Composite::Opaque => Vec::new(),
             _ => composited::pixels(&self.scene, &self.camera, &self.options),
         };
-        // These are the terms of an opaque picture, in which backs may be left out.
+        // The terms in `pixels` are those of an opaque picture, in which backs may be left out.
         Ok(Truth { frame, pixels: known(&self.camera), samples, composited })
     }
 

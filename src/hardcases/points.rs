@@ -126,16 +126,17 @@ impl Precision {
     /// Bounds the device's error at pixel (x, y) of a point that faces the camera, including the
     /// evaluation.
     ///
-    /// The error has three parts. That of a disk parallel to the image, whose radius has a relative
-    /// error of 6 e, like that of a turned disk. At the pixel that contains the point, that of the
-    /// distance in pixels: 5 e of a pixel and 4 e of the terms. And that of the height, which is
-    /// evaluated at a rho with an error, and to 40 e of itself.
+    /// The error has three parts. The first is the error of a disk parallel to the image, whose
+    /// radius has a relative error of 6 e, like the radius of a turned disk. The second applies at
+    /// the pixel that contains the point: the distance in pixels errs by 5 e of a pixel and 4 e of
+    /// the terms. The third is the error of the height, which is evaluated at a rho with an error,
+    /// and to 40 e of the height.
     pub fn point(&self, point: &Point, splat: &Splat, (x, y): (u32, u32), at: &Intersection) -> Bound {
         let height = |rho: f64| point.shape().height((rho * rho).min(1.0)) * point.radius();
         let rho = at.rho2.sqrt();
         let plane = at.depth + height(rho);
-        // The bound of a disk limits the error of the length of (u, v), and so of each of its
-        // components, which decide for a square.
+        // The bound of a disk limits the error of the length of (u, v). So it also limits the
+        // errors of u and v, which decide whether a square is hit.
         let disk = self.fragment(splat, x, y, &Intersection { depth: plane, rho2: at.uv.length_squared(), ..*at });
         let step = DVec2::new(f64::from(x) - splat.anchor[0] as f64, f64::from(y) - splat.anchor[1] as f64);
         let own = 2.0 * (5.0 * E + 4.0 * E * (step.abs().element_sum() + 1.0)) + 16.0 * E * rho;

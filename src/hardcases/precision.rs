@@ -20,7 +20,7 @@
 //!   division.
 //!
 //! rho changes by no more than the vector (u, v). For a pinhole, a relative error of the depth is
-//! also one of rho.
+//! also a relative error of rho.
 
 use crate::passes::splat::{Intersection, Splat};
 use crate::scene::{Camera, Projection, Scene};
@@ -58,8 +58,8 @@ pub struct Precision {
     pub(super) anchor_ray: DVec3,
     pub(super) principal: DVec2,
     pub(super) focal: f64,
-    /// Frobenius norm of the coefficients of x and y in rows a and b; below, their smaller singular
-    /// value.
+    /// Frobenius norm of the coefficients of x and y in rows a and b. The next field is their
+    /// smaller singular value.
     change: f64,
     least_change: f64,
     depth_row: DVec2,
@@ -106,8 +106,8 @@ impl Precision {
             change: change.sqrt(),
             least_change: std::f64::consts::SQRT_2 * determinant / change.sqrt(),
             depth_row: splat.c.truncate(),
-            // A margin on 8: if the kernel's own f32 may decide either way, the wider bound is
-            // used.
+            // A margin above the kernel's limit of 8: where its f32 may decide either way, the
+            // wider bound is used.
             thin: own && change > 8.01 * determinant,
         }
     }
@@ -118,14 +118,14 @@ impl Precision {
         if error < 0.9 { error / (1.0 - error) } else { f64::INFINITY }
     }
 
-    /// Whether the device may rightly differ about which side of the disk is seen, or whether it is
-    /// seen.
+    /// Whether the device may rightly differ about which side of the disk is seen, or whether the
+    /// disk is seen.
     pub fn side_is_open(&self) -> bool {
         self.determinant().is_infinite()
     }
 
-    /// Bounds the record's error at pixel (x, y), where the twin has `at`, as if both were
-    /// evaluated exactly.
+    /// Bounds the error of the device's record at pixel (x, y), where the twin has the intersection
+    /// `at`. Leaves out the rounding of the evaluation.
     pub fn record(&self, splat: &Splat, x: u32, y: u32, at: &Intersection) -> Bound {
         self.bound(splat, x, y, at, 0.0)
     }

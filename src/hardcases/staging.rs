@@ -52,7 +52,8 @@ impl Stage {
         Self::placed(projection, size, DVec3::ZERO, 1.0)
     }
 
-    /// Creates the oblique stage in a scene about `origin`, with `unit` world units per unit.
+    /// Creates the oblique stage in a scene about `origin`, with `unit` world units per unit of the
+    /// stage.
     pub fn placed(projection: Projection, size: (u32, u32), origin: DVec3, unit: f64) -> Result<Self> {
         let forward = DVec3::new(-0.22, 0.91, -0.35).normalize();
         let right = forward.cross(DVec3::Z).normalize();
@@ -168,8 +169,8 @@ const BITS: &str = "one-word sums have only 24 fraction bits where hundreds of f
                     weight of 1/400 at a disk's rim";
 
 /// Options of all cases: unlit, over an empty background. Duplicate disks are drawn too, because
-/// sums of many terms are judged. The tolerance does not depend on the disks' sizes, which differ
-/// by many powers of ten.
+/// sums of many terms are judged. Epsilon does not depend on the disks' sizes, which differ by many
+/// powers of ten.
 pub fn options() -> Settings {
     let (without, epsilon) = (vec![Optimisation::Copies], Epsilon::Relative(0.01));
     Settings { epsilon, shading: Shading::Unlit, lights: Vec::new(), without, ..Settings::default() }
@@ -192,8 +193,8 @@ impl Filling {
         }
     }
 
-    /// Expects one-word sums to fail: some pixel is reached only by the rims of disks, where they
-    /// have too few bits.
+    /// Expects one-word sums to fail: some pixel is reached only by the rims of disks, where the
+    /// sums have too few bits.
     pub fn with_lone_rims(self) -> Self {
         self.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
     }
@@ -218,8 +219,8 @@ impl Filling {
 }
 
 impl Stage {
-    /// Applies [`Filling::with_lone_rims`] if the stage has this `projection`; the other sees no
-    /// such pixel.
+    /// Applies [`Filling::with_lone_rims`] if the stage has this `projection`: with the other
+    /// projection, no pixel is reached by rims only.
     pub fn rims_in(&self, projection: Projection, filling: Filling) -> Filling {
         if self.camera.projection == projection { filling.with_lone_rims() } else { filling }
     }

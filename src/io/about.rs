@@ -24,7 +24,8 @@ pub struct About {
     /// The interpretation of the colour numbers, if colours are drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colors: Option<String>,
-    /// The intensities that become black and white, if they are drawn instead of colours.
+    /// The intensities that are drawn as black and as white, if intensities are drawn instead of
+    /// colours.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intensities: Option<[f64; 2]>,
 }
@@ -40,7 +41,8 @@ pub struct Attribute {
     pub(super) role: Role,
 }
 
-/// The role of an attribute: whether colours and intensities are used is decided after reading.
+/// The role of an attribute. Colours and intensities are marked, because whether they are used is
+/// decided only after reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Role {
     Color,

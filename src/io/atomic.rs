@@ -10,13 +10,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// The writer of an output file: buffered, and seekable even if the final path is not.
 pub type Output<'a> = BufWriter<&'a mut File>;
 
-/// Writes the file at `path` through `fill`, into a temporary file beside it that is renamed at the
+/// Writes the file at `path`: `fill` writes a temporary file beside it, which is renamed at the
 /// end.
 ///
 /// A reader of `path` sees the old file or the complete new one. After a failure or [`abandon`], no
-/// part of the new one is left. A replaced file keeps its mode. Symbolic links are followed: their
-/// target is replaced, and they stay. A path that is not a file (a device, a pipe, an open file in
-/// /proc) is written to and not replaced.
+/// part of the new file is left. A replaced file keeps its mode. Symbolic links are followed: the
+/// target is replaced, and the link stays. A path that is not a file (a device, a pipe, an open
+/// file in /proc) is written to and not replaced.
 ///
 /// # Errors
 ///
@@ -50,8 +50,8 @@ pub fn try_output(path: &Path) -> Result<()> {
     tried().map_err(|source| Error::write(path, source))
 }
 
-/// Checks that files can be created in `folder`, or if it is missing in its nearest existing
-/// ancestor.
+/// Checks that files can be created in `folder`, or in its nearest existing ancestor if it is
+/// missing.
 ///
 /// # Errors
 ///
@@ -90,8 +90,8 @@ pub fn place_of(path: &Path) -> Option<PathBuf> {
     Some(end.ancestors().find_map(canonical).unwrap_or(end))
 }
 
-/// Removes all temporary files, and blocks every later creation or renaming. For a program that is
-/// about to exit while other threads may still write.
+/// Removes all temporary files, and blocks threads that would create or rename one later. For a
+/// program that is about to exit while other threads may still write.
 pub fn abandon() {
     let mut unfinished = lock();
     unfinished.drain(..).for_each(|path| drop(fs::remove_file(path)));
@@ -143,8 +143,8 @@ impl Target {
     }
 }
 
-/// Follows a chain of symbolic links to its end, whether that exists or not. None for a file that a
-/// process has open: /proc lists these as links, which lead nowhere if the file has no name.
+/// Follows a chain of symbolic links to its end, whether the end exists or not. None for a link in
+/// /proc to a file that a process has open: it leads nowhere if the file has no name.
 fn end_of_links(path: &Path) -> io::Result<Option<PathBuf>> {
     let mut end = path.to_owned();
     for _ in 0..MOST_LINKS {
@@ -252,14 +252,15 @@ fn finish(files: Vec<Unfinished>) -> Result<()> {
     named
 }
 
-/// Writes a temporary file through `fill`. None if `path` is not a file; it was written to.
+/// Lets `fill` write a temporary file, and returns it ready to be renamed. If `path` is not a file,
+/// the content is copied to it instead, and the result is None.
 fn filled(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> Result<Option<Unfinished>> {
     let filled = || match Target::of(path)? {
         Target::Stream => {
             let mut whole = tempfile::tempfile()?;
             buffered(&mut whole, fill)?;
             whole.rewind()?;
-            // Append, because the open stream may be a file that others write to as well.
+            // Append, because the open stream may be a file that other processes write to as well.
             io::copy(&mut whole, &mut OpenOptions::new().append(true).open(path)?)?;
             Ok(None)
         }

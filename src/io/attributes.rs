@@ -1,13 +1,13 @@
 //! Names of point attributes that programs write in PLY and PCD files.
 //!
-//! The names are those that these programs write, or read as such: PDAL (`normalx`, `intensity`,
+//! These programs write the names, or recognise them when reading: PDAL (`normalx`, `intensity`,
 //! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field), the Point Cloud
 //! Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D (`normal_x` and `rgb` in PCD), MeshLab
 //! (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
 //! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`) and 3D Gaussian splatting
-//! (`nxx ny nz`). CGAL, Agisoft and Metashape use names from these.
+//! (`nxx ny nz`). CGAL, Agisoft and Metashape use some of the same names.
 //!
-//! Case does not matter, but a name that matches in case comes first. A prefix `scalar_` is
+//! Case does not matter, but a name of the same case takes precedence. A prefix `scalar_` is
 //! ignored.
 
 /// Names of the red, green and blue channel.
@@ -155,15 +155,14 @@ pub(super) const INTENSITY: &[&str] = &[
 /// Names of a disk's radius in world units.
 pub(super) const RADIUS: &[&str] = &["radius", "scale", "pscale"];
 
-/// Names of attributes with three or more numbers, for formats that have them: normals, and
-/// colours.
+/// Names of normals, and of colours, that are one attribute of three or more numbers.
 #[cfg(feature = "pcd")]
 pub(super) const NORMAL_VECTOR: &[&str] = &["normal", "normals", "N"];
 #[cfg(feature = "pcd")]
 pub(super) const COLOR_VECTOR: &[&str] = &["rgb", "rgba", "color", "colors", "colour", "Cd", "Col"];
 
-/// The index in `given` of the first of `names` that occurs there: in the same case, or else in any
-/// case, or else after `scalar_`.
+/// The index in `given` of the first of `names` that occurs there. Names of the same case take
+/// precedence, then names of another case, then names after the prefix `scalar_`.
 pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
     let first =
         |is: &dyn Fn(&str, &str) -> bool| names.iter().find_map(|name| given.clone().position(|given| is(given, name)));
@@ -178,8 +177,8 @@ pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Cl
 
 /// The indices of three attributes, one from each list of names.
 pub(super) fn find_triple<'a>(names: [&[&str]; 3], given: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
-    // Three names of one spelling come first: a file may have `nx ny nz`, and `normal_x` with
-    // another meaning.
+    // Three names of one spelling take precedence: a file with `nx ny nz` may also have a
+    // `normal_x` that means something else.
     let alike = (0..names[0].len()).find_map(|k| {
         let one = |channel: usize| find(names[channel].get(k..=k)?, given.clone());
         Some([one(0)?, one(1)?, one(2)?])

@@ -14,13 +14,13 @@ pub(super) struct Beside {
 }
 
 impl Beside {
-    /// Files beside the one at `path`.
+    /// Prepares the lookup of files beside the one at `path`.
     pub(super) fn of(path: &Path) -> Self {
         Self { folder: path.parent().unwrap_or(Path::new("")).to_owned(), listed: HashMap::new() }
     }
 
-    /// The path of the file with this `name`, which may have Windows backslashes and another case
-    /// than on disk. If there is none, the path of the name as it is.
+    /// The path of the file with this `name`, which may have Windows backslashes and differ in case
+    /// from the file on disk. If no file matches, the path of the name as it is written.
     pub(super) fn file(&mut self, name: &str) -> PathBuf {
         let name = name.replace('\\', "/");
         let as_written = self.folder.join(&name);

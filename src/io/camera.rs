@@ -7,8 +7,8 @@
 //!
 //! Camera space is x right, y down, z forward. The pose is `camera_to_world` or `world_to_camera`
 //! (4x4, rows), or `eye`, `target` and optionally `up`. The lens is `fx fy cx cy` in pixels, or
-//! `fov` (vertical, degrees). With `"model": "orthographic"` it is `fx fy cx cy` in pixels per
-//! world unit, or `height_world`.
+//! `fov` (vertical, degrees). With `"model": "orthographic"` the lens is `fx fy cx cy` in pixels
+//! per world unit, or `height_world`.
 
 use std::path::Path;
 
@@ -79,12 +79,12 @@ pub fn read(path: &Path) -> Result<CameraFile> {
 }
 
 impl CameraFile {
-    /// Scales the image by `scale` a side, with rounded sizes; the field of view stays the same. A
-    /// camera without a size is unchanged.
+    /// Scales width and height of the image by `scale`, and rounds them; the field of view stays
+    /// the same. A camera without a size is unchanged.
     pub fn scaled(self, scale: f64) -> Self {
         let Some((width, height)) = self.size else { return self };
         // Rounds to at least one pixel, unless the size is 0. Sizes that are too large saturate;
-        // they and 0 are refused where sizes are checked.
+        // these sizes and 0 are refused where sizes are checked.
         let scaled = |side: u32| if side == 0 { 0 } else { (f64::from(side) * scale).round().max(1.0) as u32 };
         let size = (scaled(width), scaled(height));
         let (x, y) = (f64::from(size.0) / f64::from(width), f64::from(size.1) / f64::from(height));

@@ -31,7 +31,8 @@ impl ClassOpacities {
 
     /// Sets the alphas of points to the opacities of their `classes`.
     ///
-    /// Points without colours get the default one. Nothing changes if all these opacities are 1.
+    /// Points without colours get the default colour. Nothing changes if the opacities of all these
+    /// `classes` are 1.
     pub(super) fn fade(&self, colors: Option<Colors>, classes: &[u8]) -> Option<Colors> {
         if classes.iter().all(|class| self.of(*class) == 1.0) {
             return colors;
@@ -65,7 +66,7 @@ impl ClassOpacities {
     }
 }
 
-/// The format's name of a class; None for most, such as cables and pylons.
+/// The name of a class in the LAS specification; None for most classes, such as cables and pylons.
 pub fn class_name(class: u8) -> Option<&'static str> {
     Some(match class {
         0 => "never classified",
@@ -111,7 +112,7 @@ fn is_code(alpha: f32) -> bool {
 impl FromStr for ClassOpacities {
     type Err = Error;
 
-    /// Parses `CLASS:A` or `FIRST-LAST:A`, several separated by commas; later ones override earlier
+    /// Parses rules `CLASS:A` or `FIRST-LAST:A`, separated by commas. Later rules override earlier
     /// ones.
     fn from_str(text: &str) -> Result<Self, Error> {
         let mut all = Self::default();
@@ -162,7 +163,7 @@ mod tests {
         assert_eq!(codes, Some(Colors::Srgb8(vec![[1, 2, 3, 255], [1, 2, 3, 51]])));
         let [r, g, b, _] = DEFAULT_COLOR;
         assert_eq!(of.fade(None, &[3, 1]), Some(Colors::Linear(vec![[r, g, b, 0.2], [r, g, b, 1.0]])));
-        // No point has a class with another opacity than 1, so nothing changes.
+        // The classes of all points have opacity 1, so nothing changes.
         assert_eq!(of.fade(None, &[2, 1]), None);
     }
 }

@@ -9,10 +9,10 @@ use crate::{Error, Result};
 
 /// All files that are read together with the one at `path`, whether they exist or not.
 ///
-/// A PLY file may name a mesh and textures, an OBJ file material libraries, and these may name
-/// images. A named mesh is searched in turn. Empty for other files, and for files that cannot be
-/// read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the next
-/// [`Input::open`] uses the copy.
+/// A PLY file may name a mesh and textures. An OBJ file may name material libraries, which may name
+/// images. A named mesh is searched in turn. The list is empty for other files, and for files that
+/// cannot be read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the
+/// next [`Input::open`] uses the copy.
 ///
 /// # Errors
 ///
@@ -48,7 +48,8 @@ fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<Pat
         Err(error) if stream => return Err(error),
         Err(_) => return Ok(Vec::new()),
     };
-    // Names are relative to the folder that readers use; for standard input the current folder.
+    // Names are relative to the folder that readers use; for standard input this is the current
+    // folder.
     let own = if path == Path::new("-") { Path::new("") } else { path };
     let named = match input.format {
         Format::Ply => ply::companions(&mut input.file, own),

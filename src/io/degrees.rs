@@ -3,8 +3,8 @@
 /// Heights that span at least this many times the horizontal extent are in another unit.
 const TOO_HIGH: f64 = 50.0;
 
-/// Longitudes and latitudes are at least this many times farther from the origin than they are
-/// wide; an object around the origin is not.
+/// Longitudes and latitudes lie at least this many times their extent away from the origin; an
+/// object around the origin does not.
 const FAR: f64 = 3.0;
 
 /// A sentence for the user if the bounding box looks like longitude and latitude in degrees with

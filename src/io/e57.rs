@@ -112,7 +112,8 @@ fn name_of(name: &RecordName) -> String {
 
 /// Returns the readable scans with their names, and the number of all scans.
 ///
-/// Scans without points are left out, and those that [`check`] refuses.
+/// Leaves out scans without points, and scans that [`check`] refuses. `left` is the size of the
+/// file, bits.
 fn usable(
     scans: Vec<PointCloud>,
     mut left: u64,
@@ -126,7 +127,7 @@ fn usable(
             None => format!("scan {number}"),
         };
         match check(&scan, left) {
-            // A file none of whose scans has points is empty, which is no fault.
+            // If no scan has points, the file is empty, which is not an error.
             Ok(_) if scan.records == 0 && has_points => {
                 let fault = Fault::Malformed(format!("its scan {number} has no points"));
                 unread.add(|_| format!("{name} has no points"), 0, fault, strict)?;
@@ -145,7 +146,7 @@ fn usable(
     Ok((usable, all))
 }
 
-/// Separates a damaged file from a failure of the system.
+/// Converts an error of the `e57` crate: either the file is damaged, or the system failed.
 fn of_e57(error: ::e57::Error) -> Fault {
     if let ::e57::Error::Read { source: Some(source), .. } = &error
         && let Some(of_system) = source.downcast_ref::<io::Error>()
@@ -169,7 +170,7 @@ fn check(scan: &PointCloud, left: u64) -> Result<u64, String> {
         return Err(format!("has {} attributes, more than {MOST_ATTRIBUTES}", scan.prototype.len()));
     }
     // An attribute with constant values takes no bits. If all are constant, the file's length does
-    // not limit the number of points, so `checked_div` gives none and the scan is refused.
+    // not limit the number of points: `checked_div` then returns None, and the scan is refused.
     let bits: u64 = scan.prototype.iter().map(|record| bits(&record.data_type)).sum();
     let held = left.checked_div(bits).unwrap_or(0);
     if held < scan.records {
@@ -189,7 +190,7 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// Indices of a scan's coordinate attributes, and of the one that marks invalid points.
+/// Indices of a scan's coordinate attributes, and of the attribute that marks invalid points.
 #[derive(Clone, Copy)]
 struct Place {
     spherical: bool,
@@ -214,7 +215,8 @@ fn index(scan: &PointCloud, name: &RecordName) -> Option<usize> {
     scan.prototype.iter().position(|record| record.name == *name)
 }
 
-/// The normals of the extension `nor` (E57_EXT_surface_normals), with any namespace prefix.
+/// Indices of the normal attributes of the extension `nor` (E57_EXT_surface_normals), under any
+/// namespace prefix.
 fn normal(scan: &PointCloud) -> Option<[usize; 3]> {
     let named = |wanted: &str| {
         let is = |name: &RecordName| matches!(name, RecordName::Unknown { name, .. } if name == wanted);
@@ -241,12 +243,13 @@ struct Reading {
 }
 
 impl Reading {
-    /// The number of points, and the number of those left out.
+    /// The number of points that are kept so far, and the number of points that are left out.
     fn state(&self) -> (usize, usize) {
         (self.positions.len(), self.left_out.len())
     }
 
-    /// Leaves out all `records` points of a scan, before which the state was as given.
+    /// Goes back to the [`state`](Self::state) before a scan, and leaves out all its `records`
+    /// points.
     fn go_back(&mut self, (positions, left_out): (usize, usize), records: u64) {
         self.positions.truncate(positions);
         self.normals.iter_mut().for_each(|normals| normals.truncate(positions));

@@ -64,7 +64,7 @@ pub fn read(path: &Path) -> Outcome<Frame> {
     let unreadable = |e: Error| EpsplatError::malformed(path, format!("not a readable EXR: {e}"));
     let metadata = MetaData::read_from_file(path, false).map_err(unreadable)?;
     for header in &metadata.headers {
-        // 4 bytes a channel in the decoded image, and 4 in the frame.
+        // Each channel takes 4 bytes in the decoded image, and 4 in the frame.
         let channels: u64 = metadata.headers.iter().map(|header| header.channels.list.len() as u64).sum();
         check(path, (header.layer_size.0 as u64, header.layer_size.1 as u64), 8 * channels)?;
     }
@@ -123,7 +123,7 @@ mod tests {
         let color = ramp(n, 0.01).into_iter().map(|v| [v, 1.0 - v, -v, 0.5]).collect();
         let maps = MAPS.iter().map(|row| (row.map, ramp(n * row.map.width(), 1e-7)));
         let frame = maps.fold(Frame::of_colors(7, 5, color), |frame, (map, values)| frame.with(map, values));
-        // Numbers whose bits are NaN as f32, such as that of the background.
+        // Whole numbers whose bits are NaN as f32, such as the number of the background.
         let names = (0..2 * n as u32).map(|k| f32::from_bits(u32::MAX - k)).collect();
         let frame = frame.with(Map::Depth, depth).with(Map::Index, names);
         let folder = tempfile::tempdir().unwrap();

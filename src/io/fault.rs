@@ -41,7 +41,7 @@ pub(super) fn reserve<T>(items: &mut Vec<T>, more: u64) -> Result<(), Fault> {
 /// Parts of a file that could not be read: scans, nodes, chunks.
 #[derive(Debug, Default)]
 pub(super) struct Unread {
-    /// The first parts, each with its reason.
+    /// Descriptions of the first unread parts, each with its reason.
     named: Vec<String>,
     parts: u64,
     points: u64,
@@ -53,7 +53,7 @@ impl Unread {
     const MOST_NAMED: usize = 8;
 
     /// Records that a part of `points` points is left out; `clause` describes it, given the reason.
-    /// Fails in strict mode, and for a failure of the system.
+    /// Fails with `fault` in strict mode, or if `fault` is a failure of the system.
     pub(super) fn add(
         &mut self,
         clause: impl FnOnce(&str) -> String,
@@ -78,8 +78,9 @@ impl Unread {
         self.parts == 0
     }
 
-    /// The sentence about the file at `path`, which has `all` parts of this `kind`. Fails with the
-    /// first fault if no part was `read`.
+    /// Returns a sentence about the parts that are left out of the file at `path`, which has `all`
+    /// parts of this `kind`; no sentence if no part is left out. Fails with the first fault if no
+    /// part was `read`.
     pub(super) fn told(self, path: &Path, (kind, all): (&str, u64), read: bool) -> Result<Vec<String>, Fault> {
         match self.first {
             None => return Ok(Vec::new()),
@@ -104,8 +105,8 @@ pub(super) fn name(path: &Path) -> String {
 }
 
 thread_local! {
-    /// Whether a panic on this thread comes from a decoder, and becomes a [`Fault`] without a
-    /// message.
+    /// Whether panics on this thread come from a decoder. They become [`Fault`]s, and their
+    /// messages are not printed.
     static HUSHED: Cell<bool> = const { Cell::new(false) };
 }
 
@@ -127,7 +128,7 @@ pub(super) fn hush_thread() {
     HOOK.call_once(|| {
         let usual = take_hook();
         set_hook(Box::new(move |panic| {
-            // A thread that is exiting has no flag any more; it decodes nothing.
+            // A thread that is exiting has no `HUSHED` any more, but decodes nothing either.
             if !HUSHED.try_with(Cell::get).unwrap_or(false) {
                 usual(panic);
             }

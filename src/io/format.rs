@@ -33,7 +33,7 @@ impl Format {
         ("pcd", Self::Pcd),
     ];
 
-    /// These names as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
+    /// The names in [`Self::READ`] as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {
         let names: Vec<_> = Self::READ.iter().map(|(name, _)| name.to_ascii_uppercase()).collect();
         match names.split_last() {
@@ -42,7 +42,8 @@ impl Format {
         }
     }
 
-    /// The format of a file's extension, in any case; also formats that this build does not read.
+    /// The format that a file's extension (upper or lower case) names, even if this build cannot
+    /// read it.
     pub(super) fn of_name(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "e57" => Some(Self::E57),
@@ -68,7 +69,7 @@ impl Format {
         Some(format!("it is {what}, which is not read: convert it to PLY with SuperSplat or splat-transform"))
     }
 
-    /// The format of a file's first bytes. OBJ files have no signature.
+    /// The format that a file's first bytes identify. OBJ files have no signature.
     pub(super) fn of_start(start: &[u8]) -> Option<Self> {
         if start.starts_with(b"LASF") {
             return Some(Self::Las);

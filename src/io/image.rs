@@ -94,8 +94,10 @@ fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     Ok((reader, Box::new(unreadable)))
 }
 
-/// Decodes the image at `path`: a PNG, or without a `format` one for textures, by its first bytes
-/// or extension. `each` is the number of bytes a pixel that the caller will allocate.
+/// Decodes the image at `path`.
+///
+/// If `format` is None, the format is one of those for textures, detected from the file's first
+/// bytes or extension. `each` is the number of bytes a pixel that the caller will allocate.
 ///
 /// # Errors
 ///

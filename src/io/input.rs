@@ -21,7 +21,7 @@ pub struct Input {
     pub(super) file: File,
     /// Length in bytes.
     pub(super) length: u64,
-    /// The name in errors; files that it refers to are looked up beside it.
+    /// The path, for errors. Files that the input refers to are looked up beside it.
     pub(super) path: PathBuf,
     pub(super) format: Format,
     /// Whether the file is a copy of a stream, which cannot be read again.
@@ -38,14 +38,14 @@ fn looked_at() -> MutexGuard<'static, Vec<(PathBuf, Input)>> {
 impl Input {
     /// Opens the file at `path`, or standard input for `-`, and determines its format.
     ///
-    /// The format is the given one, or else that of the file's extension in any case, or else that
-    /// of its first bytes. Pipes are copied to an unnamed temporary file, which is deleted with the
-    /// input. Devices are refused.
+    /// The format is `format` if given, else that of the file's extension (upper or lower case),
+    /// else that of its first bytes. Pipes are copied to an unnamed temporary file, which is
+    /// deleted with the input. Devices are refused.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, or a copy does not fit on disk or would exceed
-    /// [`MOST_COPIED`]. [`Error::Malformed`] where the format cannot be determined.
+    /// [`Error::Read`] if the system cannot read, or if the copy of a stream does not fit on disk
+    /// or exceeds [`MOST_COPIED`]. [`Error::Malformed`] if the format cannot be determined.
     pub fn open(path: &Path, format: Option<Format>) -> Result<Self> {
         let mut looked_at = looked_at();
         if let Some(at) = looked_at.iter().position(|(known, _)| known == path) {
@@ -84,7 +84,7 @@ pub(crate) fn check_kind(there: &Metadata) -> io::Result<()> {
     Ok(())
 }
 
-/// Refuses anything but a regular file, for files that another file names: opening a pipe would
+/// Refuses anything but a regular file. For paths that another file names: opening a pipe would
 /// block until somebody writes to it.
 pub(crate) fn check_regular(path: &Path) -> io::Result<()> {
     let there = std::fs::metadata(path)?;
@@ -95,7 +95,7 @@ pub(crate) fn check_regular(path: &Path) -> io::Result<()> {
     if there.is_file() { Ok(()) } else { Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")) }
 }
 
-/// The most bytes of a text file that is read as a whole: cameras, studies.
+/// Largest text file that is read into memory, bytes: camera files and benchmark studies.
 const MOST_TEXT: u64 = 1 << 28;
 
 /// Reads the text of a file or a pipe, in UTF-8 or UTF-16.
@@ -209,8 +209,8 @@ fn unknown(path: &Path, start: &[u8]) -> Error {
     )
 }
 
-/// Copies a stream to a temporary file: the bytes `start`, which are already read, and the `rest`,
-/// `most` bytes in all. Returns the file and its length.
+/// Copies a stream to a temporary file: the bytes `start`, which are already read, and the `rest`;
+/// at most `most` bytes in all. Returns the file and its length.
 fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
     let no_room = |error: io::Error| {
         let folder = std::env::temp_dir();

@@ -20,8 +20,8 @@ pub struct Mesh {
     /// The vertices of each triangle as indices into `positions`, counter-clockwise seen from
     /// outside.
     pub triangles: Vec<[u32; 3]>,
-    /// A normal per corner of each triangle, any length; zero or non-finite means missing. Without
-    /// them the mesh is faceted: a triangle (a, b, c) has the normal `(b - a) x (c - a)`.
+    /// A normal per corner of each triangle, any length; zero or non-finite means missing. If None,
+    /// the mesh is faceted: a triangle (a, b, c) has the normal `(b - a) x (c - a)`.
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
     /// A colour per vertex.
     pub colors: Option<Colors>,
@@ -32,7 +32,7 @@ pub struct Mesh {
     pub texture: Option<Vec<[[f32; 2]; 3]>>,
     /// The materials that triangles refer to.
     pub materials: Vec<Material>,
-    /// Per triangle an index into `materials`; one past its end means none.
+    /// Per triangle an index into `materials`; an index past the end means no material.
     pub material: Option<Vec<u32>>,
     /// The up direction of the format's convention.
     pub up: Option<Up>,

@@ -52,32 +52,32 @@ pub use tree::{Tree, TreeRow};
 use crate::{Error, Progress, Result};
 use std::path::Path;
 
-/// How files are read.
+/// Options for reading files.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
-    /// The format. None takes it from the file's name or first bytes.
+    /// The format. If None, it is detected from the file's extension, or else its first bytes.
     pub format: Option<Format>,
-    /// Points that a LAS file marks as withheld, which means deleted, are read like all others.
+    /// Keep points that a LAS file marks as withheld, which means deleted.
     pub keep_withheld: bool,
-    /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they
-    /// are. Otherwise a file is an error if many are thicker than a tenth of their width.
+    /// Drop the shortest axis of ellipsoidal Gaussians, however thick they are, so that they become
+    /// surfels. If false, a file is an error if many of its Gaussians are thicker than a tenth of
+    /// their width.
     pub flatten: bool,
     /// Opacities by class, for the points of laser scans (LAS files).
     pub classes: ClassOpacities,
-    /// Alphas beside colours are ignored; the opacities of Gaussians are not.
+    /// Ignore the alphas of colours, but not the opacities of Gaussians.
     pub ignore_alpha: bool,
-    /// The file's description of itself is stored in [`Points::about`].
+    /// Store the file's description of itself in [`Points::about`].
     pub describe: bool,
-    /// A file of which a part cannot be read is an error: a scan of an E57 file, a chunk of a LAZ
-    /// file, a node of a COPC file. Otherwise that part is left out and named in
-    /// [`Points::unread`].
+    /// Fail if a part of a file cannot be read: a scan of an E57 file, a chunk of a LAZ file, or a
+    /// node of a COPC file. If false, that part is left out and named in [`Points::unread`].
     pub strict: bool,
 }
 
 /// Reads a file of any supported format; see [`Input::open`].
 ///
-/// The formats are PLY, LAS, LAZ (also COPC) and OBJ, and with the features of their names E57 and
-/// PCD. Points keep the file's order and coordinates. A file without points is not an error here.
+/// The formats are PLY, LAS, LAZ (including COPC) and OBJ. E57 and PCD need the features `e57` and
+/// `pcd`. Points keep the file's order and coordinates. A file without points is not an error here.
 ///
 /// # Errors
 ///

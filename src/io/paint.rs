@@ -10,8 +10,8 @@ use crate::scene::color::DEFAULT_COLOR;
 pub struct Paint {
     /// Linear colours with straight alpha, per triangle: its own colour, or its material's.
     ///
-    /// A triangle's image is multiplied by this colour. Without an image, the colours of the
-    /// vertices replace it. Empty if no triangle has a colour.
+    /// If a triangle has an image, the image is multiplied by this colour. If it has none, colours
+    /// of the vertices take precedence over this colour. Empty if no triangle has a colour.
     pub colors: Vec<[f32; 4]>,
     /// The distinct images of the materials.
     pub textures: Vec<Arc<Texture>>,

@@ -24,8 +24,8 @@ pub struct Points {
     /// A disk radius per point, world units; non-positive or non-finite means missing.
     pub radii: Option<Vec<f32>>,
     /// Half-axes s and t of an elliptical disk per point, world units, with the normal s x t. They
-    /// replace normal and radius where they span an ellipse; zero, parallel or non-finite ones mean
-    /// missing.
+    /// replace normal and radius where they span an ellipse; half-axes that are zero, parallel or
+    /// non-finite mean missing.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
     /// Clip lines of the disks with these half-axes.
     pub clips: Option<Vec<Clip>>,
@@ -62,8 +62,8 @@ pub struct Points {
     /// A mesh file to draw together with these surfels: the part of the original mesh that they do
     /// not replace.
     pub beside: Option<PathBuf>,
-    /// The points are the vertices of a closed mesh that faces outward, or surfels that cover one.
-    /// Its back is visible only from inside.
+    /// The points are the vertices of a closed mesh that faces outward, or surfels that cover such
+    /// a mesh. The back of the surface is visible only from inside.
     pub closed: bool,
     /// The number of points of each class, without deleted ones; only for laser scans.
     pub classes: BTreeMap<u8, u64>,
@@ -78,8 +78,7 @@ pub struct Points {
     /// The number of mesh vertices that were left out because all their triangles have no area or
     /// are [`broken`](Self::broken).
     pub stranded: u64,
-    /// The number of surfels of a mesh that have one colour, the mean of the image on their
-    /// triangle.
+    /// The number of a mesh's surfels whose colour is the mean of the image on their triangle.
     pub averaged: u64,
     /// Parts of the file that could not be read and were left out: one sentence for each file, with
     /// names and counts.
@@ -87,7 +86,7 @@ pub struct Points {
     /// Sorted indices of the file's points that were left out; the first point has 0.
     pub left_out: Vec<u64>,
     /// For each surfel, the index of its point among those that are kept, if a point may have
-    /// several surfels.
+    /// several surfels, or only a part of the file was read.
     pub numbers: Option<Vec<u32>>,
     /// Sentences about what is odd in the file, could not be read, or is drawn differently than a
     /// user may expect.
@@ -104,8 +103,8 @@ pub struct Flattened {
     pub count: u64,
     /// The number of those whose shortest half-axis is longer than a tenth of the middle one.
     pub thick: u64,
-    /// The median ratio of the shortest half-axis to the middle one; the largest over several
-    /// files.
+    /// The median ratio of the shortest half-axis to the middle one; for several files, the largest
+    /// of their medians.
     pub ratio: f64,
 }
 

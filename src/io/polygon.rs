@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-/// The most corners of a polygon whose ears are clipped, which takes quadratic time, and cubic time
-/// at worst. Larger polygons become fans, whatever their shape.
+/// The most corners of a polygon for ear clipping, which takes quadratic time, and cubic time at
+/// worst. Polygons with more corners become triangle fans, whatever their shape.
 const MOST_CORNERS: usize = 1 << 10;
 
 /// Triangulates a polygon: returns `corners.len() - 2` triangles of indices into `corners`, with

@@ -9,8 +9,8 @@ pub use crate::scene::Texture;
 impl Texture {
     /// Reads a PNG, JPEG, BMP or TGA file. 16-bit values are reduced to their upper byte.
     ///
-    /// The first bytes decide the format, whatever the file is called. TGA has no signature, so
-    /// there the file's extension decides.
+    /// The first bytes decide the format, whatever the file is called. TGA has no signature, so the
+    /// file's extension decides for TGA.
     ///
     /// # Errors
     ///

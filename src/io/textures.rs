@@ -34,8 +34,8 @@ impl Numbers {
         if known.is_none() {
             alike.push(number);
         }
-        // Duplicates are recorded too. A recorded texture must outlive this map: another one at its
-        // address would get its index.
+        // Duplicates are recorded too. A recorded texture must outlive `by_place`: another texture
+        // at the same address would get its index.
         self.by_place.insert(place, number);
         if known.is_none() {
             self.all.push(texture.clone());
@@ -47,7 +47,8 @@ impl Numbers {
 /// The images of one mesh while they are being read.
 #[derive(Debug, Default)]
 pub(super) struct Images {
-    /// The outcome for each path and address mode: whether coordinates outside [0, 1] are clamped.
+    /// The outcome of reading, for each path and address mode (whether coordinates outside [0, 1]
+    /// are clamped).
     known: HashMap<(PathBuf, bool), Option<Arc<Texture>>>,
     /// Paths of files by their length and a hash of their bytes.
     by_content: HashMap<(u64, u64), Vec<PathBuf>>,
@@ -55,10 +56,10 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// Reads an image file, or returns the one from before if it or a copy of it was read.
+    /// Reads an image file. If this file or a copy of it was read before, returns the same image.
     ///
-    /// If it `clamps`, texture coordinates outside [0, 1] take the edge texels. Returns None for a
-    /// file that cannot be read, and adds one sentence to `notes`.
+    /// If `clamps` is set, texture coordinates outside [0, 1] take the edge texels. Returns None
+    /// for a file that cannot be read, and adds one sentence to `notes`.
     ///
     /// # Errors
     ///
@@ -98,7 +99,7 @@ impl Images {
         Ok(read)
     }
 
-    /// The first file with the same bytes that was read, or this one if there is none.
+    /// The first file that was read and has the same bytes; `path` itself if there is none.
     fn first_copy(&mut self, path: &Path) -> Result<PathBuf> {
         let bytes = image::bytes(path)?;
         let mut hasher = DefaultHasher::new();

@@ -32,7 +32,7 @@ impl<'a> Triangles<'a> {
         else {
             return;
         };
-        // Its length is twice the triangle's area, so triangles count by their area.
+        // The length of this normal is twice the triangle's area, so triangles count by their area.
         let area_normal = (b - a).cross(c - a);
         let radius = covering_radius(a, b, c);
         for (index, corner) in corners.into_iter().enumerate() {
@@ -65,8 +65,8 @@ impl<'a> Triangles<'a> {
     }
 }
 
-/// Whether no normal of `given` points to the opposite side of the vertex normal in `triangles`;
-/// zero normals have no side.
+/// Whether each normal of `given` points to the same side as the vertex normal in `triangles`. A
+/// zero normal agrees with both sides.
 pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
     let side = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from_array(*a).dot(Vec3::from_array(*b));
     given.iter().zip(triangles).map(side).all(|side| side >= 0.0)

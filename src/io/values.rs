@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 /// The byte order mark with which some editors begin UTF-8 text.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Decodes text in UTF-8, or in UTF-16 if it begins with that byte order mark, without the mark.
-/// Some editors, and redirections on Windows, write UTF-16.
+/// Decodes UTF-8 text, or UTF-16 text if it begins with the byte order mark of UTF-16. The mark is
+/// removed. Some editors, and redirections on Windows, write UTF-16.
 ///
 /// # Errors
 ///
@@ -31,8 +31,8 @@ pub(super) fn text_of(bytes: &[u8]) -> io::Result<String> {
 pub(super) static SRGB16_TO_LINEAR: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|code| srgb_to_linear(f64::from(code) / 65535.0) as f32).collect());
 
-/// The last byte of each line end, judged by the first line: `\n` (also for `\r\n`), or `\r` alone,
-/// as on old Macintoshes.
+/// Finds the last byte of line ends, from the first line: `\n` (also for `\r\n`), or `\r` alone, as
+/// on old Macintoshes.
 pub(super) fn line_end(reader: &mut impl BufRead) -> io::Result<u8> {
     let start = reader.fill_buf()?;
     let first = start.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
@@ -73,8 +73,8 @@ pub(super) fn shown(token: &[u8]) -> String {
 /// A parser's message on one line. It may quote the file at any length, so the middle of a long
 /// message is removed.
 pub(super) fn one_line(message: &str) -> String {
-    /// Characters of the start and of the end; at the end, parsers say what they expected and in
-    /// which line.
+    /// The numbers of characters kept at the start and at the end, where parsers say what they
+    /// expected and in which line.
     const KEPT: (usize, usize) = (80, 240);
     let text: Vec<char> = message.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
     match (text.get(..KEPT.0), text.len().checked_sub(KEPT.1).and_then(|from| text.get(from..))) {

@@ -10,9 +10,10 @@ use crate::error::{Error, Result};
 
 /// Passes each of `items` to one of `writers` threads, and returns the results of `write` in order.
 ///
-/// The calling thread makes the items, the next one as soon as a writer has taken the one before.
-/// At most `writers + 1` items exist at a time, so memory does not grow with their number, however
-/// slow the writers are. Several items are written at a time, in no particular order.
+/// The calling thread makes one item after the other, the next as soon as a writer has taken the
+/// previous one. At most `writers + 1` items exist at a time, so memory does not grow with their
+/// number, however slow the writers are. Several items are written at a time, in no particular
+/// order.
 ///
 /// # Errors
 ///

@@ -18,20 +18,20 @@ pub const DEFAULT_VIEWS: u32 = 64;
 /// The default number of rays along each side of a view.
 pub const DEFAULT_SIDE: u32 = 512;
 
-/// The largest distance along the ray, before or behind the surface, of a disk that covers it, in
-/// the disk's shorter half-axes.
+/// The largest distance along the ray between a hit on the surface and a disk that covers the hit,
+/// in the disk's shorter half-axes.
 ///
-/// It corresponds to the epsilon `radius:1`, within which a renderer takes depths for one surface.
-/// So disks on the far side of the body do not cover it, however many there are, but a disk that is
-/// off by the sag of a curved surface does.
+/// This corresponds to the epsilon `radius:1`, within which a renderer takes depths for one
+/// surface. So disks on the far side of the body do not cover the hit, however many there are. A
+/// disk that is off by the sag of a curved surface does.
 pub const REACH: f64 = 1.0;
 
 /// The width of the strip along an outline that flat disks may cut off, in longer half-axes of the
 /// nearest disk.
 const EDGE: f64 = 0.5;
 
-/// The surface has a step between two rays if one hits it deeper than the plane through the other's
-/// hit by more than this many times their distance.
+/// The largest depth, over the distance of two rays, by which one ray's hit may lie behind the
+/// tangent plane at the other's. Beyond it, the surface has a step between the rays.
 const STEP: f64 = 2.0;
 
 /// The parts of a mesh that surfels leave uncovered.
@@ -115,7 +115,7 @@ impl Coverage {
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if `views` is 0, or a camera cannot have `side` pixels, as 0 or too many.
+/// [`Error::Usage`] if `views` is 0, or if `side` is 0 or too many pixels for a camera.
 pub fn coverage(
     mesh: &TriangleTree,
     scene: &Scene,
@@ -193,7 +193,8 @@ fn meet(mesh: &TriangleTree, camera: &Camera, x: f64, y: f64) -> Option<Meeting>
     Some(Meeting { point: start + direction * hit.distance, direction, normal: hit.facet })
 }
 
-/// Tests rays around pixel (x, y), in eight directions, at half and at the full width of the strip.
+/// Whether the hit at pixel (x, y) is at an edge. Tests rays around it in eight directions, at half
+/// and at the full width of the strip.
 fn is_at_edge(mesh: &TriangleTree, disks: &DiskTree, camera: &Camera, hit: &Meeting, x: f64, y: f64) -> bool {
     let Some(radius) = disks.radius_near(hit.point) else { return false };
     (0..16).any(|k| {

@@ -41,8 +41,8 @@ pub struct Distances {
 pub struct SurfaceDistances {
     /// From the surfels' centres to the mesh.
     pub centers_to_mesh: Option<Distances>,
-    /// From eight points on each disk's rim to the mesh: a disk on a curved surface leaves it
-    /// towards the rim.
+    /// From eight points on each disk's rim to the mesh: a flat disk on a curved surface departs
+    /// from the surface towards its rim.
     ///
     /// Where clip lines cut the disk, the points on the lines count instead; disks whose centre is
     /// clipped away are left out.
@@ -56,7 +56,7 @@ pub struct SurfaceDistances {
 }
 
 impl Distances {
-    /// None if there are no values.
+    /// Summarises `values`; None if there are none.
     pub fn of(values: Vec<f64>) -> Option<Self> {
         let count = values.len() as f64;
         let (sum, squares) = values.iter().fold((0.0, 0.0), |(sum, squares), d| (sum + d, squares + d * d));

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use crate::scene::Camera;
 use crate::truth::Surface;
 
-/// Pixels within this distance of the curve count for the share of wrong ones, pixels.
+/// Pixels within this distance of the curve, in pixels, count for the share of wrong pixels.
 pub const BESIDE: f64 = 3.0;
 
-/// Pixels within this distance of the curve count for its offset, pixels. A wrong pixel farther
-/// away is due to a surface that ends elsewhere, not to a displaced curve.
+/// Pixels within this distance of the curve, in pixels, count for the curve's offset. A wrong pixel
+/// farther away is due to a surface that ends elsewhere, not to a displaced curve.
 const FARTHEST: f64 = 32.0;
 
 /// The error of an image near the curve at which two surfaces meet.
@@ -23,14 +23,14 @@ pub struct Joint {
 }
 
 /// Measures, pixel by pixel, whether `first_shows` agrees with the rays of `camera` to the first
-/// and the second surface. None if they meet nowhere in the image.
+/// and the second surface. None if the surfaces meet nowhere in the image.
 ///
 /// The true curve runs between neighbouring pixels whose rays hit the two surfaces in opposite
-/// order, at the point where the difference of the two depths, linearly interpolated, is 0. If the
-/// visible curve, of length L, is d(s) off, the wrong pixels lie between the two curves. The
-/// integral of their distances from the true curve is that of `d^2 / 2` over s, so
-/// `rms^2 = 2 / L * sum of distances`. L is the area of the pixels within [`BESIDE`] of the curve
-/// over the width of that strip.
+/// order, at the point where the difference of the two depths, linearly interpolated, is 0. Let the
+/// visible curve, of length L, lie at the distance d(s) from the true curve. The wrong pixels lie
+/// between the two curves. Their distances from the true curve add up to the integral of `d^2/2`
+/// over s, so `rms^2 = 2 / L * sum of distances`. L is the area of the pixels within [`BESIDE`] of
+/// the curve over the width of that strip.
 pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> Option<Joint> {
     let difference = |pixel: usize| {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);

@@ -23,7 +23,7 @@ pub use reconstruction::{DepthError, NormalError, Reconstruction, reconstruction
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 
-/// The error of colours against others, over all values.
+/// The error of one image's colours against another's, over all values.
 struct ColorError {
     max_abs: f64,
     rmse: f64,
@@ -59,8 +59,8 @@ impl Sorted {
         Self(values)
     }
 
-    /// The smallest value that at least this share of the values do not exceed (nearest rank); None
-    /// if there are none.
+    /// Returns the smallest value that at least this share of the values do not exceed (nearest
+    /// rank); None if there are no values.
     fn percentile(&self, share: f64) -> Option<f64> {
         let rank = (self.0.len() as f64 * share).ceil() as usize;
         self.0.get(rank.max(1) - 1).copied()

@@ -19,7 +19,7 @@ pub const BYTES_PER_PIXEL: u64 = 48;
 /// The error of image A against image B. Colours are compared as linear RGBA.
 ///
 /// A value that is not finite differs from any other by the largest f32. [`MapError::not_finite`]
-/// counts such pixels, and [`Comparison::is_finite`] tells that there are none.
+/// counts such pixels, and [`Comparison::is_finite`] is true if there are none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Largest absolute difference of a value.
@@ -90,7 +90,7 @@ const NEARLY_ONE: f64 = 1e-3;
 ///
 /// # Errors
 ///
-/// [`Error::Usage`](crate::Error::Usage) if they differ in size.
+/// [`Error::Usage`](crate::Error::Usage) if the images differ in size.
 pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     same_size(a, b)?;
     let pixels = a.color.len();

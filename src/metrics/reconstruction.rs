@@ -19,7 +19,7 @@ use crate::truth::Truth;
 /// The render *covers* a pixel where its depth is finite, the truth where the ray through the
 /// pixel's centre meets the surface. Alpha would not do: before an opaque background it is 1
 /// everywhere. A pixel is *inside* if the truth covers it and all its samples meet the surface.
-/// Other pixels that the truth covers, or with samples that meet the surface, are its silhouette.
+/// Other pixels that the truth covers, or with samples that meet the surface, are the silhouette.
 /// Only the outline against the background counts as silhouette: an edge in front of another part
 /// of the surface is inside.
 ///
@@ -52,12 +52,13 @@ pub struct Reconstruction {
     ///
     /// A pixel without a second surface is no leak.
     pub leak_rate: Option<f64>,
-    /// Pixels that both cover over pixels that either covers.
+    /// Number of pixels that both the render and the truth cover, over the number that either
+    /// covers.
     pub silhouette_iou: Option<f64>,
     /// Mean distance between the two outlines against the background, pixels.
     ///
-    /// It is the area that only one of the two covers, over the length of the true outline. The
-    /// length follows from the steps between covered and other pixels along rows and columns
+    /// Computed as the area that only one of the two covers, over the length of the true outline.
+    /// The length follows from the steps between covered and other pixels along rows and columns
     /// (Crofton).
     pub outline_px: Option<f64>,
 }
@@ -83,7 +84,7 @@ pub struct NormalError {
     pub percentile_99: f64,
 }
 
-/// Measures `frame`, which must have a depth map. Normals are measured if it has any.
+/// Measures `frame`, which must have a depth map. Normals are measured if `frame` has any.
 ///
 /// # Errors
 ///

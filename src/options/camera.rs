@@ -6,11 +6,11 @@ use glam::DVec3;
 
 use crate::scene::Side;
 
-/// The view of a picture. Without an eye the whole scene is in view.
+/// The view of a picture. Without an eye or a camera file it shows the whole scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Camera"))]
-// Help texts write defaults in brackets, which are no links.
+// Brackets in help texts hold defaults, not links.
 #[allow(rustdoc::broken_intra_doc_links)]
 pub struct CameraOptions {
     /// Image size in pixels [default: 1024x1024, or the camera file's]
@@ -28,15 +28,16 @@ pub struct CameraOptions {
     /// Point that the camera looks at [default: the scene's centre]
     #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true, requires = "eye"))]
     pub target: Option<DVec3>,
-    /// Direction of up in the image: x, y, z, -x, -y, -z or X,Y,Z [default: as the file says]
+    /// World direction that is up in the image: x, y, z, -x, -y, -z or X,Y,Z [default: the file's]
     ///
-    /// LAS files and the PLY files of epsplat say it; in others up is z for flat clouds, else y
+    /// LAS files and PLY files written by epsplat define it. In other files it is z if the cloud is
+    /// flat, else y
     #[cfg_attr(feature = "cli", arg(long, value_name = "AXIS|X,Y,Z", value_parser = super::parse::up, allow_hyphen_values = true))]
     pub up: Option<DVec3>,
-    /// Vertical field of view [default: 45]
+    /// Vertical field of view in degrees [default: 45]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", conflicts_with_all = ["ortho", "intrinsics"]))]
     pub fov: Option<f64>,
-    /// Orthographic view of this height in world units
+    /// Orthographic view; the image is HEIGHT world units high
     #[cfg_attr(feature = "cli", arg(long, value_name = "HEIGHT", conflicts_with = "intrinsics"))]
     pub ortho: Option<f64>,
     /// Focal lengths and principal point in pixels
@@ -45,7 +46,7 @@ pub struct CameraOptions {
     /// Camera file (see the guide), in place of all other camera options except --size
     #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
-    /// Smallest depth drawn, world units [default: a millionth of the scene]
+    /// Smallest depth drawn, world units [default: a millionth of the scene's extent]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]
     pub near: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! Options that do not go together: a row each, with a sentence that says what to do instead.
+//! Combinations of options that are refused: one row each, with a sentence that says what to do
+//! instead.
 
 use super::RenderOptions;
 use crate::error::{Error, Result};
@@ -6,15 +7,15 @@ use crate::plan::{Accumulator, BackendName, Organisation, Settings, check};
 use crate::scene::composite::ALL_LAYERS;
 use crate::scene::{Blend, Composite, Shading, ShadingAt, Tail};
 
-/// Options that do not go together.
+/// A combination of options that is refused.
 struct Clash {
-    /// Whether a picture has such options, of which the last are what became of all.
+    /// Whether a picture has this combination. The settings are those that all options resolve to.
     applies: fn(&RenderOptions, Option<BackendName>, &Settings) -> bool,
-    /// The fault, and the way out.
+    /// The fault and its remedy.
     sentence: &'static str,
 }
 
-/// Every clash of options, whatever the scene.
+/// All refused combinations that do not depend on the scene.
 const CLASHES: [Clash; 9] = [
     Clash {
         applies: |options, _, settings| settings.blend == Blend::Nearest && options.surface.epsilon.is_some(),
@@ -29,7 +30,7 @@ const CLASHES: [Clash; 9] = [
         sentence: "all fragments are summed, near and far: leave --epsilon out with --composite weighted or moments",
     },
     Clash {
-        // Without a last layer there is none to leave out, and the default says nothing.
+        // Without a last layer there is no tail. The default tail is never refused.
         applies: |_, _, settings| {
             let layered = matches!(settings.composite, Composite::Layers(most) if most < ALL_LAYERS);
             settings.tail != Tail::default() && !layered
@@ -63,13 +64,15 @@ const CLASHES: [Clash; 9] = [
     },
 ];
 
-/// Whether the compute kernels may render: the best backend that there is never rasterises.
+/// Whether the compute kernels may render. None stands for the best available backend, which is
+/// never the rasteriser.
 fn is_gpu(backend: Option<BackendName>) -> bool {
     matches!(backend, None | Some(BackendName::Gpu))
 }
 
 impl RenderOptions {
-    /// Fails for options that do not go together, of which `settings` are the outcome.
+    /// Rejects combinations of options that cannot be rendered. `settings` are those that the
+    /// options resolve to.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -87,8 +90,8 @@ mod tests {
     use super::*;
     use crate::options::Suggested;
 
-    /// The refusal of options that are set by name, for a backend by its name; none if they go
-    /// together.
+    /// Sets options by name and returns the error for this backend, or None if they can be
+    /// combined.
     fn refusal(backend: &str, set: &[(&str, &str)]) -> Option<String> {
         let mut options = RenderOptions::default();
         set.iter().for_each(|(name, text)| options.set(name, &[(*text).to_owned()]).unwrap());
@@ -115,7 +118,8 @@ mod tests {
         for (backend, set) in clashes {
             assert!(refusal(backend, set).is_some(), "{backend} {set:?}");
         }
-        // Defaults that are given are no choice.
+        // Accepted: defaults that are given explicitly, and options with the backend or shading
+        // that they need.
         let fine: [(&str, &[(&str, &str)]); 4] = [
             ("reference", &[("accumulator", "fixed"), ("organisation", "auto")]),
             ("auto", &[("tail", "sum")]),

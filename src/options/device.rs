@@ -5,8 +5,8 @@ use std::str::FromStr;
 use crate::error::Error;
 use crate::plan::BackendName;
 
-/// A backend by its name, or the best that there is: the kernels on an adapter, or the f64
-/// reference where there is no adapter.
+/// A backend, or None for the best available one: the kernels on an adapter, else the f64
+/// reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Chosen(pub Option<BackendName>);
 
@@ -22,7 +22,7 @@ impl FromStr for Chosen {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Device"))]
-// Help texts write defaults in brackets, which are no links.
+// Brackets in help texts hold defaults, not links.
 #[allow(rustdoc::broken_intra_doc_links)]
 pub struct DeviceOptions {
     /// Backend: auto, gpu, raster or reference [default: auto]
@@ -37,8 +37,8 @@ pub struct DeviceOptions {
     pub adapter: Option<String>,
     /// Limit the memory of host and device together, such as 2GiB
     ///
-    /// Needs one file of `epsplat lod` with --lod or --splats, so that a part of it is read. A
-    /// picture that needs more memory is an error
+    /// Needs --lod or --splats, and one file of `epsplat lod` as the only input. Only the part of
+    /// it that the picture shows is read. A picture that needs more memory is an error
     #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::memory, requires = "cut", hide_short_help = true))]
     pub memory: Option<u64>,
 }

@@ -1,13 +1,13 @@
-//! Groups of options: each is a struct whose fields are set by their names, from any text.
+//! Groups of options. Each is a struct whose fields can be set by name from text.
 
 use std::fmt::Display;
 use std::str::FromStr;
 
 use crate::error::{Error, Result};
 
-/// A field that texts can set.
+/// A field that can be set from text.
 pub(super) trait Choice {
-    /// Sets the field to what `texts` say, which are the items of a list or one text.
+    /// Parses `texts`, a single text or the items of a list, and sets the field.
     ///
     /// # Errors
     /// A sentence that says what the texts should be.
@@ -45,7 +45,7 @@ pub(super) trait Group {
     fn set(&mut self, name: &str, texts: &[String]) -> Result<bool>;
 }
 
-/// The error of a value, with the name of its option.
+/// Returns the error of a bad value: the option's name and the reason.
 pub(super) fn bad_value(name: &str, why: &str) -> Error {
     Error::Usage(format!("{name}: {why}"))
 }
@@ -57,7 +57,7 @@ macro_rules! group {
         #[derive(Clone, Debug, Default, PartialEq)]
         #[cfg_attr(feature = "cli", derive(clap::Args))]
         $(#[$of_group])*
-        // Help texts write what may be left out as [:L], which is no link.
+        // Brackets in help texts hold optional parts, such as [:L], and defaults, not links.
         #[allow(rustdoc::broken_intra_doc_links)]
         pub struct $group {
             $($(#[$of_field])* pub $field: $type,)*

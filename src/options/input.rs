@@ -6,7 +6,7 @@ use crate::io::{self, ClassOpacities, Format};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Input"))]
-// Help texts write defaults in brackets, which are no links.
+// Brackets in help texts hold defaults, not links.
 #[allow(rustdoc::broken_intra_doc_links)]
 pub struct FormatOptions {
     /// Format of the inputs [default: from their names, or else their first bytes]
@@ -33,7 +33,7 @@ pub struct InputOptions {
     /// Opacities of LAS classes: CLASS:A or FIRST-LAST:A, such as 3-5:0.3,7:0
     ///
     /// The example makes vegetation (3 to 5) transparent and leaves out noise (7). Points of
-    /// opacity 0 are left out and counted; others are transparent with render --composite
+    /// opacity 0 are left out and counted. Other opacities show with render --composite
     #[cfg_attr(feature = "cli", arg(long, value_name = "RULES", hide_short_help = true))]
     pub class_opacity: Option<ClassOpacities>,
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis
@@ -56,7 +56,7 @@ fn formats() -> impl clap::builder::TypedValueParser<Value = Format> {
 }
 
 impl InputOptions {
-    /// Returns how a single file is read.
+    /// Returns the options for reading a single file.
     pub(crate) fn of_file(&self) -> io::ReadOptions {
         io::ReadOptions {
             format: self.file.input_format,
@@ -69,7 +69,7 @@ impl InputOptions {
         }
     }
 
-    /// Returns these options as arguments of a command that reads the same file, each after a
+    /// Formats these options as arguments of a command that reads the same file, each preceded by a
     /// space.
     pub fn arguments(&self) -> String {
         let format = self.file.input_format;

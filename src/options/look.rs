@@ -8,11 +8,11 @@ group! {
     /// Light, background and the smoothness of edges.
     #[cfg_attr(feature = "cli", command(next_help_heading = "Look"))]
     pub struct LookOptions {
-        /// Shading: unlit, lambert or phong [default: lambert; unlit where there are no normals]
+        /// Shading: unlit, lambert or phong [default: lambert; unlit if there are no normals]
         ///
-        /// unlit is the blended colour, lambert the colour times the lights' cosines, and phong
-        /// adds white highlights. Points that face the camera, --blend nearest and Gaussians are
-        /// unlit
+        /// unlit shows the blended colour. lambert multiplies it by the lights' cosines, and phong
+        /// adds white highlights. Points drawn with --facing, pictures with --blend nearest and
+        /// Gaussians are unlit
         #[cfg_attr(feature = "cli", arg(long, value_name = "MODEL"))]
         pub shading: Option<Shading>,
         /// A light in place of the headlight: headlight[:INTENSITY] or X,Y,Z[:INTENSITY]
@@ -20,18 +20,18 @@ group! {
         /// X,Y,Z is the direction toward the light. The option may be given several times
         #[cfg_attr(feature = "cli", arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true))]
         pub lights: Vec<Light>,
-        /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they
-        /// are [default: 32]
+        /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller the
+        /// highlights [default: 32]
         #[cfg_attr(feature = "cli", arg(long, value_name = "EXPONENT", hide_short_help = true))]
         pub shininess: Option<f32>,
         /// Colour behind the scene, linear [default: transparent]
         #[cfg_attr(feature = "cli", arg(long, value_name = "R,G,B[,A]"))]
         pub background: Option<Rgba>,
-        /// Samples of a pixel: 1, 4, 8 or 16 [default: 4, of Gaussians 1]
+        /// Samples per pixel: 1, 4, 8 or 16 [default: 4; 1 for Gaussians]
         ///
-        /// More samples make smoother edges; maps are those of the pixel's centre. Samples are
-        /// averaged in linear light, those of Gaussians as the codes that their files are trained
-        /// to
+        /// More samples make smoother edges. Maps are taken at the pixel's centre. Samples are
+        /// averaged in linear light; those of Gaussians are averaged as sRGB codes, as in their
+        /// training
         #[cfg_attr(feature = "cli", arg(long, value_name = "N"))]
         pub samples: Option<Samples>,
     }

@@ -7,12 +7,15 @@ group! {
     /// Maps beside the colour.
     #[cfg_attr(feature = "cli", command(next_help_heading = "Output"))]
     pub struct MapOptions {
-        /// Maps beside the colour, in an EXR: depth, normal, weight, count, index, ...
+        /// Maps to write beside the colour, in an EXR: depth, normal, weight, count, index, ...
         ///
-        /// index names the input and the point that show most, transmittance the light that all
-        /// surfaces of a pixel let through, layers their number, tail the share behind --composite
-        /// layers:L, surfaces depth and alpha of the nearest eight, texz the place in a texture,
-        /// and decision, of the reference, the distance to the nearest yes-or-no
+        /// weight is the sum of the fragments' weights, and count is their number. index names the
+        /// input and the point of the surfel with the greatest weight. transmittance is the share
+        /// of light that passes all surfaces of a pixel, and layers is their number. tail is the
+        /// share of the surfaces behind the last layer of --composite layers:L. surfaces holds
+        /// depth and alpha of the nearest eight surfaces. texz holds texture coordinates and depth.
+        /// decision, which only the reference makes, is the smallest relative distance of a
+        /// fragment to a threshold, such as a disk's rim or epsilon
         #[cfg_attr(feature = "cli", arg(long, value_name = "MAPS", value_delimiter = ','))]
         pub aov: Vec<Map>,
     }

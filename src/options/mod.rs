@@ -1,5 +1,5 @@
-//! The options of a picture, each declared once: for the command line, for studies and for callers
-//! of the library.
+//! The options of a picture. Each is declared once, for the command line, studies and callers of
+//! the library.
 //!
 //! An option that is `None` leaves the choice to the scene: Gaussians are drawn by other rules than
 //! surfels. [`RenderOptions::settle`] makes these choices.
@@ -51,7 +51,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess,
 use crate::error::{Error, Result};
 use group::Group;
 
-/// Names that options had before, and what is written in their place.
+/// Former names of options, and what to write instead.
 const RENAMED: [(&str, &str); 2] = [("maps", "aov"), ("lod_caps", "lod_shape: cap or disk")];
 
 /// How files become a scene.
@@ -69,7 +69,7 @@ pub struct SceneOptions {
     pub triangles: TriangleOptions,
 }
 
-/// The options of a picture, scene, camera and backend apart.
+/// The options of a picture, except those of scene, camera and backend.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 pub struct RenderOptions {
@@ -97,11 +97,11 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
-    /// Sets the option `name`, as the command line writes it with `_` for `-`, to what `texts` say:
-    /// one text, or the items of a list.
+    /// Sets the option `name` from `texts`, which are a single text or the items of a list. Names
+    /// are those of the command line, with `_` for `-`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where there is no such option, or the texts are no value of it.
+    /// [`Error::Usage`] if there is no such option, or if the texts are not a valid value.
     pub fn set(&mut self, name: &str, texts: &[String]) -> Result<()> {
         let groups: [&mut dyn Group; 7] = [
             &mut self.look,
@@ -123,8 +123,8 @@ impl RenderOptions {
         }))
     }
 
-    /// A deserialiser of the value of the option `name`: text, a number, true or false, or a list
-    /// of these.
+    /// Returns a deserialiser that sets the option `name`. The value is a text, a number, true or
+    /// false, a list of these, or a table of texts.
     pub fn value_of<'a>(&'a mut self, name: &'a str) -> OptionValue<'a> {
         OptionValue { options: self, name }
     }
@@ -141,7 +141,7 @@ impl<'de> DeserializeSeed<'de> for OptionValue<'_> {
 
     fn deserialize<D: Deserializer<'de>>(self, value: D) -> Result<(), D::Error> {
         let texts = value.deserialize_any(Texts)?;
-        // The reader of a file names the key itself.
+        // The file's deserialiser names the key, so the option's name is removed here.
         let prefix = format!("{}: ", self.name);
         self.options.set(self.name, &texts).map_err(|error| {
             let sentence = error.to_string();
@@ -150,7 +150,7 @@ impl<'de> DeserializeSeed<'de> for OptionValue<'_> {
     }
 }
 
-/// Reads a value as the texts that the command line would have.
+/// Converts a value to the texts that the command line would have.
 struct Texts;
 
 impl<'de> Visitor<'de> for Texts {
@@ -188,7 +188,8 @@ impl<'de> Visitor<'de> for Texts {
         Ok(texts)
     }
 
-    /// A table, such as `{ "kernel_ellipse.wgsl" = "mine.wgsl" }`, has an item `KEY=VALUE` a row.
+    /// Converts each row of a table, such as `{ "kernel_ellipse.wgsl" = "mine.wgsl" }`, to a text
+    /// `KEY=VALUE`.
     fn visit_map<A: MapAccess<'de>>(self, mut rows: A) -> Result<Vec<String>, A::Error> {
         let mut texts = Vec::new();
         while let Some((key, value)) = rows.next_entry::<String, String>()? {

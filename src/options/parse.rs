@@ -15,7 +15,7 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
-/// Parses a positive factor of the size of pictures.
+/// Parses a positive factor on the size of pictures.
 pub fn scale(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(factor),

@@ -1,4 +1,4 @@
-//! The choices that options leave to the scene.
+//! Resolves options that leave a choice to the scene.
 
 use super::RenderOptions;
 use super::values::{Diameters, Rgba, Switch};
@@ -7,21 +7,22 @@ use crate::scene::{
     Blend, Composite, Detail, Facing, Kernel, LowPass, Maps, NodeShape, PointSize, Samples, Shading, gaussian,
 };
 
-/// The scene's and its use's answers to what the options leave open.
+/// Facts of the scene and its use that decide what the options leave open.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Suggested {
-    /// The scene has Gaussians, which are drawn by the rules that their files are trained with.
+    /// The scene has Gaussians, which are drawn by the rules of their training.
     pub gaussians: bool,
-    /// The scene's own shading.
+    /// The shading that the scene suggests.
     pub shading: Option<Shading>,
-    /// There are many views, between which cuts of levels of detail fade where they can.
+    /// There are many views. Levels of detail then fade from view to view, if the other settings
+    /// allow it.
     pub views: bool,
-    /// There is one input, so that none is kept apart.
+    /// There is only one input, so inputs cannot be kept separate.
     pub one_input: bool,
 }
 
 impl RenderOptions {
-    /// The settings of a picture by `backend`, `None` being the best that there is.
+    /// Returns the settings of a picture drawn by `backend`; None is the best available one.
     pub fn settle(&self, backend: Option<BackendName>, suggested: Suggested) -> Settings {
         let Self { look, surface, transparency, levels, research, maps, .. } = self;
         let default = Settings::default();
@@ -30,7 +31,7 @@ impl RenderOptions {
         let blend = surface.blend.unwrap_or_default();
         let trained = suggested.gaussians && facing.is_none() && raster.is_none() && blend != Blend::Nearest;
         let kernel = surface.kernel.unwrap_or(match surface.lowpass {
-            // This filter stands beside a Gaussian.
+            // This filter requires a Gaussian kernel.
             Some(LowPass::Gaussians) => gaussian::KERNEL,
             _ if trained => gaussian::KERNEL,
             _ => default.kernel,
@@ -76,13 +77,13 @@ impl RenderOptions {
         Settings { detail_fades: settings.detail_fades || fades, ..settings }
     }
 
-    /// Whether a picture of Gaussians has another kernel than the one of its file.
+    /// Whether the options replace the kernel that Gaussians are trained with.
     pub fn replaces_gaussians(&self) -> bool {
         let is_own = |sigma: f64| (sigma * gaussian::EXTENT - 1.0).abs() < 1e-6;
         self.surface.kernel.is_some_and(|kernel| !matches!(kernel, Kernel::Gaussian { sigma } if is_own(sigma)))
     }
 
-    /// The shape of points that face the camera.
+    /// Returns the shape of points that face the camera, with its limits in pixels.
     fn facing(&self) -> Option<Facing> {
         let pixels = match (self.points.point_size, self.points.pixels) {
             (Some(PointSize::Pixels(diameter)), _) => [diameter; 2],
@@ -92,7 +93,7 @@ impl RenderOptions {
         self.points.facing.map(|shape| Facing { shape, pixels })
     }
 
-    /// The targets and depths of the rasteriser.
+    /// Returns the rasteriser's target format and depth test.
     pub(crate) fn raster(&self) -> Raster {
         let default = Raster::default();
         Raster {

@@ -8,12 +8,13 @@ use crate::surfels::{Limits, Size};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Surfels from points"))]
-// Help texts write defaults in brackets, which are no links.
+// Brackets in help texts hold defaults, not links.
 #[allow(rustdoc::broken_intra_doc_links)]
 pub struct LimitOptions {
-    /// Drop outliers: points K standard deviations farther from their neighbours than the mean
+    /// Drop outliers: points farther from their neighbours than the mean plus K standard deviations
     ///
-    /// A point's distance is its mean distance to 16 neighbours
+    /// A point's distance is its mean distance to 16 neighbours; mean and deviation are over all
+    /// points
     #[cfg_attr(feature = "cli", arg(long, value_name = "K", hide_short_help = true))]
     pub outliers: Option<f64>,
     /// Largest estimated half-axis, as a multiple of the neighbours' median; inf for no limit
@@ -41,14 +42,16 @@ pub struct SurfelOptions {
     /// Outliers, and the size and shape of estimated surfels.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub limits: LimitOptions,
-    /// Size the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat, ...
+    /// Estimate sizes anew, as `epsplat surfels --size` does: knn, ellipse, bsp[:RULE] or qsplat
+    ///
+    /// RULE is circumsphere, global or global-circumsphere
     #[cfg_attr(feature = "cli", arg(long = "surfel-size", id = "surfel_size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true))]
     pub size: Option<Size>,
     /// Image that paints the surfels by their texture coordinates: .png, .jpg, .bmp or .tga
     ///
-    /// It replaces the surfels' own colours; `epsplat sample` writes texture coordinates. Given
-    /// several times, the images are those of the inputs in order, or of the image numbers
-    /// (texnumber) of one input's points
+    /// It replaces the surfels' own colours; `epsplat sample` writes texture coordinates. If the
+    /// option is given several times, the images belong to the inputs in order. With one input they
+    /// belong to the image numbers (texnumber) of its points
     #[cfg_attr(feature = "cli", arg(long = "texture", id = "textures", value_name = "IMAGE"))]
     pub textures: Vec<PathBuf>,
 }

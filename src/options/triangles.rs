@@ -10,7 +10,7 @@ pub struct TriangleOptions {
     /// Meshes drawn as triangles, beside the surfels of the inputs or alone: .obj or .ply
     #[cfg_attr(feature = "cli", arg(long = "triangles", id = "triangles", value_name = "MESH", num_args = 1..))]
     pub meshes: Vec<PathBuf>,
-    /// Image for the triangles of meshes whose materials have none: .png, .jpg, .bmp or .tga
+    /// Image for the triangles of meshes whose materials have no image: .png, .jpg, .bmp or .tga
     #[cfg_attr(feature = "cli", arg(long = "triangle-texture", value_name = "IMAGE", hide_short_help = true))]
     pub texture: Option<PathBuf>,
 }

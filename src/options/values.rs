@@ -1,4 +1,4 @@
-//! Values that several numbers make: as texts, with commas between the numbers.
+//! Option values that are parsed from text: numbers with commas between them, and switches.
 
 use std::str::FromStr;
 
@@ -55,7 +55,7 @@ impl FromStr for Rgba {
     }
 }
 
-/// `on` or `off`, or `true` or `false` as studies have it.
+/// A switch: `on` or `off`; studies may write `true` or `false`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switch(pub bool);
 

@@ -10,39 +10,44 @@
 //! attribute's range, in addition to the errors of the fragments themselves. Let u = 2^-24, the
 //! rounding of one f32 operation.
 //!
-//! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word; W a is rounded to
+//! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word. W a is rounded to
 //!   f32 and then to an integer. Integer addition is associative: the sums, and so the image, do
-//!   not depend on the order of the surfels, on pages, or on the schedule. Sums have 64 bits in two
-//!   words: `before = atomicAdd(low, x)`; if that wrapped, `atomicAdd(high, 1)`. They overflow
-//!   after 2^32 full weights. A term errs by a relative u of itself, which moves the mean by at
-//!   most u, and by half a unit, which moves it by `n / (2 sum W)`. Rounding the weights moves it
-//!   by as much again, times the spread of the attributes, which is at most 1: `n / (F w)` in all.
-//!   A sum is read as an f32 with an error of 1.5 u: its upper word, below 2^24, is exact; the
-//!   rounding of the lower word is at most u / 2 of a sum that has an upper one, and only then does
-//!   adding the two round again. Two such sums, the division, and the product that maps back give
-//!   `6 u`, the term's own error included. A sum carries once per full weight, which is rarer than
-//!   once per fragment (on a software adapter carries are a fifth of the pass). At the rim of the
-//!   paper's kernel, exp(-6), terms keep 23 bits. Where weights may be smaller still, or alphas
-//!   differ ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of
-//!   `fixed64` in two words, which takes two additions for most. They have 40 bits; or up to 56
-//!   ([`wide_bits`]) where the kernel's tails need them, or order-free sums, whose far fragments
+//!   not depend on the order of the surfels, on pages, or on the schedule. A sum has 64 bits in two
+//!   words: `before = atomicAdd(low, x)`; if that wrapped, `atomicAdd(high, 1)`. It overflows after
+//!   2^32 full weights. A sum carries once per full weight, which is less often than once per
+//!   fragment; on a software adapter carries take a fifth of the pass.
+//!
+//!   *Error*: rounding W a to f32 moves the mean by at most u. Rounding it to an integer errs by
+//!   half a unit, which moves the mean by `n / (2 sum W)`. Rounding the weights moves the mean by
+//!   at most as much again, because attributes spread by at most 1: `n / (F w)` in all. Reading a
+//!   sum as f32 errs by 1.5 u: the upper word, below 2^24, is exact. If the upper word is not 0,
+//!   rounding the lower word errs by at most u / 2 of the sum, and adding the two words by u. Two
+//!   such sums, their division, the product that maps the mean back, and the rounding of W a give
+//!   `6 u`.
+//!
+//!   *Small weights*: at the rim of the paper's kernel, where w = exp(-6), terms keep 23 bits.
+//!   Where weights may be smaller still, or alphas differ
+//!   ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of `fixed64`
+//!   in two words, and most take two additions. They have 40 fraction bits, or up to 56
+//!   ([`wide_bits`]) for kernels with long tails and for order-free sums, in which far fragments
 //!   weigh little. An adapter with 64-bit atomics makes the same sums in half the additions.
-//! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at
-//!   least 24 and let 255 full weights (or all surfels, if fewer) meet in a pixel. A sum that wraps
-//!   is detected, and the frame is rendered again with `fixed`. A sum is read with one rounding:
-//!   `n 2^-B / w + 5 u`.
-//! - **fixed64**: W = 2^40 w exactly; W a, rounded as f32 and cut at 2^-40, in one u64. Each term
-//!   errs by a relative u of itself, so the mean by u, whatever n: `6 u + n 2^-40 / w`. It
-//!   overflows after 2^24 full weights.
+//! - **fixed32**: the same in one word with `B = 32 - bits(min(surfels, 255))` fraction bits. B is
+//!   at least 24, so that 255 full weights (or all surfels, if fewer) can meet in a pixel. A sum
+//!   that wraps is detected, and the frame is rendered again with `fixed`. Reading a sum rounds
+//!   once: `n 2^-B / w + 5 u`.
+//! - **fixed64**: a term is one u64. W = 2^40 w is exact; W a is rounded to f32 and cut at 2^-40.
+//!   The rounding moves the mean by at most u, whatever n: `6 u + n 2^-40 / w`. A sum overflows
+//!   after 2^24 full weights.
 //! - **packed64**: the terms of `fixed32`, two sums in the halves of one u64.
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in
-//!   any order errs by at most `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The
-//!   image depends on the order of the fragments.
+//!   any order errs by at most `(n - 1) u` of itself. An attribute's sum divided by the weight's
+//!   errs by `2 n u + 4 u`. The image depends on the order of the fragments.
 //!
-//! Where surfaces are compared by their blended depths, a fragment adds W w and W w z to the
-//! depth's sums, with the factor w at least 2^-8. These terms are up to 256 times smaller than W,
-//! and the bounds, in which w stands for the summed weights, that much larger. With 24 bits nothing
-//! is left of weights below 2^-17; the depth is then the nearest one.
+//! Where surfaces are compared by their blended depths, a fragment adds `W f` and `W f z` to the
+//! depth's sums, with `f = max(w, 2^-8)`. These terms are up to 256 times smaller than W, so the
+//! error bounds, in which w is the summed weight, are up to 256 times larger for the depth. With
+//! 24 fraction bits, terms of weights below 2^-17 round to 0. A pixel with no larger weights shows
+//! its nearest depth.
 
 use super::attributes;
 use super::footprint::footprint;
@@ -66,7 +71,7 @@ fn fixed_file(needs: &SceneNeeds) -> &'static str {
     match (needs.wide_sums || needs.surface.copies(), needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => PAIRS,
-        // Products with numbers of copies are made of single words.
+        // The product of a term and a number of copies is computed in single words.
         (true, true) if !needs.surface.copies() => "accumulator_fixed64.wgsl",
         (true, _) => "accumulator_fixed_wide.wgsl",
     }
@@ -89,8 +94,8 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     }
 }
 
-/// The files that keep the sums of a tile's pixels in registers; those of [`files`] keep sums in
-/// storage.
+/// The files that keep the sums of a tile's pixels in registers. Those of [`files`] keep sums in
+/// storage buffers.
 pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     let pairs = fixed_file(needs) == PAIRS;
     [
@@ -142,8 +147,8 @@ pub struct PixelSums {
     pub back: bool,
     /// The sum of the depths, weighted as in `depth_weight`.
     pub depth: f64,
-    /// The sum of the depths' weights: the weights, or their squares where surfaces are compared by
-    /// depth.
+    /// The sum of the factors of the depths: the weights or, where surfaces are compared by depth,
+    /// about their squares ([`LEAST_MIDDLE`]).
     pub depth_weight: f64,
     /// The depth of the nearest fragment; set for lists only.
     pub nearest: f64,
@@ -178,11 +183,11 @@ impl PixelSums {
 /// The smallest factor on a fragment's weight in the depth sums where surfaces are compared by
 /// depth.
 ///
-/// There a fragment counts by the square of its weight; this bound ensures that every covered pixel
-/// has a depth.
+/// In these sums each weight is multiplied by itself, or by this bound if that is larger. The bound
+/// ensures that every covered pixel has a depth.
 pub const LEAST_MIDDLE: f64 = 1.0 / 256.0;
 
-/// How far outside a decision, relative, a fragment still records its distance.
+/// A fragment that a decision rejects by at most this relative distance still records the distance.
 const NEARBY: f64 = 1e-3;
 
 /// The f64 twin, over the rows of `nearest`, the result of the visibility pass's twin.
@@ -258,13 +263,13 @@ pub fn reference<'a>(
 
 /// The relative distance to the nearest decision that could change whether a fragment is accepted.
 ///
-/// It is accepted if rim, near depth and epsilon all accept it. If it clearly fails one of them,
-/// the others cannot change that, and the distance is +inf.
+/// A fragment is accepted if rim, near depth and epsilon all accept it. If one of them clearly
+/// rejects it, the others cannot change that, and the distance is +inf.
 pub(super) fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
     decision_beside(at, behind, near, f64::INFINITY)
 }
 
-/// The same, with one more margin that must accept the fragment.
+/// The same as [`decision`] with one more margin, `beside`, that must accept the fragment.
 fn decision_beside(at: Intersection, behind: f64, near: f64, beside: f64) -> f64 {
     let before = if behind.is_finite() { behind / at.depth - 1.0 } else { f64::INFINITY };
     let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before, beside];

@@ -1,8 +1,8 @@
 //! The attributes that are blended with the weight: colour, normal, depth, fragment count, and
 //! texture coordinates.
 //!
-//! Each has a file that adds its terms to a pixel's sums and one that resolves them, or a file that
-//! replaces both where it is absent.
+//! Each attribute has a file that adds its terms to a pixel's sums and a file that resolves them.
+//! Where the attribute is absent, one file replaces both.
 
 use super::lit;
 use super::splat::Splat;

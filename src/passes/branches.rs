@@ -1,9 +1,9 @@
 //! Stage 0 with levels of detail: cuts the tree into branches that fit a device's buffers.
 //!
-//! A branch has neighbouring subtrees, whose surfels are consecutive. If there are several
-//! branches, the first has no surfels, but the nodes above all others; its lowest nodes lead to
-//! roots of the other branches. Which nodes share a branch depends on the adapter, but the fate of
-//! a node does not depend on its branch.
+//! A branch consists of neighbouring subtrees of one tree, whose surfels are consecutive. If there
+//! are several branches, the first one has no surfels: it has the nodes above the other branches,
+//! and its lowest nodes lead to the roots of those branches. The adapter determines which nodes
+//! share a branch, but whether a node is drawn does not depend on its branch.
 
 mod row;
 mod small;
@@ -19,23 +19,23 @@ use self::small::Small;
 use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
-/// The most surfels of one node whose numbers one invocation copies.
+/// The most surfels of one leaf whose numbers one invocation copies. Larger leaves have parts.
 const MOST_OF_LEAF: u32 = 4096;
 
 /// Neighbouring subtrees of a tree, laid out for a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Branch {
-    /// The range of its surfels in the scene.
+    /// The range of the branch's surfels in the scene.
     pub surfels: Range<u32>,
-    /// Its rows, roots first and level by level.
+    /// The branch's rows, roots first and level by level.
     pub nodes: Vec<Row>,
-    /// The number in the tree of each row's node.
+    /// For each row, the number of its node in the tree.
     pub numbers: Vec<u32>,
     /// The number of roots.
     pub roots: u32,
     /// The number of the first root, counted over all branches except the first.
     pub first_root: u32,
-    /// Whether its root is the root of the tree.
+    /// Whether the branch starts at the root of the tree.
     pub whole: bool,
     /// The number of levels.
     pub levels: u32,
@@ -48,8 +48,8 @@ pub struct Branch {
 enum Item {
     /// A node, with everything below it.
     Node(u32),
-    /// Some surfels of a leaf that has too many. The leaf is judged whole, as a node above its
-    /// parts.
+    /// Some surfels of a leaf that has more than [`MOST_OF_LEAF`]. The leaf becomes an inner node
+    /// above its parts and is judged once, for all of them.
     Part { leaf: u32, first: u32, count: u32 },
     /// A root of another branch, by its number.
     Other { root: u32, node: u32 },
@@ -58,13 +58,13 @@ enum Item {
 /// The place of a node that is in another branch.
 #[derive(Clone, Copy)]
 struct Elsewhere {
-    /// The number of its root, or of the first of its roots.
+    /// The number of the root that is the node, or of the root that is the node's first part.
     root: u32,
-    /// Whether it is a leaf each part of which is a root.
+    /// Whether the node is a leaf in parts, each of which is a root.
     in_parts: bool,
 }
 
-/// The parts of a leaf with more surfels than one invocation should copy; none for other nodes.
+/// The parts of a leaf with more than [`MOST_OF_LEAF`] surfels; none for other nodes.
 fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
     let Node { first, count, leaf, .. } = *node;
     let end = if leaf && count > MOST_OF_LEAF { first + count } else { first };
@@ -114,9 +114,10 @@ fn of_root(tree: &Hierarchy, surfels: u32) -> Branch {
     Branch { whole: true, ..laid_out(tree, (&[Item::Node(0)], tree.nodes.len()), 0..surfels, |_| None) }
 }
 
-/// The same for a tree without crowded leaves, whose rows are its nodes in the same order.
+/// The single branch of a tree without leaves in parts: its rows are the tree's nodes, in the same
+/// order.
 ///
-/// All threads make them, which takes 0.98 times as long for a view of 3,000,000 nodes.
+/// All threads make the rows; a view of 3,000,000 nodes then takes 0.98 times as long.
 fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
     let row = |node: &Node| {
         let kind = if node.leaf { LEAF } else { INNER };
@@ -136,7 +137,7 @@ fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
     Branch { surfels: 0..surfels, nodes, numbers, roots: 1, first_root: 0, whole: true, levels, small_levels }
 }
 
-/// The number of rows and surfels of a tree.
+/// The size of a tree: the number of its rows and surfels together, and of its surfels alone.
 fn rows_of(tree: &Hierarchy) -> (u64, u32) {
     let of = |(number, node): (usize, &Node)| {
         let surfels = if node.leaf { node.count } else { 0 };
@@ -146,7 +147,7 @@ fn rows_of(tree: &Hierarchy) -> (u64, u32) {
     tree.nodes.par_iter().enumerate().with_min_len(4096).map(of).reduce(|| (0, 0), sum)
 }
 
-/// For each node, the number of surfels and rows of its subtree, itself included.
+/// For each node, the size of its subtree: surfels and rows together, the node's own row included.
 fn sizes(tree: &Hierarchy) -> Vec<u64> {
     let mut sizes = vec![0u64; tree.nodes.len()];
     // Children have larger numbers than their parents.
@@ -159,8 +160,8 @@ fn sizes(tree: &Hierarchy) -> Vec<u64> {
     sizes
 }
 
-/// The largest subtrees of size at most `most`, from left to right, with their sizes and their
-/// numbers of surfels.
+/// The largest subtrees of size at most `most`, from left to right, each with its size and its
+/// number of surfels.
 fn subtrees(tree: &Hierarchy, sizes: &[u64], most: u64) -> Vec<(Item, u64, u32)> {
     let (mut found, mut open) = (Vec::new(), vec![0u32]);
     while let Some(index) = open.pop() {
@@ -196,10 +197,11 @@ fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
     last.first + last.count - first.first
 }
 
-/// Lays out the branch of some subtrees, whose surfels are a range.
+/// Lays out the branch that consists of the subtrees below `roots`; `surfels` is the range of their
+/// surfels.
 ///
-/// The subtrees have `room` nodes, or a few more. Nodes that are `elsewhere` lead to roots of other
-/// branches.
+/// `room` is the expected number of nodes, for allocation. Nodes that are `elsewhere` lead to roots
+/// of other branches.
 fn laid_out(
     tree: &Hierarchy,
     (roots, room): (&[Item], usize),
@@ -230,7 +232,7 @@ struct Rows<'a, E> {
 }
 
 impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
-    /// Adds the row of an item, without what is below it.
+    /// Adds the row of an item, without the rows below it.
     fn push(&mut self, item: Item) {
         let (number, kind, first, count) = match item {
             Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - self.surfels.start, count),
@@ -242,7 +244,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
                     None if node.leaf && node.count <= MOST_OF_LEAF => {
                         (number, LEAF, node.first - self.surfels.start, node.count)
                     }
-                    // A leaf in parts becomes a node above them.
+                    // A leaf in parts becomes an inner node above them.
                     _ => (number, INNER, 0, 0),
                 }
             }
@@ -252,7 +254,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
         self.numbers.push(number);
     }
 
-    /// Adds the rows right below an inner node.
+    /// Adds the rows of the children or parts of an inner node.
     fn push_below(&mut self, row: usize) {
         if self.nodes[row].below >> KIND_SHIFT != INNER {
             return;
@@ -345,13 +347,13 @@ mod tests {
         levels
     }
 
-    /// Checks an inner node's bound on its children's radii. It has one unless some of its children
-    /// are in another branch or in parts.
+    /// Checks an inner node's bound on its children's radii. The node has a bound unless a child is
+    /// in another branch or in parts.
     fn family(tree: &Hierarchy, branch: &Branch, index: usize) {
         let (node, children) = (branch.nodes[index], branch.row(tree, index).children);
         let rows = node.first as usize..(node.first + kind(&node).1) as usize;
         let of = |row: usize| kind(&branch.nodes[row]);
-        // A crowded leaf whose parts are roots is a node above them.
+        // A leaf whose parts are roots of other branches is an inner node above the parts.
         let crowds = |row: usize| {
             let leaf = tree.nodes[branch.numbers[row] as usize].leaf;
             leaf && of(row).0 == INNER && of(branch.nodes[row].first as usize).0 == OTHER_BRANCH
@@ -380,7 +382,7 @@ mod tests {
             assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
             assert!(all.len() == 1 || all[0].surfels.is_empty());
             let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;
-            // The first branch fits, because the nodes above all others are few.
+            // The first branch fits, because few nodes lie above the roots of other branches.
             assert!(all.iter().all(fits), "{count} {copies}");
             let mut found = Vec::new();
             below(&all, (0, 0), 0, &mut found);

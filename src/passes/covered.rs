@@ -1,8 +1,8 @@
 //! Stage 4, its start: the list of image tiles that are not empty.
 //!
-//! Resolving a pixel that no splat covers takes as long as any other. Tiles without a fragment are
-//! therefore skipped and stay as the image was cleared, unless the background or the depth map
-//! differs from 0 there.
+//! Resolving a pixel that no splat covers takes as long as resolving any other. Tiles without a
+//! fragment are therefore skipped and keep the zeros to which the image is cleared, unless their
+//! background or their depth map must differ from 0.
 
 use crate::gpu::layout::COVERED_LIST;
 use crate::plan::pass::Pass;
@@ -15,8 +15,8 @@ pub const PASS: Pass = Pass {
     files: |_| vec!["covered.wgsl"],
     kernels: |_| vec![LIST, ARRANGE],
     constants: |making| {
-        // With depth peeling the last layer may be empty, so the nearest depths do not show which
-        // tiles have earlier ones.
+        // With depth peeling the last layer may be empty, so its nearest depths do not show which
+        // tiles have earlier layers.
         let needs = making.needs;
         let list_empty = making.options.shows_where_nothing_is() || needs.surface.peels().is_some();
         vec![
@@ -47,8 +47,8 @@ pub fn restart(plan: &Plan, band: usize) -> Clear {
     Clear::of("nearest", start(plan, band), COVERED_LIST.into())
 }
 
-/// The clears before the list is made: its header, and the image, in which only covered tiles are
-/// written.
+/// The clears before the list is made: the list's header, and the image, because only covered tiles
+/// are written later.
 pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
     let mut clears = vec![restart(plan, band)];
     if !plan.lists_empty || super::asks_for_order(&plan.needs) {
@@ -61,8 +61,8 @@ pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
 /// The dispatch that lists the tiles with a nearest depth.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 
-/// The dispatches that make the list: `lists`, which lists the tiles, and one that writes the grids
-/// to dispatch over it.
+/// The dispatches that make the list: `lists`, which lists the tiles, and one that writes the
+/// numbers of workgroups of the dispatches over the list.
 pub fn runs(lists: Run) -> [Run; 2] {
     [lists, Run { kernel: ARRANGE, over: Over::Once }]
 }

@@ -3,15 +3,16 @@
 //!
 //! The order of the surfels makes each [`BATCH`](crate::gpu::layout::BATCH) of them a
 //! neighbourhood, with a bounding ball. Among the batches in view, those nearer than the middle of
-//! the scene are projected and drawn first ([`Part::Near`]). The farthest of the nearest depths in
-//! each tile of pixels then hides those of the others ([`Part::Far`]) that lie behind it, by more
-//! than epsilon, at all of their pixels. For a closed surface that is most of its back.
+//! the scene are projected and drawn first ([`Part::Near`]). Each tile of pixels then stores the
+//! farthest of its nearest depths. A later batch ([`Part::Far`]) is hidden if it lies behind that
+//! depth, by more than epsilon, in all tiles that it may touch. Most of the back of a closed
+//! surface is hidden in this way.
 //!
-//! **No image depends on it.** A fragment of a batch that is left out has a depth z beyond the
-//! deepest that is accepted at its pixel for the nearest depth so far, and the true nearest depth
-//! is no farther. So the fragment is neither nearest nor accepted. Both comparisons allow for
-//! rounding: a kernel's depth differs from that of the disk by some units of 2^-24 divided by the
-//! cosine between ray and normal, and the margin is a thousandth.
+//! **No image depends on culling.** Take a fragment of a batch that is left out. Its depth z is
+//! beyond the deepest that is accepted at its pixel for the nearest depth so far, and the true
+//! nearest depth is no farther. So the fragment is neither nearest nor accepted. Both comparisons
+//! allow for rounding: a kernel's depth differs from that of the disk by some units of 2^-24
+//! divided by the cosine between ray and normal, and the margin is a thousandth.
 //!
 //! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has
 //! no holes.
@@ -39,7 +40,7 @@ pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel, f64)> +
     let far =
         |(center, surfel, height): (DVec3, &Surfel, f64)| center.distance(middle.as_dvec3()) + reach(surfel) + height;
     let radius = surfels.map(far).fold(0.0, f64::max);
-    // Rounded up to the next f32, and past the rounding of these lengths.
+    // The factor covers the rounding of these lengths and of the conversion to f32.
     middle.extend((radius * (1.0 + 1e-6)) as f32).to_array()
 }
 
@@ -104,11 +105,12 @@ const CULL_FAR: Kernel = Kernel::new("cull_far");
 
 /// The stage that lists the batches of every page that are in `part`.
 ///
-/// This is [`Part::Near`] or, once the nearest depths of the near ones are known, [`Part::Far`].
+/// `part` is [`Part::Near`] first, then, once the near batches have nearest depths, [`Part::Far`].
 pub fn steps(band: usize, part: Part) -> Stage {
     let near = part == Part::Near;
     let kernel = if near { CULL_NEAR } else { CULL_FAR };
-    // The counts of all, far and not near batches; the far ones are listed after the near ones.
+    // Resets three counts: batches listed, far batches among them, and batches that are not near.
+    // Far batches are listed after the near ones.
     let counts = [("drawn", 1), ("drawn", u64::from(LIST_FAR) + 1), ("rest", 0)];
     let mut clears: Vec<_> = counts.into_iter().map(|(list, word)| Clear::of(list, word, 1)).collect();
     clears.push(Clear::of("queue", 0, QUEUE_START.into()));

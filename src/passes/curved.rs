@@ -4,17 +4,17 @@
 //! **Rows.** With N the inverse of [s t n], n the unit normal, a point q relative to the surfel's
 //! centre has the coordinates `(u, v, w) = N q`, and the cap is
 //! `w = (uu u² + 2 uv u v + vv v²) / 2`. On the ray through a pixel, take the point at the depth of
-//! the centre: its (U, V, W) are affine in the pixel, and 0 at the image of the centre. They are
-//! stored relative to the pixel that holds the centre, like the rows of a
-//! [homography](super::homography). When its depth grows by r, the longer half-axis, the ray
-//! advances by `(U, V, W) r/z + D`, where D = N p r/z (pinhole) or D = N e r (orthographic, e the
-//! ray's direction). All these numbers are near 1 at any scale of the scene, if the surfel is not
-//! much larger than its depth.
+//! the centre. Its coordinates (U, V, W) are affine in the pixel, and 0 at the image of the centre.
+//! The rows of U, V and W are stored relative to the pixel that holds the centre, like the rows of
+//! a [homography](super::homography). While the depth grows by r, the longer half-axis, the point
+//! on the ray advances by `(U, V, W) r/z + D`, where D = N p r/z (pinhole) or D = N e r
+//! (orthographic, e the ray's direction). All these numbers are near 1 at any scale of the scene,
+//! if the surfel is not much larger than its depth.
 //!
-//! **Intersection.** `a σ² + b σ + c = 0`, where σ is the distance along the ray in units of r of
-//! depth. The nearest root counts that lies on the cap, inside its clip lines and past the near
-//! depth; the sign of the slope there tells the side. For a flat disk the equation is that of its
-//! plane. (Specified after paper 001, which gives no formula.)
+//! **Intersection.** `a σ² + b σ + c = 0`, where σ is the distance along the ray, in steps by which
+//! the depth grows by r. The hit is the nearest root that lies on the cap, inside its clip lines
+//! and past the near depth. The sign of the slope at the hit tells which side is seen. For a flat
+//! disk the equation is that of its plane. (Specified after paper 001, which gives no formula.)
 
 use glam::{DVec2, DVec3};
 
@@ -129,8 +129,8 @@ impl Seen {
     }
 }
 
-/// The rows of the inverse of [s t n], n the unit normal of s and t. These need not be
-/// perpendicular.
+/// The rows of the inverse of [s t n], where n is the unit normal of s and t. The half-axes s and t
+/// need not be perpendicular.
 fn inverse(s: DVec3, t: DVec3) -> [DVec3; 3] {
     let cross = s.cross(t);
     let n = cross.normalize_or_zero();
@@ -206,7 +206,7 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
         // The hit is no more certain than the miss of the first root.
         Intersection { inside: second.inside.min(out), ..second }
     } else {
-        // A miss by as much as the nearer root misses.
+        // Both roots miss. The root that misses by less says by how much the ray misses.
         let (nearer, missed) = if out_of_second < out { (second, out_of_second) } else { (first, out) };
         Intersection { rho2: (1.0 + missed).powi(2), inside: f64::INFINITY, ..nearer }
     };
@@ -245,8 +245,8 @@ impl Way {
 
 /// How far an intersection is from being a hit; 0 or negative for a hit.
 ///
-/// The largest of the distances outside the unit disk, outside the clip lines, and before the near
-/// depth (relative).
+/// This is the largest of three distances: outside the unit disk, outside the clip lines, and
+/// before the near depth (relative).
 fn outside(curve: &Curve, camera: &Camera, at: &Intersection) -> f64 {
     let never = curve.culls && at.away || at.rho2.is_nan();
     let margins = [at.rho2.sqrt() - 1.0, -at.inside, 1.0 - at.depth / camera.near];

@@ -77,7 +77,7 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
     met(splat, camera, low_pass, x, y).map(|(at, gain)| (at, gain * splat.fade.weight()))
 }
 
-/// The same without the splat's fade.
+/// The same as [`footprint`], without the splat's fade.
 fn met(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
     if let Some(curve) = &splat.curve {

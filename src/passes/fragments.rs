@@ -5,14 +5,13 @@
 //! The visibility pass counts the fragments of each pixel, a prefix sum turns the counts into list
 //! starts, and the attribute pass stores every fragment's depth, weight and attributes in its list.
 //! Then each list is sorted, so later passes do not depend on the order in which fragments were
-//! stored: fragments at one depth are in the order of their surfels ([`order`](super::order)),
-//! where that order is visible.
+//! stored. Where the order of fragments at one depth is visible, they are in the order of their
+//! surfels ([`order`](super::order)).
 //!
-//! **Memory.** The number of fragments is read before any is stored. If a band has more than a
-//! buffer holds, it is cut, by the counts of its rows, into bands that fit, and the frame begins
-//! again: fragments that do not fit at once are drawn in turns, and none is left out. Lists that
-//! are too long for one invocation are sorted and composited in rounds
-//! ([`long_lists`](super::long_lists)).
+//! **Memory.** The number of fragments is read before any is stored. If a band has more fragments
+//! than a buffer holds, the counts of its rows say where to cut it into bands that fit, and the
+//! frame begins again. No fragment is left out. Lists that are too long for one invocation are
+//! sorted and composited in rounds ([`long_lists`](super::long_lists)).
 
 use glam::DVec3;
 
@@ -137,11 +136,11 @@ const LIST: Kernel = Kernel::new("list_fragments");
 const LIST_LARGE: Kernel = Kernel::of("list_fragments_large", [TILE, TILE, 1]);
 const SORT: Kernel = Kernel::new("sort_fragments");
 
-/// Words of the buffer of list starts.
+/// The number of words of the buffer of list starts.
 ///
-/// First the total number of fragments and the most at one pixel; then the start of each row's
-/// lists and the end of the last; then the same per pixel; then the last step of each pixel's list
-/// ([`veils`](super::veils)).
+/// The buffer holds the total number of fragments and the most at one pixel; the start of each
+/// row's lists and the end of the last row's; the same per pixel; and for each pixel the step of
+/// depth at which its list ends ([`veils`](super::veils)).
 pub fn start_words(band: &Band) -> u64 {
     2 + u64::from(band.rows) + 1 + band.pixels + 1 + band.pixels
 }
@@ -154,19 +153,19 @@ pub fn starts(band: usize) -> [Step; 2] {
     [Step::Stage(Stage::new("bin", band, runs)), Step::Look(Look::Fragments(band))]
 }
 
-/// The stages that store the fragments in their lists, and sort these.
+/// The stages that store the fragments in their lists, and that sort the lists.
 pub fn steps(band: usize) -> [Stage; 2] {
     let run = |kernel, over| Run { kernel, over };
     let list = vec![run(LIST, Over::Slots(Part::All)), run(LIST_LARGE, Over::Large)];
     [Stage::new("accumulate", band, list), Stage::new("sort", band, vec![run(SORT, Over::Pixels)])]
 }
 
-/// Cuts `band` of a view, which has more than the `most` fragments that a buffer holds, and returns
-/// all bands of the new view.
+/// Cuts a `band` with more fragments than the `most` that a buffer holds, and returns all bands of
+/// the view after the cut.
 ///
-/// The band is cut where the next row would exceed `most`, by the `starts` of its rows, and only
-/// between rows of whole pixels. Later bands get as many rows as the smallest piece, the last one
-/// excepted. `None` if a single row has more.
+/// `starts` are those of the band's rows of samples. The band is cut before the row of pixels with
+/// which a piece would exceed `most`. Later bands get as many rows as the smallest piece, not
+/// counting the last piece. Returns `None` if a single row of pixels exceeds `most`.
 pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Band>> {
     let whole = plan.needs.samples.down as usize;
     let mut rows = Vec::new();

@@ -33,8 +33,8 @@ pub(super) struct Projected {
     pub(super) images: Option<[DVec2; 3]>,
 }
 
-/// The largest coordinate of an anchor, pixels, which is exact in f32. A centre farther outside the
-/// image is of no use.
+/// The largest coordinate of an anchor, pixels, which is exact in f32. A disk whose centre lies
+/// farther outside is anchored at the middle of the image.
 const FARTHEST_ANCHOR: f64 = 4_194_304.0;
 
 /// Projects the disk with centre `p` and half-axes `s` and `t` (camera space). Part of it must lie
@@ -55,7 +55,7 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {
     let away = p.dot(s.cross(t));
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
-    // Edge-on the rows vanish; u is then set to 2, outside the disk.
+    // Edge-on, all rows are 0. The row `a` then gives u = 2, which is outside the disk.
     let edge_on = away == 0.0;
     let scale = if edge_on { 0.0 } else { 1.0 / away };
     let (a, b, c) = (t.cross(p) * scale, p.cross(s) * scale, s.cross(t) * scale);
@@ -99,8 +99,8 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {
     }
 }
 
-/// X/Z of the tangents to a disk in front of the camera, relative to its centre's. Vectors are (x
-/// or y, z).
+/// X/Z of the two tangents to a disk in front of the camera, relative to X/Z of its centre. Vectors
+/// are (x, z); with y in place of x, the result is Y/Z.
 fn tangents(s: [f64; 2], t: [f64; 2], p: [f64; 2]) -> DVec2 {
     let ratio = p[0] / p[1];
     let (s_x, t_x) = (s[0] - ratio * s[1], t[0] - ratio * t[1]);

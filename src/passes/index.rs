@@ -6,8 +6,8 @@
 //! [`order`](super::order) wins. That order depends on the surfels' values, not on their places in
 //! files.
 //!
-//! Two sweeps over the fragments find the greatest weight, then the first surfel that has it, in
-//! the map's own words of the image.
+//! Two sweeps over the fragments find the greatest weight, then the first surfel with that weight.
+//! Both are stored in the map's words of the image.
 
 use super::footprint::footprint;
 use super::visibility::Nearest;

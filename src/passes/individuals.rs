@@ -1,11 +1,11 @@
 //! Stages 2 to 4 where inputs are kept separate: Tien's individuals (2008, chapter 5), which do not
 //! blend however close they lie.
 //!
-//! Each input is blended by itself, with nearest depths and sums in buffers that all inputs share,
-//! and its pixels are shaded. Each pixel keeps the nearest of the shaded surfaces, by the depth
-//! that each blends to, as triangles and splats are compared ([`join`](super::join)). So any number
-//! of inputs may meet at a pixel. A picture costs as much as its inputs would one by one, and eight
-//! words per pixel, or sixteen with maps or triangles.
+//! The inputs are drawn one after the other: each is blended by itself and shaded, with nearest
+//! depths and sums in buffers that the next input reuses. Each pixel keeps the shaded surface with
+//! the nearest blended depth, as splats are compared with triangles ([`join`](super::join)). So any
+//! number of inputs may meet at a pixel. A picture takes as long as pictures of its inputs one by
+//! one, and eight more words per pixel, or sixteen with maps or triangles.
 
 use super::resolve::Surface;
 use super::{Strip, accumulate, covered, resolve, visibility};
@@ -33,15 +33,16 @@ const LIST: Kernel = Kernel::new("list_individuals");
 /// The dispatch that lists the tiles in which any input is visible.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 
-/// The stage that shades the sums of an input and keeps its surface where it is nearest so far.
+/// The stage that shades the sums of an input and keeps its surface at the pixels where that is the
+/// nearest so far.
 pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: KEEP, over: Over::Covered });
     Stage::new("resolve", band, runs).after(clears(plan, band, first))
 }
 
-/// The clears before an input's tiles are listed. Before the `first` input they include the
-/// surfaces kept.
+/// The clears before an input's tiles are listed. Before the `first` input they include the kept
+/// surfaces.
 pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
     let kept = extra::clear("individuals", plan, band).filter(|_| first);
     [covered::restart(plan, band)].into_iter().chain(kept).collect()
@@ -57,8 +58,8 @@ pub fn reference(strip: &Strip<'_>, individual: usize) -> Vec<Surface> {
     resolve::surfaces(&sums, &nearest, (scene, camera, options), first_row)
 }
 
-/// The f64 twin: keeps the nearer of each pixel's surface in `kept` and in `shown`, and their
-/// smallest distance to a decision.
+/// The f64 twin: stores in `kept`, at each pixel, the nearer of the surfaces in `kept` and `shown`,
+/// with the smallest distance to a decision of either.
 pub fn keep_nearest(kept: &mut [Surface], shown: Vec<Surface>) {
     for (kept, shown) in kept.iter_mut().zip(shown) {
         let both = kept.exists() && shown.exists();

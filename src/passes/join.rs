@@ -1,9 +1,9 @@
 //! Stage 4 where there are triangles: joins each pixel's blended splats with its nearest triangle
 //! (Tien 2008, section 5.3), by [`Join`].
 //!
-//! Splats are blended first, without the triangles: if a triangle took part in nearest depths and
-//! sums, a splat's fragments just behind it would be missing from a mean that includes those just
-//! in front.
+//! Splats are blended first, without the triangles. If a triangle took part in nearest depths and
+//! sums, fragments just behind the triangle would be missing from a mean that includes fragments
+//! just in front of it.
 
 use super::resolve::Surface;
 use super::triangles::Shown;
@@ -73,8 +73,8 @@ pub(super) fn compares_depth(scene: &Scene, camera: &Camera, options: &Settings)
     apart || (options.join != Join::Nearest && in_view(&bounds_of(&scene.triangles), scene.origin, camera))
 }
 
-/// The share of splats in a pixel beside a triangle, 0 to 1, and the relative distance to a
-/// decision.
+/// The weight of a pixel's splats, 0 to 1, and the relative distance to a decision. The pixel's
+/// triangle has the rest of the weight.
 fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &Settings) -> (f64, f64) {
     match (splats.exists(), triangle.depth.is_finite()) {
         (false, _) => return (0.0, f64::INFINITY),

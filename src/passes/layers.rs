@@ -1,15 +1,16 @@
 //! Stage 4 of [`Composite::Layers`]: splits each pixel's fragments into surfaces, blends each
-//! surface as the nearest one is always blended, and composites them from front to back.
+//! surface as an opaque picture blends the nearest one, and composites the surfaces from front to
+//! back.
 //!
 //! # Where a surface ends
 //!
-//! The nearest fragment that no layer has yet consumed starts a surface. Fragments of its side
-//! within epsilon of it are blended, as in an opaque picture. Those of its side that follow, each
-//! within epsilon of one before it, belong to the same surface but lie behind its visible part and
-//! are skipped. So a surface ends at the first gap of epsilon, as 3DSS merges the intervals of its
-//! kernels. A window of one epsilon behind the nearest fragment would cut a surface in two where
-//! the ray meets it at a grazing angle or at a crease. Where normals have sides, a front and a back
-//! are two surfaces, however close they lie.
+//! The nearest fragment that no layer has yet consumed starts a surface. Fragments of the same side
+//! within epsilon of this first one are blended, as in an opaque picture. Further fragments of that
+//! side, each within epsilon of a fragment before it, belong to the same surface but lie behind its
+//! visible part and are skipped. So a surface ends at the first gap of epsilon, as 3DSS merges the
+//! intervals of its kernels. If instead a surface ended one epsilon behind its nearest fragment, it
+//! would be cut in two where the ray meets it at a grazing angle or at a crease. Where normals have
+//! sides, a front and a back are two surfaces, however close they lie.
 //!
 //! The sums are the integers of [`accumulate`](mod@super::accumulate), from the same terms. A
 //! nearest layer of alpha 1 therefore has the bits of the opaque picture without culling, and a
@@ -26,13 +27,13 @@ use crate::scene::composite::LEAST_TRANSMITTANCE;
 use crate::scene::maps::SURFACES;
 use crate::scene::{Composite, Map, Tail};
 
-/// How a pixel's fragments are split into surfaces.
+/// Where a pixel's surface ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parting {
     /// At the first gap of epsilon.
     Runs,
-    /// One epsilon behind the nearest fragment: the layers that the rasteriser peels, to compare
-    /// with.
+    /// One epsilon behind the nearest fragment, as in the layers that the rasteriser peels
+    /// ([`peel`](super::peel)).
     Window,
 }
 
@@ -48,8 +49,8 @@ pub fn part(
 ) -> (Vec<PixelSums>, f64) {
     let farthest = |depth: f64, radius: f64| options.epsilon.farthest(depth, radius, along);
     let (mut layers, mut decision) = (Vec::new(), f64::INFINITY);
-    // Per side, the depth up to which fragments are consumed: the end of the last run, or with
-    // windows the last front, behind which each fragment's own epsilon counts.
+    // Per side, the depth up to which fragments are consumed: the end of the last surface, or with
+    // windows the depth of its nearest fragment, to which `untold` adds each fragment's epsilon.
     let mut told = [f64::NEG_INFINITY; 2];
     let untold = |f: &Fragment, told: [f64; 2]| {
         let told = told[usize::from(f.back)];
@@ -137,7 +138,7 @@ impl Shown {
         (self.transmittance / least - 1.0).abs()
     }
 
-    /// Composites a straight colour at `depth` behind what is there.
+    /// Composites a straight colour at `depth` behind the layers so far.
     pub(super) fn with(mut self, [r, g, b, alpha]: [f64; 4], depth: f64) -> Self {
         let shows = self.transmittance * alpha;
         if let Some(surface) = self.nearest.get_mut(self.layers as usize) {
@@ -167,7 +168,7 @@ impl Shown {
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let most = if let Composite::Layers(most) = options.composite { most } else { 1 };
-    // The rasteriser's layers are windows (peel.rs).
+    // The rasteriser ends a surface one epsilon behind its nearest fragment (peel.rs).
     let parting = if options.raster.is_some() { Parting::Window } else { Parting::Runs };
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);

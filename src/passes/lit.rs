@@ -22,7 +22,7 @@ pub const PASS: Pass = Pass {
 };
 
 /// The f64 twin: the premultiplied colour of a splat, lit if splats are lit. `direction` points
-/// from the eye to its centre.
+/// from the eye to the splat's centre.
 pub fn reference(premultiplied: [f64; 4], splat: &Splat, direction: DVec3, options: &Settings) -> [f64; 4] {
     let [r, g, b, alpha] = premultiplied;
     if !options.lights_splats() || alpha <= 0.0 {

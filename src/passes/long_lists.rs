@@ -2,16 +2,18 @@
 //! sorts and composites long lists in rounds.
 //!
 //! Each dispatch does a part of the work and stores where it stopped. Mesa's llvmpipe silently ends
-//! the loops of an invocation after 65,535 rounds in total. It counts every round in which any
-//! invocation of the subgroup takes part: with nested loops at worst the rounds of all of them.
-//! Each dispatch stays below that limit, so the bits are those of a list that is processed at once.
+//! the loops of an invocation after 65,535 rounds in total. It counts a round for all invocations
+//! of a subgroup if any of them runs it. With nested loops, an invocation may therefore be charged
+//! the rounds of the whole subgroup. Each dispatch stays below the limit, so the bits are those of
+//! a list that is processed at once.
 //!
 //! **Number of dispatches.** A heap sort of n keys has n / 2 + n - 1 steps, of fewer than 32 rounds
-//! each. Compositing visits a fragment at most five times, where fronts and backs alternate: as
-//! part of its surface, as a neighbour of the other side, as the end of a run, as already consumed,
-//! and as part of the tail. A dispatch may visit the last fragment of the one before once more.
+//! each. Compositing visits a fragment at most five times, if fronts and backs alternate: as part
+//! of its surface, as a neighbour of the other side, as the end of a surface, as already consumed,
+//! and as part of the tail. A dispatch may revisit the last fragment of the dispatch before it.
 //!
-//! Views without such lists have none of this, unless an earlier view of the same size had.
+//! Views without long lists have none of these dispatches, unless an earlier view of the same image
+//! size had long lists.
 
 use crate::gpu::layout::MOST_ROUNDS;
 use crate::plan::Plan;
@@ -22,25 +24,26 @@ use crate::scene::Samples;
 /// Steps of a heap sort per dispatch.
 const HEAP_STEPS: u32 = 512;
 
-/// Fragments of a list that one dispatch visits: 16 invocations of a subgroup take at most a
-/// quarter of the rounds that llvmpipe allows.
+/// Fragments of a list that one dispatch visits. Together, the 16 invocations of a subgroup then
+/// take at most a quarter of the rounds that llvmpipe allows.
 const LOOKS: u32 = 1024;
 
 /// Words of the buffer before the first list, and words per list.
 const HEAD: u64 = 1;
 const WORDS: u64 = 39;
 
-/// The most fragments of a list that one invocation sorts and composites. With `samples` it
-/// composites the lists of all of a pixel's samples.
+/// The most fragments of a list that one invocation sorts and composites. It composites the lists
+/// of all `samples` of a pixel.
 ///
-/// A heap of n takes fewer than n (log2 n + 2) rounds, and fewer than twice that if the lists of a
-/// subgroup differ in length. Compositing takes five rounds per fragment, and as many are left for
-/// the rounds of other invocations of the subgroup, in which this one waits.
+/// A heap sort of n keys takes fewer than n (log2 n + 2) rounds, and fewer than twice that if the
+/// lists of a subgroup differ in length. Compositing takes five rounds per fragment, at most
+/// [`MOST_ROUNDS`] in all. That is half of llvmpipe's limit; the other half is for rounds in which
+/// the invocation waits for others of its subgroup.
 pub fn most_at_once(samples: Samples) -> u32 {
     (MOST_ROUNDS / 16).min(MOST_ROUNDS / 5 / samples.count())
 }
 
-/// Words of a buffer that holds the state of the long lists that `fragments` can form at most.
+/// Words of a buffer that holds the state of as many long lists as `fragments` can form.
 pub fn words(fragments: u64, samples: Samples) -> u64 {
     HEAD + WORDS * (fragments / (u64::from(most_at_once(samples)) + 1) + 1)
 }

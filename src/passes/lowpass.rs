@@ -6,16 +6,16 @@
 //! - **max** (Botsch et al. 2005, section 4.2): a circle of radius [`RADIUS`] beside the disk; the
 //!   smaller rho counts. A splat then reaches the centre of the pixel that it lies in, so a surface
 //!   sampled once per pixel has no holes.
-//! - **gaussians** ([`gaussian`]): the same circle for the surfels of 2D Gaussian splatting, where
-//!   a Gaussian of a fixed standard deviation stands beside that of the disk. The circle's radius
-//!   is as many of these deviations as the kernel's disk has.
+//! - **gaussians** ([`gaussian`]): the same for the surfels of 2D Gaussian splatting. The circle
+//!   holds a Gaussian of fixed standard deviation in pixels, and cuts it at as many deviations as
+//!   the rim of the disk cuts the kernel's Gaussian.
 //! - **ewa** (Zwicker et al. 2001): the disk's affine image J at its centre, convolved with the
 //!   pixel's Gaussian: `Q = J J^T + blur I`, weight times `sqrt(|J J^T| / |Q|)`. Exact for a
 //!   Gaussian kernel; other kernels are convolved as the Gaussian of the same variance.
 //!
-//! A filtered fragment's depth is that of the disk's plane, clamped to the disk's own depths. Where
-//! the filter takes over from the disk the two agree; edge-on, where the plane's depth diverges,
-//! the fragment's does not.
+//! A filtered fragment has the depth of the disk's plane, clamped to the disk's own depths. Where
+//! the filter takes over from the disk, the depths of filter and disk agree. Seen edge-on, the
+//! plane's depth diverges, but the fragment's depth does not.
 
 use glam::DVec2;
 
@@ -80,7 +80,7 @@ pub struct Design {
     pub blur: f64,
     /// The radius of `max` or `gaussians`, pixels.
     pub radius: f64,
-    /// How surfels face the camera, if they are drawn as points that do.
+    /// How points face the camera; `None` if surfels are drawn as disks.
     pub facing: Option<Faced>,
 }
 
@@ -131,7 +131,7 @@ pub fn filter(design: &Design, center: DVec2, s: DVec2, t: DVec2, depths: [f64; 
 /// weight.
 ///
 /// `plane` is the third row at the pixel: 1/z (pinhole) or z of the disk's plane. `inside` is how
-/// far its point lies inside the disk's clip lines.
+/// far the plane's point at the pixel lies inside the disk's clip lines.
 pub fn filtered(
     splat: &Splat,
     camera: &Camera,

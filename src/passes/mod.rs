@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | [`order`] | [`Scene`] | the order of its surfels in memory |
 //! | [`upload`] | a [`source::Source`] | pages of surfels |
-//! | [`branches`], [`select`] | a tree of surfels | the cut that is drawn in place of all |
+//! | [`branches`], [`select`] | a tree of surfels | the cut that is drawn in place of all surfels |
 //! | [`cull`] | surfels, nearest depths so far | the batches to project |
 //! | [`project`] | surfels | one [`splat::Splat`] each |
 //! | [`visibility`] | splats | the nearest depth of each pixel |
@@ -36,15 +36,15 @@
 //!   `weight_at`) and a row of [`ACCUMULATORS`](crate::plan::ACCUMULATORS): words per sum, needed
 //!   features, whether the bits are the same in any order, and a proven bound on its error. Tests
 //!   and `epsplat hardcases` loop over that table.
-//! - **A map** that a pass of its own makes: a row of [`MAPS`](crate::scene::MAPS), a pass with its
-//!   twin such as [`index`], its row in `MAP_PASSES`, and a kernel in `wgsl/`. The build finds
-//!   kernel files by itself. A file with loops names the proof that they end (`gpu/loops.rs`); else
-//!   its loops are counted at run time.
-//! - **A kernel function** of one's own needs no variant: `--source kernel_ellipse.wgsl=mine.wgsl`,
-//!   `sources` of a study, or a [`Replacement`](crate::gpu::Replacement) from Rust puts a text in
-//!   the place of a built-in file. A blending kernel's text is evaluated in f64 too, which is its
-//!   twin; its weights that are NaN, infinite, negative or above 1, and loops that do not end, are
-//!   counted in the report.
+//! - **A map** that a pass of its own makes: write a row of [`MAPS`](crate::scene::MAPS), a pass
+//!   with its twin such as [`index`], the pass's row in `MAP_PASSES`, and a kernel in `wgsl/`. The
+//!   build finds kernel files by itself. A file with loops names the proof that they end
+//!   (`gpu/loops.rs`); without a proof, the loops are counted at run time.
+//! - **A kernel function** of your own needs no variant. `--source kernel_ellipse.wgsl=mine.wgsl`,
+//!   `sources` of a study, or a [`Replacement`](crate::gpu::Replacement) from Rust replaces a
+//!   built-in file by your text. The text of a blending kernel is also evaluated in f64, as its
+//!   twin. The report counts weights that are NaN, infinite, negative or above 1, and calls whose
+//!   loops do not end.
 
 pub mod accumulate;
 pub mod attributes;
@@ -120,7 +120,7 @@ pub struct Strip<'a> {
 }
 
 impl<'a> Strip<'a> {
-    /// A strip without rows and splats; `facts` are those of the scene.
+    /// Makes a strip without rows and splats; `facts` are those of the scene.
     pub fn of((scene, facts): (&'a Scene, &Facts), camera: &'a Camera, options: &'a Settings) -> Self {
         Self {
             scene,
@@ -140,11 +140,11 @@ impl<'a> Strip<'a> {
 
 /// A map with a pass of its own, made from splats and nearest depths.
 ///
-/// Its words of the image are left alone by [`resolve`].
+/// The pass writes the map's words of the image, and [`resolve`] leaves them alone.
 pub struct MapPass {
     /// The map that this pass makes.
     pub map: Map,
-    /// Its kernels and files; named like the map.
+    /// The pass's kernels and files; it has the name of the map.
     pub pass: Pass,
     /// The stage of a band, which runs after the band's image is resolved.
     pub runs: fn(&Plan, usize) -> Stage,
@@ -164,7 +164,7 @@ fn own_maps(needs: &SceneNeeds) -> impl Iterator<Item = &'static MapPass> {
     MAP_PASSES.into_iter().filter(move |own| maps.has(own.map))
 }
 
-/// The stages that make these maps in a band.
+/// The stages that make the maps of [`MAP_PASSES`] in a band.
 pub fn of_maps(plan: &Plan, band: usize) -> impl Iterator<Item = Stage> {
     own_maps(&plan.needs).map(move |own| (own.runs)(plan, band).as_twin(Twin::Map(own.map)))
 }
@@ -217,11 +217,11 @@ fn passes(needs: &SceneNeeds) -> impl Iterator<Item = &'static Pass> {
     PASSES.into_iter().chain(own_maps(needs).map(|own| &own.pass))
 }
 
-/// The modules of a render with `needs`: the main one, then the one of the tiles and the one that
-/// chooses a cut, if they exist.
+/// The modules of a render with `needs`: the main module, then, if needed, the module of the tiles
+/// and the module that chooses a cut.
 pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
     let tiles = || Module { files: files_with(&tiles::PASS, needs).collect(), kernels: (tiles::PASS.kernels)(needs) };
-    // Compiled before the size of the cut is known, so with the needs that hold then.
+    // This module is compiled before the size of the cut is known, so with the needs at that time.
     let cut = || Module { files: first_files(&needs.before_cut()), kernels: select::CHOOSING.into() };
     let kernels = passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect();
     let first = Module { files: first_files(needs), kernels };

@@ -4,12 +4,12 @@
 //! After Münstermann, Krumpen, Klein and Peters 2018, Moment-based order-independent transparency.
 //!
 //! A fragment of alpha a at depth y, mapped to [-1, 1] over the scene's depths, adds `h y^k` with
-//! `h = -ln(1 - a)` to the moments k = 0 to 4. Among all measures with these moments, take the one
-//! with mass at a given depth x: it has mass at two other depths (the canonical representation: the
-//! zeros of the second orthogonal polynomial through x). No measure has less mass before x than
-//! this one, and none has more up to and including x. The mass in front of x is estimated as its
-//! mass before x plus a quarter of its mass at x (paper, section 3.2), and the transmittance is
-//! `exp` of minus that.
+//! `h = -ln(1 - a)` to the moments k = 0 to 4. For a given depth x, one measure with these moments
+//! has mass at x and at just two other depths (the canonical representation; the two depths are the
+//! zeros of the second orthogonal polynomial through x). No measure with these moments has less
+//! mass before x than the canonical one, and none has more up to and including x. The mass in front
+//! of x is estimated as the canonical measure's mass before x plus a quarter of its mass at x
+//! (paper, section 3.2). The transmittance is `exp` of minus that estimate.
 //!
 //! A fragment's weight is the transmittance in front of it divided by that in front of the nearest
 //! fragment. The nearest weight is then 1 however dense the pixel is; as colours are means, a
@@ -17,17 +17,17 @@
 //!
 //! Moments are 64-bit integer sums in units of 2^-26, so the result does not depend on the order of
 //! fragments; the paper sums floats. Because f32 loses nearly all digits of nearly degenerate
-//! moments, they are mixed with a part of 2^-14 of a spread measure: the paper's part for 16-bit
-//! moments, and a hundred times its part for floats. Depths are not warped by a logarithm, because
-//! they are relative to the scene's body and not to clip planes.
+//! moments, they are mixed with the moments of a spread-out measure, in a share of 2^-14. The paper
+//! takes that share for 16-bit moments, and a hundredth of it for floats. Depths are not warped by
+//! a logarithm, because they are relative to the scene's body and not to clip planes.
 
 use super::Strip;
 use super::oit::{held_back, visit};
 
-/// The part of the spread measure that is mixed in.
+/// The share of the spread-out measure that is mixed in.
 const MIXED: f64 = 1.0 / 16384.0;
 
-/// Moments 1 to 4 of the spread measure, whose mass is 1.
+/// Moments 1 to 4 of the spread-out measure, whose mass is 1.
 const SPREAD: [f64; 4] = [0.0, 0.375, 0.0, 0.375];
 
 /// The part of the mass at a depth that counts as in front of it.
@@ -36,10 +36,10 @@ const OF_OWN: f64 = 0.25;
 /// Moments 0 to 4 of the optical depth of a pixel's fragments.
 pub type Sums = [f64; 5];
 
-/// The lower bound of the variance, and of the part of the fourth moment that skewness leaves,
-/// relative to the variance.
+/// The lower bound of the variance and, relative to the variance, of the part of the fourth moment
+/// that variance and skewness do not account for.
 ///
-/// Moments of a nearly transparent pixel, once rounded, may belong to no measure.
+/// Without it, the rounded moments of a nearly transparent pixel may belong to no measure.
 const LEAST_SPREAD: f64 = 1e-6;
 
 /// Below this optical depth a pixel counts as fully transparent.
@@ -89,7 +89,7 @@ impl Moments {
         let c2 = (x * x - second - third / second * x) / rest;
         let (c1, c0) = ((x - third * c2) / second, 1.0 - second * c2);
         let own = 1.0 / (c0 + x * (c1 + x * c2));
-        // One of them may be infinitely far away; it has no mass then.
+        // One of the two other depths may be infinitely far away; it has no mass then.
         let c2 = if c2.abs() < 1e-12 { 1e-12 } else { c2 };
         let (half, product) = (-0.5 * c1 / c2, c0 / c2);
         let larger = half + (half * half - product).max(0.0).sqrt().copysign(half);

@@ -1,15 +1,15 @@
 //! Stage 3 of [`Composite::Weighted`] and [`Composite::Moments`]: order-independent transparency.
 //!
-//! It approximates [`sorted`](super::sorted) by sums over all fragments of a pixel, in any order.
-//! No list is made and nothing is sorted.
+//! Sums over all fragments of a pixel, in any order, approximate the picture of
+//! [`sorted`](super::sorted). No list is made and nothing is sorted.
 //!
 //! With alphas `a_i = A w_i alpha_i` (A the opacity, w_i the kernel's weight) and straight colours
 //! c_i at depths z_i (McGuire and Bavoil 2013, Eq. 2)
 //!
 //!   `colour = sum(v_i a_i c_i) / sum(v_i a_i)`, `alpha = 1 - prod(1 - a_i)`.
 //!
-//! So the alpha over the background is exact, and order enters only through the visibility v_i. It
-//! approximates the transmittance in front of fragment i:
+//! So the alpha over the background is exact, and order enters only through the visibility v_i,
+//! which approximates the transmittance in front of fragment i:
 //!
 //! - **weighted**: `max((1 - d)^3, 1 / 300,000)` (McGuire and Bavoil, Eq. 10, divided by its
 //!   largest value), where d runs from 0 at the near end of the scene's body to 1 at its far end;
@@ -17,9 +17,10 @@
 //!   not fill.
 //! - **moments**: reconstructed from the moments of all fragments ([`moments`]).
 //!
-//! The product is stored as the optical depth, `sum(-ln(1 - a_i))`. With the accumulator `fixed`
-//! the sums are integers, so the image does not depend on the order of the fragments; with `float`
-//! and `cas`, which renderers commonly use, it does.
+//! The product over 1 - a_i is stored as the optical depth, `sum(-ln(1 - a_i))`. With the
+//! accumulator `fixed` the sums are integers, so the image does not depend on the order of the
+//! fragments. With the accumulators `float` and `cas`, the kind that renderers commonly use, it
+//! does.
 //!
 //! Splats are lit, not pixels, because the mean of several surfaces' normals is the normal of none
 //! of them.
@@ -65,8 +66,7 @@ impl Fragment {
     }
 }
 
-/// Visits every footprint of the splats of `strip` (`near`, hit or not) and every fragment
-/// (`fragment`, hits only).
+/// Calls `near` for every footprint of the splats of `strip`, hit or not, and `fragment` for hits.
 pub(super) fn visit(strip: &Strip<'_>, mut near: impl FnMut(usize, Intersection), mut fragment: impl FnMut(Fragment)) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let of_splat = |splat: &Splat, near: &mut dyn FnMut(usize, Intersection), fragment: &mut dyn FnMut(Fragment)| {
@@ -127,7 +127,8 @@ pub const PASS: Pass = Pass {
 
 const MARK: Kernel = Kernel::new("mark_covered");
 
-/// Whether sums mark the pixels that are not empty, because there is no visibility pass.
+/// Whether a kernel marks the pixels that are not empty, by their sums, because there is no
+/// visibility pass.
 pub fn marks(needs: &SceneNeeds) -> bool {
     needs.surface.oit() == Some(Oit::Weighted)
 }

@@ -1,13 +1,16 @@
-//! Stage 0: the order in which surfels are stored on the device: along a Morton curve, so that
-//! neighbours in memory are neighbours in the image, cut into runs that are dealt out over the
-//! scene.
+//! Stage 0: the order in which surfels are stored on the device.
 //!
-//! The invocations of a subgroup then draw splats of one place: they loop alike, and hidden ones
-//! are rejected together. Runs that are processed at the same time lie far apart, so their atomics
-//! do not contend. Sums and minima do not depend on the order. Sorted lists and the index map take
-//! the first of several fragments at one depth (or of one weight), which depends only on the
-//! surfels' values. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
-//! Order Optimization".)
+//! Surfels are sorted along a Morton curve, so that neighbours in memory are neighbours in the
+//! image. The curve is then cut into runs of equal length, and the runs are shuffled by a fixed
+//! stride, so that consecutive runs lie far apart.
+//!
+//! The invocations of a subgroup then draw neighbouring splats: their loops are of similar length,
+//! and hidden splats are rejected together. Runs that are processed at the same time lie far apart,
+//! so their atomics do not contend. Sums and minima do not depend on the order. It decides only in
+//! sorted lists, among fragments at one depth, and in the index map, among surfels of one weight.
+//! There the image is still the same for any input order, because the stored order depends only on
+//! the surfels' values. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and
+//! Vertex Order Optimization".)
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -29,8 +32,8 @@ const LAST: u32 = (1 << BITS) - 1;
 /// The indices of the surfels of `scene` in the order in which they are stored; there are fewer
 /// than 2^32.
 ///
-/// `core` is a box that holds nearly all surfels. Those outside fall into the outermost cells, so
-/// that they do not enlarge the others.
+/// `core` is a box that holds nearly all surfels. Surfels outside it fall into the outermost cells,
+/// so that they do not make all cells larger.
 ///
 /// Within a cell the surfels' values decide, so the device sees the same scene for any input order.
 /// Only surfels that are equal in every value are ordered by index.
@@ -54,7 +57,7 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
         let by_content = || content(*a).cmp(&content(*b)).then_with(|| harmonics(*a).cmp(harmonics(*b)));
         (a >> 32).cmp(&(b >> 32)).then_with(by_content).then_with(|| a.cmp(b))
     });
-    // The incomplete last run stays last, so that each run is stored as one batch.
+    // The incomplete last run stays last, so that every other run is stored as whole batches.
     let (runs, rest) = along.as_chunks::<RUN>();
     let stride = dealing(runs.len());
     let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
@@ -79,17 +82,18 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>
     )
 }
 
-/// The page of a cut (`wgsl/levels/select.wgsl`) that draws `surfels` chosen surfels from the
-/// `first` on, with their runs dealt out.
+/// The page of a cut (`wgsl/levels/select.wgsl`) that draws `surfels` chosen surfels from number
+/// `first` on, with their runs shuffled.
 ///
-/// The list of the chosen surfels starts at word `chosen`.
+/// The list of the chosen surfels starts at word `chosen` of the branch's attributes.
 pub(crate) fn dealt(surfels: u64, (chosen, first): (u32, u32)) -> Page {
     let runs = surfels / RUN as u64;
     let stride = dealing(runs as usize) as u32;
     Page { first, surfels: surfels as u32, runs: runs as u32, stride, chosen, ..Zeroable::zeroed() }
 }
 
-/// A stride near the golden ratio of `runs` and coprime to it, so that it visits each run once.
+/// The stride by which runs are shuffled. It is near the golden ratio of `runs`, and coprime to
+/// `runs`, so that steps of this stride visit each run once.
 fn dealing(runs: usize) -> usize {
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {

@@ -5,9 +5,9 @@
 //! pass are drawn once per layer, each time without the fragments of the layers before, and the
 //! result is composited behind those layers.
 //!
-//! A layer is a window of one epsilon behind its nearest fragment
-//! ([`Parting::Window`](super::layers::Parting::Window)): the rasteriser cannot know where a run of
-//! fragments ends before it has drawn all of them.
+//! A layer ends one epsilon behind its nearest fragment
+//! ([`Parting::Window`](super::layers::Parting::Window)) and not at the first gap between
+//! fragments: the rasteriser cannot find that gap before it has drawn all fragments.
 
 use crate::plan::Plan;
 use crate::plan::extra;

@@ -165,8 +165,8 @@ fn large(making: &Making<'_>) -> u32 {
 
 /// The stage that projects `part` of the surfels, for `band` or for it and all later bands.
 ///
-/// If [`cull`](super::cull) leaves batches out, it has listed the others before. Splats that take
-/// long to project are listed and projected by a dispatch of their own.
+/// If [`cull`](super::cull) leaves batches out, it has already listed the batches to project.
+/// Splats that take long to project are listed and projected by a dispatch of their own.
 pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
     let mut clears = vec![start("rare")];

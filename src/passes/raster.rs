@@ -1,10 +1,10 @@
 //! Stages 2 and 3 by the rasteriser (Botsch et al. 2005), the baseline for the compute kernels.
 //!
-//! The splats are those of [`project`](super::project), and footprint and attributes use the same
-//! WGSL. A quad covers the pixels that a splat may touch. The **visibility pass** stores the
-//! nearest depth in a depth buffer, the **attribute pass** adds each accepted fragment's terms by
-//! additive blending, four channels per target, and [`resolve`](super::resolve) reads the targets.
-//! [`RasterDepth`] says how fragments are accepted:
+//! The splats are those of [`project`](super::project). Footprint and attributes use the WGSL of
+//! the compute kernels. A quad covers the pixels that a splat may touch. The **visibility pass**
+//! stores the nearest depth in a depth buffer. The **attribute pass** adds each accepted fragment's
+//! terms by additive blending, four channels per target. Then [`resolve`](super::resolve) reads the
+//! targets. [`RasterDepth`] says how fragments are accepted:
 //!
 //! - **exact**: fragments write their own depth, scaled by a power of two, and the attribute pass
 //!   compares in the shader. It accepts exactly the fragments that the compute kernels accept.
@@ -12,19 +12,20 @@
 //!   depths. Both sides of a surface are blended, with normals as they are given, as in the papers.
 //!   Depths err by the rasteriser's interpolation (a fragment within about 2^-20 of epsilon may be
 //!   decided otherwise), absolute tolerances are applied at the quads' corners, and a plane that
-//!   passes through the eye within its quad becomes bent. OpenGL cannot represent these depths: it
-//!   maps them to -1 to 1, where depths far from the eye, which are near 0 elsewhere, lie near -1
-//!   and keep no digits.
+//!   passes through the eye within its quad becomes bent. OpenGL cannot represent these depths. It
+//!   maps them to the range -1 to 1, in which far depths lie near -1 and keep no digits; other APIs
+//!   store them near 0.
 //!
-//! Triangles are drawn first, each with its number, into a texture. Their coverage and interpolated
-//! depths are the rasteriser's; the nearest one is shaded as in the compute path ([`triangles`]).
+//! Triangles are drawn first, and write their numbers to a texture. The rasteriser determines their
+//! coverage and interpolates their depths. The nearest triangle is shaded as in the compute path
+//! ([`triangles`]).
 //!
-//! **Error.** A sum of n terms in a format of unit roundoff r, added in the rasteriser's order,
-//! errs by at most `n r` of itself if the format is floating (r = 2^-11 or 2^-24), so a mean errs
-//! by `2 n r + 4 u`. In 8 bits, each of the n additions errs by half a step of 1/255 of the
-//! [`BlendFormat::MOST_WEIGHTS_8`] weights that a sum can hold: `8 n / (255 w)` for a summed weight
-//! w, and anything above 8 weights is lost. Blending rounds in the order of the quads, so the image
-//! depends on the order of the surfels.
+//! **Error.** In a floating format of unit roundoff r (2^-11 or 2^-24), a sum of n terms errs by at
+//! most `n r` of itself, so a mean errs by `2 n r + 4 u` with u = 2^-24. An 8-bit sum holds
+//! [`BlendFormat::MOST_WEIGHTS_8`] = 8 weights in steps of 1/255 of that, and each of the n
+//! additions errs by half a step: a mean errs by `8 n / (255 w)` for a summed weight w. Anything
+//! above 8 weights is lost. Blending rounds in the order of the quads, so the image depends on the
+//! order of the surfels.
 
 use super::triangles;
 use crate::gpu::program::Draw;
@@ -99,8 +100,8 @@ pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
 /// The texture format of nearest depths.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// The pipelines of the two passes and of triangles; or the single one in which the nearest
-/// fragment's terms replace those of others.
+/// The pipelines of the two passes and of triangles. If only the nearest fragment shows, a single
+/// pipeline draws it, and its terms replace those of other fragments.
 pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     let pixel = PixelLayout::of(needs);
     let depth = |compare, write| {

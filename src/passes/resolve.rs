@@ -1,5 +1,5 @@
-//! Stage 4: sums become the image: divided by the weight (paper 000, section 5.4), shaded,
-//! composited over the background.
+//! Stage 4: makes the image from the sums. They are divided by the weight (paper 000, section 5.4),
+//! shaded, and composited over the background.
 
 use glam::{DVec3, DVec4};
 use rayon::prelude::*;
@@ -43,8 +43,8 @@ pub fn surfaces(
     sums.iter().enumerate().map(of).collect()
 }
 
-/// The f64 twin: writes `surfaces`, joined with triangles if there are any, to `frame`, which holds
-/// just their rows.
+/// The f64 twin: writes `surfaces`, joined with triangles if there are any, to `frame`, which has
+/// only the rows of `surfaces`.
 pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &Settings, frame: &mut Frame) {
     for (pixel, of_splats) in surfaces.iter().enumerate() {
         let surface = match beside.triangles.get(pixel) {
@@ -135,9 +135,9 @@ pub(super) fn surface(
     (color, normal)
 }
 
-/// The straight colour of a premultiplied one, with its alpha times the opacity.
+/// Converts a premultiplied colour to a straight one, and multiplies its alpha by the opacity.
 ///
-/// It is lit with the unit `normal`, unless splats were lit before.
+/// The colour is lit with the unit `normal`, unless splats were lit before.
 pub(super) fn shaded(
     [r, g, b, alpha]: [f64; 4],
     normal: DVec3,
@@ -290,8 +290,8 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
 /// Words per pixel of [`Map::Surfaces`].
 const WORDS_OF_SURFACES: usize = 2 * SURFACES;
 
-/// Appends the resolved pixels in `bytes` to those of `frame`. The caller counts the rows, as it
-/// knows when they are complete.
+/// Appends the resolved pixels in `bytes` to those of `frame`. The caller updates the frame's
+/// height, because only the caller knows when rows are complete.
 pub fn unpack(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
     // Copies N words of each pixel, from `word` on.

@@ -1,20 +1,21 @@
 //! Stage 0 with levels of detail: chooses the cut, which is drawn in place of all surfels (Pajarola
 //! 2003, section 5.1, step 1).
 //!
-//! The tree is walked from the root down. A node out of view is skipped; with back-face culling so
-//! is one below which everything faces away. A node that appears smaller than the requested size is
-//! drawn; with culling only if its own plane faces the viewer, since otherwise it would be culled
-//! although surfels below it may be visible. Any other leaf is replaced by its surfels, any other
-//! node by its children. The cut depends only on the tree, the camera and whether backs are culled.
+//! The tree is walked from the root down. A node is skipped if it is out of view or, with back-face
+//! culling, if everything below it faces away. A node that appears smaller than the requested size
+//! is drawn. With culling, its own plane must also face the viewer: otherwise the node would be
+//! culled although surfels below it may be visible. Any other leaf is replaced by its surfels, any
+//! other node by its children. The cut depends only on the tree, the camera and [`Wanted`], the
+//! options of the cut.
 //!
-//! With fades, the cuts of [`STEPS`] sizes, from half the requested size on, are drawn at once. A
+//! With fades, the cuts of [`STEPS`] sizes, from half the requested size up, are drawn at once. A
 //! node or surfel belongs to the cuts of its [`Fade`](crate::scene::Fade), which follows from its
-//! size and those of the nodes above it. So when a node passes one of these sizes, its weight
-//! changes by `1 / STEPS`, and no cut draws a node larger than the requested size.
+//! size and the sizes of the nodes above it. When a node's size passes one of the `STEPS` sizes,
+//! its weight changes by only `1 / STEPS`. No cut draws a node larger than the requested size.
 //!
-//! On a device the tree lies in [`branches`](super::branches), which are processed one after the
-//! other. The chosen surfels and nodes are drawn from where they lie, page by page: no later pass
-//! knows of trees.
+//! On a device the tree is stored as [`branches`](super::branches), which are processed one after
+//! the other. Pages then read the chosen surfels and nodes from the branch, so no later pass
+//! depends on trees.
 
 use glam::{DVec2, DVec3};
 
@@ -72,9 +73,10 @@ pub fn choose(large_levels: u32) -> Vec<Run> {
 /// The options of a cut.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {
-    /// The size in the image below which a node is drawn in place of what is below it.
+    /// The size in the image. A node that appears smaller is drawn in place of its children or
+    /// surfels.
     pub detail: Detail,
-    /// How that size is measured.
+    /// How the size of a node is measured.
     pub measure: DetailMeasure,
     /// Whether surfels that face away are left out.
     pub backs_out: bool,
@@ -95,22 +97,23 @@ impl Wanted {
     }
 }
 
-/// Converts a requested number of splats to a size in square pixels for the view of the image's
-/// `camera`. Any other size is returned as it is.
+/// Converts a requested number of splats to a node size in square pixels for the view of the
+/// image's `camera`. Returns any other request as it is.
 ///
-/// A smaller size draws more, except for a few nodes at the image's edges that stand for more than
-/// is in view. So a search by powers of two, then by bisection, finds a size that draws at most the
-/// requested number, and hardly fewer. Nodes that reach the near depth are divided at any size, so
-/// even the coarsest cut may draw more. With fades some sizes may draw more than all surfels: if
-/// the number allows the smallest size, that one is returned.
+/// A smaller size draws more splats, with few exceptions: a node at the image's edge may be divided
+/// into children that are mostly out of view. So a search by powers of two, then by bisection,
+/// finds a size that draws at most the requested number, and hardly fewer. Nodes that reach the
+/// near depth are divided at any size, so even the coarsest cut may draw more than requested. With
+/// fades, some sizes may draw more splats than there are surfels. If the request allows the
+/// smallest size, that size is returned without a search.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
     let fits_at = |size: f64| {
         let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
         bounded(hierarchy, origin, camera, &wanted, splats).is_some()
     };
-    // The size found is just above that of some node, which a device may round to the other side. A
-    // slightly larger size is safe, so it must fit too.
+    // The size found is just above the size of some node, which a device may round to the other
+    // side of it. The returned size is therefore slightly larger, and it must fit too.
     let fits = |size: f64| fits_at(size) && fits_at(size * SIZE_SLACK);
     let size = if wanted.fades && fits(SMALLEST) { SMALLEST } else { finest(fits) };
     Detail::Pixels(size * SIZE_SLACK)
@@ -133,16 +136,16 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
     bounded(hierarchy, origin, camera, wanted, u64::MAX).unwrap_or_default()
 }
 
-/// The same; `None` if the cut has more than `most` surfels and nodes.
+/// The same as [`reference`]; `None` if the cut has more than `most` surfels and nodes.
 fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
     let fate = |index: u32| fate(&hierarchy.nodes[index as usize], hierarchy.low(index), (origin, camera), wanted, 0.0);
     Cut::of(hierarchy, most, fate)
 }
 
-/// Whether a render may need what is below a node: whether the twin, or a device within its error,
-/// may divide the node in some of the wanted cuts.
+/// Whether a render may need the children or surfels of a node: whether the twin, or a device
+/// within its error, may divide the node in some of the wanted cuts.
 ///
-/// The tree's positions are relative to the origin in `at`; `low` is the part of the node's centre
+/// The tree's positions are relative to the origin in `at`. `low` is the part of the node's centre
 /// that f32 leaves out.
 pub fn may_divide(node: &Node, low: DVec3, at: (DVec3, &Camera), wanted: &Wanted) -> bool {
     // A leaf of one surfel is always drawn as that surfel.
@@ -168,12 +171,13 @@ fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wa
     let near = at.z - radius <= camera.near;
     let seen = if near { f64::INFINITY } else { measure.of(node, center, camera) };
     let seen = seen * (1.0 + slack * (SIZE_SLACK - 1.0));
-    // A node whose plane faces away would be culled, whatever is below it, so it is divided.
+    // A node whose plane faces away would be culled even if surfels below it are visible, so it is
+    // divided.
     if turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
 }
 
-/// The number of cuts, the finest first, that divide a node that appears as large as `seen`. The
-/// requested size is `size`.
+/// The number of cuts that divide a node of apparent size `seen`, where the requested size is
+/// `size`. If only some cuts divide it, these are the finest ones.
 ///
 /// Without fades there is one cut, which counts as all [`STEPS`].
 fn divided(seen: f64, size: f64, fades: bool) -> u8 {
@@ -187,11 +191,10 @@ fn divided(seen: f64, size: f64, fades: bool) -> u8 {
     }
 }
 
-/// The sine by which a node's normal points away from the eye, and the one above which everything
-/// below the node faces away, seen from the eye at any point of the node's ball (specification
-/// S12).
+/// Two sines: by how much a node's normal points away from the eye, and the limit above which
+/// everything below the node faces away, wherever in the node's ball it lies (specification S12).
 ///
-/// The latter is the sine of the sum of the cone's angle and the ball's half-angle, if that sum is
+/// The limit is the sine of the sum of the cone's angle and the ball's half-angle, if that sum is
 /// less than a right angle; else 1.
 fn turned_away(node: &Node, (center, radius): (DVec3, f64), camera: &Camera) -> [f64; 2] {
     let (toward, ball) = match camera.projection {
@@ -281,7 +284,7 @@ mod tests {
         }
     }
 
-    /// The part of a fading cut that belongs to one size is the cut of that size alone.
+    /// The part of a fading cut that belongs to one size equals the cut of that size without fades.
     #[test]
     fn cuts_that_fade_are_cuts_of_sizes_from_half_on() {
         let (_, tree) = sphere();

@@ -1,7 +1,7 @@
 //! Stage 4 of [`Composite::Sorted`] and [`Composite::Gaussians`]: composites every fragment of a
 //! pixel by itself, from front to back, lit at its own normal.
 //!
-//! A fragment's alpha is its surfel's alpha times its weight, limited by the rules of Gaussians.
+//! A fragment's alpha is its surfel's alpha times its weight, limited by [`Rules`].
 
 use super::Strip;
 use super::fragments::{self, Fragment};
@@ -22,8 +22,8 @@ pub struct Rules {
     pub most_alpha: f64,
     /// The smallest transmittance at which compositing goes on.
     pub least_shown: f64,
-    /// Whether the fragment that would go below `least_shown` is left out too, and not only those
-    /// behind it.
+    /// Whether the fragment that would bring the transmittance below `least_shown` is left out too,
+    /// and not only the fragments behind it.
     pub leaves_last: bool,
 }
 
@@ -46,8 +46,8 @@ impl Rules {
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let rules = Rules::of(options);
-    // Two fragments of surfels at the same place have exactly the same depth, and the order of
-    // their surfels decides.
+    // Fragments of two surfels with the same geometry have exactly the same depth, so the order of
+    // the surfels decides which fragment comes first.
     let place = |f: &Fragment| {
         let surfel = f.surfel as usize;
         (scene.surfels[surfel], scene.low.get(surfel), scene.caps.get(surfel))
@@ -76,8 +76,8 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
             }
             before = Some(f);
             let next = shown.with([r, g, b, alpha], f.depth);
-            // The transmittance of an alpha near 1 also errs by more. Without `leaves_last` that
-            // does not matter, as what lies behind would hardly show.
+            // Behind an alpha near 1 the transmittance also errs by more. Without `leaves_last`
+            // that does not matter, because fragments behind would hardly show.
             if rules.leaves_last {
                 sensitivity += alpha / (1.0 - alpha) * steepness;
             }

@@ -18,13 +18,13 @@ use crate::scene::{Cap, Clip, Colors, Fade, Mipmap, Provenance, Scene, Surfel, T
 
 /// A source of surfels, page by page.
 pub trait Source: Send + Sync {
-    /// The ranges of the surfels' values, and their counts.
+    /// The number of surfels and the ranges of their values.
     fn facts(&self) -> Facts;
 
     /// Pages of at most `most` surfels, as a render with `needs` draws them.
     ///
-    /// With `ordered` they are in the [`order`] that draws well. Copies that another surfel stands
-    /// for are left out.
+    /// With `ordered`, surfels are sorted by [`order`]. If the render draws copies of a surfel
+    /// once, the other copies are left out.
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
     /// The surfels' textures, by their numbers in an [`Atlas`](crate::scene::Atlas).
@@ -40,13 +40,15 @@ pub trait Source: Send + Sync {
         None
     }
 
-    /// The surfels of a branch of these levels, followed by those of its nodes, as a render with
-    /// `needs` draws them. For a leaf of one surfel the node's is that surfel again.
+    /// The surfels of a branch of the levels of detail, then one surfel per node of the branch, as
+    /// a render with `needs` draws them. A leaf of one surfel is drawn as that surfel, which is
+    /// then present twice.
     fn branch<'a>(&'a self, _needs: &SceneNeeds, _branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         None
     }
 
-    /// The input and the point that each surfel comes from, by the numbers that pages give.
+    /// The input and the point that each surfel comes from, by the surfel's number
+    /// ([`Page::numbers`]).
     fn provenance(&self) -> Cow<'_, Provenance>;
 
     /// All surfels in memory, for the f64 reference.
@@ -194,11 +196,11 @@ struct ScenePage<'a> {
     needs: SceneNeeds,
     layout: SurfelLayout,
     indices: Box<[u32]>,
-    /// The number of copies of every surfel of the scene; 0 for those that another stands for.
+    /// The number of copies of every surfel of the scene; 0 if an equal surfel is drawn instead.
     copies: Option<Arc<[u32]>>,
 }
 
-/// Stores the bits of floats.
+/// Copies the bits of floats into words.
 fn write(values: &[f32], into: &mut [u32]) {
     values.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
 }

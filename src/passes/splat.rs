@@ -38,13 +38,13 @@ pub struct Splat {
     pub clip: Clip,
     /// The polygon that is drawn in place of the disk, if any.
     pub outline: Option<Outline>,
-    /// How it curves; set for all splats of a scene in which some surfel does.
+    /// The splat's curvature; set for all splats of a scene in which some surfel curves.
     pub curve: Option<Curve>,
-    /// Its shape, if it is a point that faces the camera.
+    /// The splat's shape, if it is a point that faces the camera.
     pub point: Option<Point>,
-    /// The number of surfels that it stands for.
+    /// The number of equal surfels that are drawn as this splat.
     pub copies: u32,
-    /// The cuts of a fading view that it is in.
+    /// The cuts of a fading view that contain the splat.
     pub fade: Fade,
 }
 
@@ -97,8 +97,8 @@ impl Splat {
         self.curve.as_ref().map_or(self.away, Curve::faces_away)
     }
 
-    /// The normal at the centre that light sees where splats are lit. A surfel with a side keeps it
-    /// as given.
+    /// The normal at the centre that light sees where splats are lit. A normal that has a side
+    /// ([`Sides`]) stays as given.
     pub fn lit_normal(&self) -> DVec3 {
         // `normal` of a disk was turned toward the viewer; that of a cap is turned at each
         // fragment.

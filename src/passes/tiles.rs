@@ -3,17 +3,18 @@
 //! [`resolve`](mod@super::resolve) to the bit.
 //!
 //! The scatter kernels, with one invocation per splat, add each fragment to memory by atomics. A
-//! tile instead has a list of the splats that may touch it, made by count, scan and place, and
-//! keeps its pixels' nearest depths, then their sums, in registers. A splat costs each tile that it
-//! touches about as much as a dozen fragments cost scatter, so large splats are cheaper by tiles on
-//! any adapter: those whose bounds hold more than
-//! [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are drawn so. On a software
-//! adapter, whose atomics are slow, all splats are summed by tiles if they are not tiny
-//! ([`touched`]) and those that blend with each other are in one page
-//! ([`Splats::Tiles`](crate::plan::Splats::Tiles)). A tile then resolves its pixels at
-//! once, and no sum is stored. Nearest depths of small splats are found by scatter in any case, and
-//! the nearest depths of all splats are known before any is accumulated. Opaque blending within
-//! epsilon needs no order, so no list is sorted.
+//! tile instead has a list of the splats that may touch it, made by count, scan and place. It keeps
+//! its pixels' nearest depths, then their sums, in registers. A splat costs, per tile that it
+//! touches, about as much as a dozen fragments cost the scatter kernels, so large splats are
+//! cheaper by tiles on any adapter. Tiles draw the splats whose bounds hold more than
+//! [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels.
+//!
+//! On a software adapter, whose atomics are slow, tiles sum all splats (they *gather*) if two
+//! conditions hold: splats are not tiny ([`touched`]), and splats that blend with each other are in
+//! one page ([`Splats::Tiles`](crate::plan::Splats::Tiles)). A tile then resolves its
+//! pixels at once, and no sum is stored. Nearest depths of small splats are always found by the
+//! scatter kernels, and all nearest depths are known before any splat is accumulated. Opaque
+//! blending within epsilon needs no order, so no list is sorted.
 //!
 //! The size that the lists need is read from the device once; a later frame that needs more is
 //! rendered again.
@@ -96,14 +97,15 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
-/// The longest list that is drawn. Mesa's llvmpipe ends the loops of an invocation after 65,535
-/// rounds in total, and the last test of a loop's condition counts as one. An entry that is fetched
-/// alone takes four: to be fetched, to be drawn, and a last test for each half of the tile. When
-/// entries are fetched in eights, eight take 19 if both halves draw them. There are two lists.
+/// The longest list that tiles draw. Mesa's llvmpipe ends the loops of an invocation after 65,535
+/// rounds in total, and the last test of a loop's condition counts as a round. An entry that is
+/// fetched alone takes four rounds: one to fetch it, one to draw it, and a last test for each half
+/// of the tile. When entries are fetched in eights, eight entries take 19 rounds if both halves
+/// draw them. A tile has two lists.
 pub const LONGEST: u64 = 8_000;
 
-/// Words of a kind of lists before their entries: the sizes that the frame needed, and the end of
-/// each list (`wgsl/tiles/bin.wgsl`).
+/// Words of the lists of a kind before their entries: the sizes that the frame needs, and the end
+/// of each list (`wgsl/tiles/bin.wgsl`).
 pub fn list_words(plan: &Plan, of: Listed, band: &Band) -> u64 {
     let [across, down] = match of {
         Listed::Large => [BLOCK_SIDE; 2],
@@ -121,13 +123,13 @@ pub fn list_name(of: Listed) -> &'static str {
     }
 }
 
-/// The stage that lists the splats of a page. Unless it `places` them, it only finds how long the
-/// lists become.
+/// The stage that lists the splats of a page. Without `places`, it only finds how long the lists
+/// become.
 ///
-/// If it is `fresh`, it also resets the sizes that the frame needs.
+/// With `fresh`, it also resets the sizes that the frame needs.
 fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, places: bool) -> Stage {
     let most = plan.bands.iter().map(|band| list_words(plan, of, band)).max().unwrap_or(0);
-    // The first two words are those sizes.
+    // The first two words are the sizes that the frame needs.
     let first = if fresh { 0 } else { u64::from(LIST_ENDS) };
     let (kernels, over) = match of {
         Listed::Large => ([COUNT_LARGE, SCAN_LARGE, PLACE_LARGE], Over::Listing),
@@ -188,8 +190,8 @@ mod tests {
     use crate::scene::{Colors, Lens, Scene, Surfel, Up};
     use glam::{DMat3, DVec3, Vec3};
 
-    /// Whether splats are gathered for a grid of disks of `radius` in front of a camera that sees
-    /// its unit square as 100 x 100 pixels.
+    /// Whether tiles gather a grid of disks of `radius` that fills a unit square, which the camera
+    /// sees as 100 x 100 pixels.
     fn gathered(radius: f32) -> bool {
         let at = |i: u32| (i as f32 + 0.5) / 40.0 - 0.5;
         let surfels =

@@ -14,32 +14,35 @@
 //!
 //! **Each pixel belongs to one of the two triangles at an edge.** A vertex is projected once, for
 //! all its triangles, in doubled f32 arithmetic, so its spoke from a pixel is the same for all of
-//! them. The rounding of E depends only on the edge's two ends. In f32 it is `x1 y2 - y1 x2`:
-//! reversing the edge changes its sign and nothing else. If an end has no image, or one beyond 2^16
-//! pixels, E is computed in doubled arithmetic from the end of the lower number on. So the two
-//! triangles at an edge get opposite signs however E is rounded. Where E is 0, p is taken to lie
-//! slightly to the right, then slightly below: `dE/dx`, or else `dE/dy`, decides.
+//! them. The rounding of E depends only on the edge's two ends. In f32, E is `x1 y2 - y1 x2`, and
+//! reversing the edge changes only the sign. If an end has no image, or an image beyond 2^16
+//! pixels, E is computed in doubled arithmetic, always with the end of the lower number first. So
+//! the two triangles at an edge get opposite signs however E is rounded. Where E is 0, p is taken
+//! to lie slightly to the right, then slightly below: `dE/dx`, or else `dE/dy`, decides.
 //!
 //! *No crack shows*: around a vertex close to p the signs of its edges change at least once, and
 //! the triangle at such a change has p. Near the middle of an edge only the sign of that edge is
 //! uncertain, and one of its two triangles has p. Signs may be wrong where E is less than 2^-22 of
 //! its products: p may then belong to the neighbour, or to both, and the nearer one shows.
 //!
-//! **Rare triangles**, whose parts f32 would blur, have a kernel of their own that computes areas
-//! in doubled arithmetic. They are those with an end that needs doubled arithmetic (see above), and
-//! those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`,
-//! since parts err by `2^-23 L^2 / 2A`; and those for which that error is about an eighth or more,
-//! `2A < 1e-6 L^2`, whose parts would be arbitrary. The attribute pass computes the parts of all
-//! triangles as exactly.
+//! **Rare triangles** need more than f32 for their parts. A kernel of their own computes the areas
+//! in doubled arithmetic. In f32 parts err by `2^-23 L^2 / 2A`, where L is the length and A the
+//! area in the image. A triangle is rare if
+//!
+//! - an end needs doubled arithmetic (see above), or
+//! - it is long for its area and its depths: `L^2 / 2A (z_max - z_min) / z_min > 4`, or
+//! - its parts would be arbitrary: `2A < 1e-6 L^2`, an error of about an eighth or more.
+//!
+//! The attribute pass computes the parts of all triangles in doubled arithmetic.
 //!
 //! **Far corners**: f32 relative to the scene's origin has too few digits for a mesh far from it.
-//! Such scenes store two f32 per coordinate (`vertex_doubled.wgsl`); others have neither the words
-//! nor the code.
+//! Such scenes store two f32 per coordinate (`vertex_doubled.wgsl`); other scenes have neither the
+//! words nor the code.
 //!
-//! **The nearest** triangle is an atomic maximum of (bits(+inf) - bits(depth), number). The order
+//! **The nearest triangle** is an atomic maximum of (bits(+inf) - bits(depth), number). The order
 //! of [`Triangles`](crate::scene::Triangles) does not depend on the order in files, so no bit of
-//! the image does. By the rasteriser, for comparison, it is the first triangle drawn among those
-//! nearest by the rasteriser's own depths, at the points that it covers.
+//! the image does. The rasteriser, for comparison, uses its own coverage and depths; among
+//! triangles at its nearest depth, the first one drawn counts as nearest.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -69,7 +72,7 @@ pub struct Corner {
 }
 
 impl Corner {
-    /// Whether it has an image.
+    /// Whether the vertex has an image.
     fn is_before(&self, camera: &Camera) -> bool {
         camera.projection == Projection::Orthographic || self.depth >= camera.near
     }
@@ -106,12 +109,14 @@ pub struct Crossing {
     pub spread: f64,
     /// Whether the point is in the triangle and not nearer than the near depth.
     pub hit: bool,
-    /// The smallest distance to a decision: an edge's area relative to the products that it is a
-    /// difference of, negative outside, or the depth's relative distance from the near depth.
+    /// The smallest relative distance to a decision, negative on the rejecting side. For an edge it
+    /// is the area divided by the products whose difference the area is; for the near depth it is
+    /// relative to that depth.
     pub decision: f64,
 }
 
-/// A triangle, by its corners and their numbers, at the point `p`; `None` if it has no area there.
+/// Evaluates a triangle at the image point `p`; `None` if it has no area there. `of` are its
+/// corners, `numbers` the corners' numbers.
 pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -> Option<Crossing> {
     let edge = |from: usize, to: usize| {
         let (from, to, turned) = if numbers[from] < numbers[to] { (from, to, 1.0) } else { (to, from, -1.0) };
@@ -137,8 +142,8 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
     let most = sides.iter().sum::<f64>().signum();
     let distance = edges.map(|(_, side, distance)| side * most * distance).into_iter().fold(f64::INFINITY, f64::min);
     let beyond = depth / camera.near - 1.0;
-    // In perspective z^3 / det by Cramer's rule, as the homogeneous areas sum to det / z; in an
-    // orthographic image 1 over the doubled area.
+    // In perspective the spread is z^3 / det by Cramer's rule, as the homogeneous areas sum to
+    // det / z. In an orthographic image it is 1 over the doubled area.
     let units =
         of.map(
             |corner| {
@@ -210,7 +215,8 @@ impl Shown {
     }
 }
 
-/// How far outside a triangle, relative, a point still records its distance to a decision.
+/// A point outside a triangle by at most this relative distance still records its distance to a
+/// decision.
 const NEARBY: f64 = 1e-3;
 
 /// The f64 twin: the nearest triangle at each pixel of `strip`.
@@ -275,7 +281,7 @@ pub fn tile_words(band: &Band) -> u64 {
     TRIANGLE_TILES + band.tiles
 }
 
-/// Words of a band's shaded triangles: for each pixel, and four for each tile.
+/// Words of a band's shaded triangles: [`TRIANGLE_PIXEL_WORDS`] per pixel, and four per tile.
 pub fn pixel_words(band: &Band) -> u64 {
     u64::from(TRIANGLE_PIXEL_WORDS) * band.pixels + 4 * band.tiles
 }
@@ -299,7 +305,7 @@ pub const PASS: Pass = Pass {
         };
         let vertex = if mesh.doubled { "vertex_doubled.wgsl" } else { "vertex.wgsl" };
         let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
-        // Otherwise the surfels' colours bring these files.
+        // If surfels are textured, or coloured by sRGB codes, their colours include these files.
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
@@ -374,10 +380,10 @@ pub fn draw() -> Draw {
     }
 }
 
-/// The name of that pipeline.
+/// The name of the pipeline of [`draw`].
 pub const DRAWN: &str = "triangles";
 
-/// The format of the texture of triangle numbers that it writes.
+/// The format of the texture of triangle numbers that the pipeline of [`draw`] writes.
 pub const NUMBERS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
 /// The stages of a band: vertices once per frame, then the nearest triangle of each pixel, then its

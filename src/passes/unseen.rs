@@ -17,7 +17,7 @@ pub struct Unseen {
     pub outside: u64,
     /// In the image, but over no pixel's centre: too small, or seen edge-on.
     pub between: u64,
-    /// Facing away, in a view that culls those.
+    /// Facing away, in a view that culls backs.
     pub away: u64,
     /// Over pixels, but without effect: seen edge-on, transparent, or of the background's colour.
     pub over: u64,

@@ -25,7 +25,8 @@ pub type Named = Vec<(&'static str, Buffer<u32>)>;
 pub struct Uploaded {
     /// Consecutive surfels; kernels see one page at a time.
     pub pages: Vec<Page>,
-    /// The branches of the levels of detail, if a cut is drawn. There are no pages yet then.
+    /// The branches of the levels of detail, if a cut is drawn. Then `pages` is empty: pages are
+    /// made once the size of the cut is known.
     pub branches: Vec<BranchBuffers>,
     /// Buffers that exist once: the table that decodes 8-bit sRGB, the textures and the triangles.
     pub shared: Named,
@@ -35,7 +36,7 @@ pub struct Uploaded {
 pub struct BranchBuffers {
     /// The branch's surfels and nodes, with the attributes that the render needs.
     pub buffers: Named,
-    /// The number of its levels that are too large for one workgroup.
+    /// The number of the branch's levels that are too large for one workgroup.
     pub large_levels: u32,
     /// The number of nodes.
     pub nodes: u64,
@@ -79,8 +80,8 @@ pub fn upload(
 /// Uploads the branches of the levels of detail of `source`.
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
     let words = SurfelLayout::of(needs).words as usize;
-    // Words per chosen surfel: its number and, with fades, its fade. One word before them counts
-    // them.
+    // Words per chosen surfel: its number and, with fades, its fade. The list of chosen surfels
+    // starts with a word that counts them.
     let of_chosen = if needs.fades { 2 } else { 1 };
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))).saturating_sub(1);
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
@@ -110,8 +111,8 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     branches::branches(tree, most).into_iter().map(of).collect()
 }
 
-/// Uploads the rows of a branch of `tree`. They are made while they are written, because allocating
-/// all of them at once takes time.
+/// Uploads the rows of a branch of `tree`. The rows are made while they are written, because
+/// allocating all of them at once takes time.
 fn rows_of(gpu: &Gpu, tree: &Hierarchy, branch: &Branch) -> Result<Buffer<u32>> {
     let count = branch.nodes.len();
     let row = |index: usize| branch.row(tree, index);
@@ -188,7 +189,7 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
 /// The buffers of triangles: vertices, corners and attributes, and space for projected corners and
 /// for the queues of large and rare triangles.
 ///
-/// `textures` is the number of textures that precede theirs.
+/// `textures` is the number of the surfels' textures, which precede those of the triangles.
 fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u32) -> Result<Named> {
     let (vertices, corners) = (triangles.vertices(), triangles.corners());
     let queue = corners.len() as u64 + u64::from(QUEUE_START);

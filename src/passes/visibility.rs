@@ -1,12 +1,12 @@
 //! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000,
-//! section 5.3, first pass). The paper adds the tolerance to the depths; here it enters the
-//! comparison, which is exact.
+//! section 5.3, first pass). The paper adds the tolerance to the depths. Here the tolerance enters
+//! the comparison, which is exact.
 //!
-//! On the device depths are positive f32, whose bits order as u32, so an atomic minimum works. They
-//! are stored as `bits(+inf) - bits(depth)`, which makes it an atomic maximum over a buffer of
-//! zeros. The farthest of the nearest depths in each tile of pixels then lets the next pass skip
-//! splats that are hidden completely. Where surfels have sides and both may be seen, the last bit
-//! of a depth tells the side (side.wgsl).
+//! On the device depths are positive f32, whose bits order as u32, so an atomic minimum would work.
+//! Depths are stored as `bits(+inf) - bits(depth)`: then the minimum is an atomic maximum, and a
+//! buffer of zeros is empty. The farthest of the nearest depths in each tile of pixels lets the
+//! next pass skip splats that are hidden completely. Where surfels have sides and both may be seen,
+//! the last bit of a depth stores the side (side.wgsl).
 
 use super::footprint::footprint;
 use super::splat::Splat;
@@ -38,8 +38,8 @@ impl Nearest {
         if nearer { Self { depth, back } } else { self }
     }
 
-    /// Whether a fragment belongs to this surface: its depth is at most the tolerance `behind`, and
-    /// it shows the same side.
+    /// Whether a fragment belongs to this surface: its depth is at most `behind`, the far end of
+    /// the tolerance, and it shows the same side.
     pub fn shows(self, depth: f64, back: bool, behind: f64) -> bool {
         depth <= behind && back == self.back
     }

@@ -1,12 +1,12 @@
 //! Stages 2 and 3 where only the nearest fragment shows, as with a depth test (Schuetz and Wimmer
 //! 2015, section III). Nothing is blended, so there is no epsilon, no weight and nothing to sum.
 //!
-//! A pixel shows the smallest (depth, colour): among fragments at one depth the one whose colour,
-//! as a word of four bytes, is greatest. So the image does not depend on the order of the surfels.
-//! With 64-bit atomics both are one number, and the visibility pass is the only one over the
-//! fragments. Otherwise a second pass stores the colours of the fragments at the nearest depth,
-//! which gives the same bits. Finer colours are rounded to such words. If all surfels have one
-//! colour, the nearest depth is all that is needed.
+//! A pixel shows its nearest fragment. Among fragments at the nearest depth it shows the one whose
+//! colour, as a word of four bytes, is greatest, so the image does not depend on the order of the
+//! surfels. With 64-bit atomics depth and colour are one number, and the visibility pass is the
+//! only pass over the fragments. Otherwise a second pass stores the colours of the fragments at the
+//! nearest depth, which gives the same bits. Colours with more bits are rounded to such words. If
+//! all surfels have one colour, only the nearest depth is needed.
 
 use super::accumulate::{PixelSums, decision};
 use super::footprint::footprint;
@@ -57,7 +57,8 @@ pub fn reference<'a>(
     (first_row, rows): (u32, u32),
 ) -> Vec<PixelSums> {
     let (low, high) = scene.color_range();
-    // Finer colours are rounded, unless all surfels share one (src/plan/check.rs).
+    // Colours of more than 8 bits are rounded, unless all surfels share one colour
+    // (src/plan/check.rs).
     let code = |surfel: usize| match &scene.colors {
         Colors::Srgb8(codes) => Some(codes[surfel]),
         Colors::Linear(colors) if low != high => Some(srgb8(colors[surfel])),

@@ -32,7 +32,7 @@ pub enum Accumulator {
 impl Accumulator {
     /// Its row in [`ACCUMULATORS`].
     pub fn row(self) -> &'static AccumulatorRow {
-        // The table has a row for each accumulator in this order; a test checks it.
+        // The table has its rows in the order of the enum; a test checks it.
         &ACCUMULATORS[self as usize]
     }
 
@@ -158,13 +158,14 @@ pub const ACCUMULATORS: &[AccumulatorRow] = &[
 ];
 
 impl AccumulatorRow {
-    /// u32 words before the sums, which count the sums that wrapped; 0 if sums cannot wrap.
+    /// Number of u32 words before the sums, which count the sums that wrapped; 0 if sums cannot
+    /// wrap.
     pub fn head_words(&self) -> u64 {
         if matches!(self.of, Accumulator::Fixed32 | Accumulator::Packed64) { 2 } else { 0 }
     }
 
-    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sum of
-    /// all surfels, or of 255 full weights, leaves free.
+    /// Fraction bits of a one-word sum in a scene of `surfels`: as many as `surfels` full weights
+    /// leave free, or 255 full weights in a larger scene.
     pub fn fraction_bits(&self, surfels: u64) -> u32 {
         let most = surfels.clamp(1, 255) as u32;
         32 - (32 - most.leading_zeros())
@@ -173,11 +174,12 @@ impl AccumulatorRow {
 
 /// Returns the fraction bits per term of `fixed64`, and of `fixed` if terms may be small.
 ///
-/// They are 40, or up to 56 where small weights matter: as many as the sum of all `surfels` leaves
-/// free in 64 bits. Kernels that fall below [`LEAST_AT_RIM`] have at least 40, so that a pixel
-/// reached only by their tails keeps its digits. Order-free composites ([`Oit`](super::Oit)) need
-/// the digits where only far fragments show, which weigh less; as all fragments of a pixel are
-/// summed, they always leave room for every surfel.
+/// The result is 40 unless small weights matter. Where they do, it is up to 56: as many bits as the
+/// weights of all `surfels` leave free in a 64-bit sum. Kernels that fall below [`LEAST_AT_RIM`]
+/// get at least 40, so that a pixel reached only by their tails keeps its digits. Order-free
+/// composites ([`Oit`](super::Oit)) give far fragments small weights, and need the digits where
+/// only these show. Because they sum all fragments of a pixel, they leave room for every surfel,
+/// even if fewer than 40 bits remain.
 pub fn wide_bits(options: &Settings, surfels: u64) -> u32 {
     if options.composite.is_order_free() {
         surfels.leading_zeros().min(56)

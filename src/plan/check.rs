@@ -1,5 +1,6 @@
-//! Options and scenes that do not go together: a row each, with a sentence that says what to do
-//! instead. The command line, studies and the library share these rows.
+//! Combinations of options, or of a scene and options, that are rejected: one row each, with a
+//! sentence that says what to do instead. The command line, studies and the library share these
+//! rows.
 
 mod adapter;
 mod table;
@@ -11,20 +12,20 @@ use crate::error::{Error, Result};
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::{Blend, Map, Shading, options::SHININESS_RANGE};
 
-/// Options that do not go together, whatever the scene.
+/// A combination of options that is rejected for every scene.
 struct Clash {
-    /// Whether a picture has such options; the second argument says whether a device draws it. The
-    /// reference ignores choices that only a device has.
+    /// Whether a picture has this combination. The second argument is false if the f64 reference
+    /// renders, which ignores options that only devices use.
     applies: fn(&Settings, bool) -> bool,
-    /// The fault, and the way out.
+    /// The fault and its remedy.
     sentence: &'static str,
 }
 
-/// A scene that its options do not fit.
+/// A combination of a scene and options that is rejected.
 struct SceneClash {
-    /// As for [`Clash`], for a scene with such facts.
+    /// As in [`Clash`], for a scene with these facts.
     applies: fn(&Facts, &Settings, bool) -> bool,
-    /// The fault, and the way out.
+    /// The fault and its remedy.
     sentence: &'static str,
 }
 
@@ -38,8 +39,8 @@ fn first(clashes: &[Clash], options: &Settings, device: bool) -> Result<()> {
     found.map_or(Ok(()), |clash| usage(clash.sentence))
 }
 
-/// Fails for options that no adapter can combine. The `reference` ignores choices that only a
-/// device has.
+/// Rejects combinations of options that no adapter can render. If the `reference` renders, options
+/// that only devices use are ignored.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -52,7 +53,7 @@ pub fn options(options: &Settings, reference: bool) -> Result<()> {
     maps(options, reference)
 }
 
-/// Fails for numbers outside their range.
+/// Rejects numbers outside their ranges.
 fn in_range(options: &Settings) -> Result<()> {
     let (least, most) = SHININESS_RANGE;
     if options.lights.len() > MAX_LIGHTS {
@@ -67,7 +68,7 @@ fn in_range(options: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Fails for maps that the renderer does not make.
+/// Rejects maps that the renderer does not make.
 fn maps(options: &Settings, reference: bool) -> Result<()> {
     // The reference's only fragment has weight 1 and count 1.
     let unknown = if reference { &[Map::Normal][..] } else { &[Map::Normal, Map::Weight, Map::Count, Map::Index] };
@@ -85,7 +86,8 @@ fn maps(options: &Settings, reference: bool) -> Result<()> {
     Ok(())
 }
 
-/// Fails for options that no tiles draw, where tiles are asked for: a study measures what it names.
+/// Rejects options that tiles cannot draw if the organisation `tile` is chosen. A study must
+/// measure the organisation that it names, so there is no fallback.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -93,7 +95,7 @@ pub fn by_tiles(options: &Settings) -> Result<()> {
     first(&TILES, options, true)
 }
 
-/// Fails for options with which cuts cannot fade into each other. Fades need weighted sums of the
+/// Rejects options with which cuts cannot fade into each other. Fades need weighted sums of the
 /// nearest surface.
 ///
 /// # Errors
@@ -102,8 +104,8 @@ pub fn fades(options: &Settings) -> Result<()> {
     first(&FADES, options, true)
 }
 
-/// Fails for options that cannot be combined with a texture. The `reference` ignores choices that
-/// only a device has.
+/// Rejects options that cannot be combined with a texture. If the `reference` renders, options that
+/// only devices use are ignored.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -111,7 +113,7 @@ pub fn textured(options: &Settings, reference: bool) -> Result<()> {
     first(&TEXTURES, options, !reference)
 }
 
-/// Fails for options that do not go with the scene that `facts` describe.
+/// Rejects options that cannot be used with the scene that `facts` describe.
 ///
 /// # Errors
 /// [`Error::Usage`].

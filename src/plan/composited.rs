@@ -4,8 +4,8 @@ use super::{Facts, Settings};
 use crate::scene::{Composite, Map};
 
 /// Returns the effective composite of a picture of the scene that `facts` describe. Layers of
-/// opaque surfaces become [`Composite::Opaque`], because only the nearest shows, unless a map asks
-/// for the others.
+/// opaque surfaces become [`Composite::Opaque`], because only the nearest shows, unless a map needs
+/// the others.
 pub fn composited(facts: &Facts, options: &Settings) -> Composite {
     let (low, _) = facts.color;
     match options.composite {
@@ -30,9 +30,9 @@ pub enum Lists {
 /// order ([`oit`](crate::passes::oit)).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Oit {
-    /// A function of its depth.
+    /// A function of the fragment's depth.
     Weighted,
-    /// The transmittance in front of it, estimated from moments
+    /// The transmittance in front of the fragment, estimated from moments
     /// ([`moments`](crate::passes::moments)).
     Moments,
 }

@@ -7,7 +7,7 @@ use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, MOST_GROUPS, MOST_ROUNDS, OCCLUSION_TILE, TILE};
 use crate::scene::Camera;
 
-/// A band: rows of the image that buffers hold at a time.
+/// A band: the rows of the image that buffers hold at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Band {
     /// First row.

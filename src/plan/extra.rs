@@ -1,9 +1,9 @@
-//! Buffers with words for each pixel that only some renders have: a row each.
+//! Per-pixel buffers that only some renders have: one row each.
 
 use super::steps::Clear;
 use super::{Oit, Plan, SceneNeeds};
 
-/// A buffer that only some renders have.
+/// A per-pixel buffer that only some renders have.
 pub struct Extra {
     /// Its name in WGSL.
     pub name: &'static str,
@@ -15,23 +15,23 @@ pub struct Extra {
     pub summed: bool,
 }
 
-/// The number of steps of depth in which veils sum optical depths
+/// The number of depth intervals for which veils sum optical depths
 /// ([`veils`](crate::passes::veils)).
 pub const VEILS: u32 = 16;
 
-/// All such buffers.
+/// All buffers that only some renders have.
 pub const EXTRA: [Extra; 4] = [
     Extra {
         name: "veils",
         label: "veils",
-        // The count and the optical depth of each step.
+        // The count and the optical depth of each interval.
         words: |needs| if needs.surface.veils() { 2 * VEILS } else { 0 },
         summed: true,
     },
     Extra {
         name: "moments",
         label: "moments",
-        // Two per moment.
+        // Two for each of five moments.
         words: |needs| if needs.surface.oit() == Some(Oit::Moments) { 10 } else { 0 },
         summed: true,
     },
@@ -67,10 +67,10 @@ pub fn clear(name: &'static str, plan: &Plan, band: usize) -> Option<Clear> {
     (words > 0).then(|| Clear::of(name, 0, words))
 }
 
-/// The most words per pixel in any of these buffers.
+/// The most words per pixel in any of these buffers and in that of the shaded triangles.
 pub(super) fn most_words(needs: &SceneNeeds) -> u32 {
-    // Four words per tile of 64 pixels (fewer at the image's edges) are at most one more per pixel,
-    // unless the image has only a few pixels.
+    // Triangles also take four words per tile. A tile has 64 pixels, or fewer at the image's edges,
+    // so that is at most one more word per pixel unless the image is tiny.
     let triangles = if needs.mesh.is_some() { TRIANGLE_PIXEL_WORDS + 1 } else { 0 };
     EXTRA.iter().map(|extra| (extra.words)(needs)).max().unwrap_or(0).max(triangles)
 }

@@ -15,11 +15,11 @@ pub enum ColorNeed {
     Srgb8,
     /// Four f32 each.
     Linear,
-    /// Four f32 each, the texture's mean over the disk, and a place in the texture, which is looked
-    /// up once per pixel.
+    /// Four f32 each for the texture's mean colour over the disk, and texture coordinates. The
+    /// texture is looked up once per pixel.
     Textured,
-    /// Four f32 each and the terms of spherical harmonics of this degree, which are summed once per
-    /// splat.
+    /// Four f32 each, and the terms of spherical harmonics of this degree, which are summed once
+    /// per splat.
     Harmonics(u32),
 }
 
@@ -36,7 +36,7 @@ pub struct Facts {
     /// Number of surfels of each non-empty input ([`Scene::provenance`]), in the order of the
     /// inputs.
     pub individuals: Vec<u64>,
-    /// Facts of its triangles.
+    /// Facts of the scene's triangles.
     pub mesh: MeshFacts,
     /// [`Scene::bounds`].
     pub bounds: Bounds,
@@ -74,17 +74,17 @@ pub struct Facts {
     pub copies: bool,
     /// Facts of the octree's nodes, if there are levels of detail.
     pub levels: Option<LevelFacts>,
-    /// Surfels at regular intervals of the scene, each with its centre in f64.
+    /// Every n-th surfel of the scene, with its centre in f64.
     pub sample: Vec<(Surfel, DVec3)>,
 }
 
 impl Facts {
-    /// The longest half-axis of what may be drawn, world units.
+    /// The longest half-axis of all surfels and nodes that may be drawn, world units.
     pub fn drawn_radius(&self, options: &Settings) -> f32 {
         self.nodes_of(options).map_or(self.largest_radius, |nodes| nodes.largest_radius.max(self.largest_radius))
     }
 
-    /// The largest shorter half-axis of what may be drawn, world units.
+    /// The largest shorter half-axis of all surfels and nodes that may be drawn, world units.
     pub fn drawn_shorter(&self, options: &Settings) -> f32 {
         self.nodes_of(options).map_or(self.largest_shorter, |nodes| nodes.largest_shorter.max(self.largest_shorter))
     }

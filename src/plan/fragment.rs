@@ -8,15 +8,15 @@ use super::{EpsilonForm, Lists, SceneNeeds, color_channels};
 pub struct FragmentLayout {
     /// u32 words of a record: a multiple of four.
     pub words: u32,
-    /// The rank of its surfel, if it decides between fragments at one depth.
+    /// The rank of the surfel, stored if it decides between fragments at one depth.
     pub rank: u32,
-    /// The first word of its colour.
+    /// The first word of the colour.
     pub color: u32,
-    /// Number of words of its colour.
+    /// Number of words of the colour.
     pub colors: u32,
-    /// The first of the three words of its normal.
+    /// The first of the three words of the normal.
     pub normal: u32,
-    /// Its surfel's radius, by which layers are separated.
+    /// The surfel's radius, by which layers are separated.
     pub radius: u32,
     /// Whether the radius is stored.
     pub has_radius: bool,

@@ -4,9 +4,10 @@
 use super::Band;
 
 /// The most tries of a frame, besides those counted in [`Known::times_cut`]. A try fails for one of
-/// five reasons: the size of the cut, the splat slots, the lists of large splats, the lists of all
-/// splats, or sums that wrap. Each failed try records the size that was missing, so the next one
-/// succeeds; where a list's length changes with the view, this holds for the present view.
+/// five reasons: the cut, the splat slots, the lists of large splats or the lists of all splats are
+/// longer than the plan knew, or sums wrap. Each failed try records the missing size, so the next
+/// try does not fail for it again. The length of a list may change with the view, so its size is
+/// certain only for the present view.
 pub const MOST_TRIES: usize = 7;
 
 /// The lists of splats that may touch each cell of the image (`wgsl/tiles/bin.wgsl`).
@@ -18,7 +19,7 @@ pub enum Listed {
     Small,
 }
 
-/// The measured sizes; initially none.
+/// The sizes measured so far; initially none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
     /// Mean number of tiles that a splat touches in this view, estimated from a sample of surfels.
@@ -35,15 +36,17 @@ pub struct Known {
     pub entries: [Option<u64>; 2],
     /// Whether tiles cannot list all splats, so gathering is off and sums are stored.
     pub crowded: bool,
-    /// Bands of this view whose fragments fit, as far down the image as fragments were counted.
+    /// Bands whose fragments fit in this view, for the rows from the top whose fragments were
+    /// counted.
     pub cuts: Option<Vec<Band>>,
     /// Number of retries of this view because a band was cut, its lists ended early, or a list was
     /// longer than known. Each such try reaches farther down the image.
     pub times_cut: usize,
-    /// Whether lists end where nothing behind shows ([`veils`](crate::passes::veils)): some pixel
-    /// has more fragments than can be sorted, or some row more than a buffer holds.
+    /// Whether fragment lists end where nothing behind shows ([`veils`](crate::passes::veils)),
+    /// because some pixel has more fragments than can be sorted, or some row more than a buffer
+    /// holds.
     pub veiled: bool,
-    /// Bound on the fragments of a list, if one invocation cannot process the longest
+    /// Bound on the fragments of any list, if one invocation cannot process the longest list
     /// ([`long_lists`](crate::passes::long_lists)); else 0.
     pub longest_list: u32,
     /// Number of fragments of this view that made a sum of the chosen accumulator wrap.
@@ -51,7 +54,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// Capacity of these lists in entries, once measured.
+    /// Capacity of the lists of large or of small splats, in entries, once measured.
     pub fn entries_of(&self, of: Listed) -> Option<u64> {
         self.entries[of as usize]
     }

@@ -28,16 +28,16 @@ pub struct MeshFacts {
 /// Border around the image, in pixels, within which a box still counts as visible.
 const BORDER: f64 = 1.0;
 
-/// Whether the view of `camera` may show part of a box relative to `origin`. It does not if all of
-/// the box lies before the near depth or beyond one side of the image.
+/// Whether the view of `camera` may show part of a box relative to `origin`. It shows nothing of a
+/// box that lies entirely before the near depth or beyond one side of the image.
 pub(crate) fn in_view(bounds: &Bounds, origin: DVec3, camera: &Camera) -> bool {
     let corner = |k: usize| {
         let [x, y, z] = [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] });
         camera.to_camera(origin + DVec3::new(x, y, z))
     };
     let [width, height] = [camera.width, camera.height].map(f64::from);
-    // Distance of a corner inside each limit, for a pinhole in pixels times depth. These are linear
-    // in the position, so the corners bound the whole box.
+    // Distance of a corner inside each limit; for a pinhole it is multiplied by the depth. Each
+    // distance is linear in the position, so the corners bound the whole box.
     let inside = |p: DVec3| {
         let depth = if camera.projection == Projection::Pinhole { p.z } else { 1.0 };
         let (x, y) = (camera.fx * p.x + camera.cx * depth, camera.fy * p.y + camera.cy * depth);
@@ -82,7 +82,7 @@ pub struct MeshNeeds {
     pub colored: bool,
     /// Triangles have textures.
     pub textured: bool,
-    /// The f32 positions of corners omit digits that show, so their low parts are stored too.
+    /// The f32 positions of corners omit visible digits, so their low parts are stored too.
     pub doubled: bool,
     /// The nearest triangle is found in one pass, by 64-bit atomics.
     pub once: bool,
@@ -136,8 +136,8 @@ impl MeshNeeds {
     }
 }
 
-/// The bit of a width that marks images whose edges are clamped beyond [0, 1]. No image is that
-/// wide.
+/// The bit of a width that is set if coordinates outside [0, 1] take the image's edge texels. No
+/// image is that wide.
 const CLAMPS: u32 = 1 << 31;
 
 /// Packs textures into u32 words: the offset of each texture's head, then per texture its head and

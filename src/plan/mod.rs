@@ -72,21 +72,21 @@ pub struct Plan {
     pub pages: usize,
     /// Surfel slots for the cut, by branch; `None` if no cut is drawn or its size is not known yet.
     pub cut: Option<Vec<u64>>,
-    /// The pages of each individual; empty unless inputs are kept separate.
+    /// The pages of each separate input; empty unless inputs are kept separate.
     pub individuals: Vec<Range<usize>>,
     /// Upper bound on the length of fragment lists if some are processed in rounds; else 0.
     pub longest_list: u32,
-    /// Whether pixels that nothing covers differ from 0 in the image, so that their tiles are
-    /// resolved too.
+    /// Whether empty pixels differ from 0 in the image, so that empty tiles are resolved too.
     pub lists_empty: bool,
-    /// Whether splats are projected again in each band: what is drawn first in a band hides what is
-    /// drawn later, and hidden splats are removed from the band's list.
+    /// Whether splats are projected again in each band. Splats that are drawn first in a band hide
+    /// others, which are left out of the band's list.
     pub projects_each_band: bool,
     /// Whether the frame reads back how many splat slots it needs before it projects.
     pub looks_for_slots: bool,
     /// Whether large splats are drawn by tiles instead of one workgroup each.
     pub large_by_tiles: bool,
-    /// Whether the frame reads back how many list entries it needs: of large and of small splats.
+    /// Whether the frame reads back how many entries it needs in the lists of large and of small
+    /// splats.
     pub looks_for_lists: [bool; 2],
 }
 
@@ -97,7 +97,8 @@ fn most_together((facts, drawn): (&Facts, u64), needs: &SceneNeeds) -> u64 {
     largest.filter(|_| needs.surface.separate()).unwrap_or(drawn)
 }
 
-/// The range of pages of each group of surfels in `apart`, at `most` surfels per page.
+/// The range of pages of each group, at `most` surfels per page. `apart` has the groups' sizes;
+/// groups share no page.
 fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
     let mut end = 0;
     let pages = apart.iter().map(|surfels| {
@@ -108,7 +109,7 @@ fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
     pages.collect()
 }
 
-/// Whether tiles sum all splats of a page, if those that blend with each other share one.
+/// Whether tiles sum all splats, if those that blend with each other fit one page.
 fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     let pays = match options.organisation {
         Organisation::Auto => needs.surface.subgroups() && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
@@ -118,9 +119,9 @@ fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     needs.may_gather() && pays && !known.crowded && options.has(Optimisation::Gathering)
 }
 
-/// Whether batches that are hidden or out of view are culled. Batches of cuts are not: nodes out of
-/// view are not in the cut, and recomputing the bounds of their batches in each frame takes longer
-/// than drawing what is hidden, unless most of it is.
+/// Whether batches that are hidden or out of view are culled. Batches of cuts are not culled. A cut
+/// has no nodes out of view. The bounds of its batches would have to be recomputed in each frame,
+/// which takes longer than drawing the hidden batches, unless most are hidden.
 fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &Settings) -> bool {
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
@@ -208,7 +209,7 @@ impl Plan {
         let needs = SceneNeeds::of_picture(facts, camera, options);
         let individuals = if needs.surface.separate() { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
-            // The twins have one path for what a device draws in several ways.
+            // The twins have one path where a device has several ways to draw.
             needs: SceneNeeds {
                 surface: Surface::by_compute(facts, options),
                 // The reference gets a scene that holds only the cut.
@@ -239,7 +240,7 @@ impl Plan {
     }
 
     /// The groups of pages whose surfels blend with each other: all pages, or those of each
-    /// individual.
+    /// separate input.
     pub fn together(&self) -> Vec<Range<usize>> {
         if self.needs.surface.separate() { self.individuals.clone() } else { std::iter::once(0..self.pages).collect() }
     }

@@ -20,10 +20,10 @@ pub struct SceneNeeds {
     pub projection: Projection,
     /// The format of sums on the device.
     pub accumulator: Accumulator,
-    /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided
-    /// by a small mean alpha, or a fragment's weight may be less than [`SMALL_WEIGHT`], as for a
-    /// far fragment when all of a pixel are summed. Terms then keep 40 bits or more
-    /// ([`wide_bits`](super::wide_bits)).
+    /// The accumulator is `fixed` and terms may be small. Either alphas differ, so that means may
+    /// be divided by a small mean alpha. Or a fragment's weight may be less than [`SMALL_WEIGHT`],
+    /// for example far away in an order-free composite. Terms then have the fraction bits of
+    /// [`wide_bits`](super::wide_bits).
     pub wide_sums: bool,
     /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in
     /// half the additions.
@@ -31,17 +31,17 @@ pub struct SceneNeeds {
     /// Records are read and written 64 bits at a time, on adapters with 64-bit integers: the same
     /// bits in half the accesses.
     pub long_words: bool,
-    /// The f32 centres of surfels omit digits that show, so their low parts are stored too.
+    /// The f32 centres of surfels omit visible digits, so their low parts are stored too.
     pub doubled: bool,
     /// A cut of levels of detail is drawn.
     pub levels: bool,
     /// Octree nodes in the cut are drawn with curvature (caps).
     pub node_caps: bool,
-    /// Cuts fade into each other, and some surfel belongs to only a part of them.
+    /// Cuts fade into each other, so a surfel may belong to only some of them.
     pub fades: bool,
     /// Batches of surfels that are out of view or hidden are culled. This requires that no cut is
-    /// drawn, and enough surfels for the number of pixels, because the search for what hides them
-    /// visits every pixel ([`tuning::PIXELS_A_CULLED_SURFEL`]).
+    /// drawn. It also requires many surfels for the number of pixels, because the search for hidden
+    /// batches visits every pixel ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// The needs of the triangles drawn with the splats.
     pub mesh: Option<MeshNeeds>,
@@ -57,9 +57,9 @@ pub struct SceneNeeds {
     pub alpha: bool,
     /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
-    /// The visible sides of surfels whose normals have a side.
+    /// The visible sides of surfels with oriented normals.
     pub sides: Sides,
-    /// Surfels have normals other than those of their disks' planes, and these are summed.
+    /// Surfels have normals other than those of their disks' planes, and these normals are summed.
     pub own_normals: bool,
     /// Surfels that face away are culled.
     pub cull_back: bool,
@@ -77,7 +77,7 @@ pub struct SceneNeeds {
     pub shading: Shading,
     /// Splats are lit, not pixels.
     pub lit_splats: bool,
-    /// The maps to write. Some need further sums: depth its depths, count the number of fragments.
+    /// The maps to write. Some need further sums: depth sums depths, count counts fragments.
     pub maps: Maps,
 }
 
@@ -104,8 +104,8 @@ impl EpsilonForm {
     }
 }
 
-/// Returns the needs of the scene's triangles, or `None` if the view shows none. Next to triangles,
-/// the depths of splats are weighted differently. Without splats there is nothing to join.
+/// Returns the needs of the scene's triangles, or `None` if the view shows none. Without splats the
+/// join is [`Join::Nearest`], which needs no sums of depths.
 fn mesh(facts: &Facts, camera: &Camera, options: &Settings) -> Option<MeshNeeds> {
     let of = facts.mesh;
     let shows = of.triangles > 0 && in_view(&of.bounds, facts.origin, camera);
@@ -121,17 +121,17 @@ fn mesh(facts: &Facts, camera: &Camera, options: &Settings) -> Option<MeshNeeds>
     })
 }
 
-/// Terms of at least this weight keep 23 of the 32 fraction bits of `fixed`, like f32; where cuts
-/// fade into each other, terms of which only a 64th of a splat remains keep 17.
+/// Terms of at least this weight keep 23 of the 32 fraction bits of `fixed`, like f32. If cuts fade
+/// into each other, a term may be multiplied by 1/64 and then keeps 17.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
 fn may_be_small(options: &Settings) -> bool {
-    // The corners of squares lie at sqrt(2) radii. The convolution of `ewa` with the pixel lowers
-    // the weight of splats smaller than a pixel.
-    // A kernel that the user wrote may be small anywhere.
+    // A user-written kernel may have small weights anywhere.
     if options.own_kernel.is_some() {
         return true;
     }
+    // The corners of squares lie at sqrt(2) radii. The convolution of `ewa` with the pixel lowers
+    // the weight of splats smaller than a pixel.
     let square = options.facing.is_some_and(|facing| facing.shape == PointShape::Square);
     let farthest = if square { 2.0 } else { 1.0 };
     options.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
@@ -154,16 +154,16 @@ pub fn culls_back(facts: &Facts, camera: &Camera, options: &Settings) -> bool {
     }
 }
 
-/// The visible sides of surfels whose normals have a side.
+/// The visible sides of surfels with oriented normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Sides {
-    /// No normal has a side, or all that are drawn face the viewer.
+    /// No normals are oriented, or all drawn surfels face the viewer.
     None,
-    /// A pixel shows one side: that of its nearest fragment. At outlines and in thin parts the back
+    /// A pixel shows the side of its nearest fragment only. At outlines and in thin parts the back
     /// lies within epsilon of the front.
     Nearest,
-    /// Both sides, with normals blended as they are given: the rasteriser's own depth test does not
-    /// tell which fragment is nearest.
+    /// Both sides, with normals blended as given, because the nearest fragment is not known: with
+    /// the rasteriser's own depth test, and in order-free composites.
     Both,
 }
 
@@ -211,7 +211,7 @@ impl SceneNeeds {
                 true => EpsilonForm::of(options.epsilon, camera),
                 false => EpsilonForm::Depth,
             },
-            // Lit surfels differ even if all have one colour.
+            // Lit splats differ in colour even if all surfels have one colour.
             color: match facts.colors {
                 ColorNeed::Constant if options.lights_splats() => ColorNeed::Linear,
                 // Without blending each colour is one word.
@@ -255,7 +255,7 @@ impl SceneNeeds {
             }
             other => other,
         };
-        // Lists are summed in registers.
+        // Fragment lists are summed in registers.
         let fixed = picture.accumulator == Accumulator::Fixed && surface.sums_by_compute();
         let once = long_atomics && surface.raster().is_none();
         Self {
@@ -267,7 +267,7 @@ impl SceneNeeds {
         }
     }
 
-    /// Whether one surfel may be drawn for all identical ones.
+    /// Whether identical surfels may be drawn once.
     fn may_draw_copies(&self, facts: &Facts, options: &Settings) -> bool {
         let plain = !self.levels && !self.fades && self.color != ColorNeed::Textured;
         facts.copies && options.draws_copies_once() && self.accumulator == Accumulator::Fixed && plain
@@ -279,7 +279,7 @@ impl SceneNeeds {
         self.surface.tiles() && !(self.color == ColorNeed::Textured && self.mesh.is_some())
     }
 
-    /// Returns these needs without those that depend on how much is drawn.
+    /// Returns these needs without those that depend on the number of drawn surfels.
     pub fn before_cut(&self) -> Self {
         Self { cull: false, surface: self.surface.before_cut(), ..*self }
     }

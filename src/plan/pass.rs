@@ -18,7 +18,7 @@ pub struct Making<'a> {
 /// override constants that are set. The bindings, the proof that loops end, and the tests of the
 /// layout follow from these rows.
 pub struct Pass {
-    /// Its name, also that of its file and of its time in reports.
+    /// The pass's name, which its file and its time in reports have too.
     pub name: &'static str,
     /// Its WGSL files.
     pub files: fn(&SceneNeeds) -> Vec<&'static str>,

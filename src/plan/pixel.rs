@@ -13,7 +13,7 @@ pub struct PixelLayout {
     pub normal_channel: u32,
     /// The depth's channel.
     pub depth_channel: u32,
-    /// The channel of the weights of depths, if these differ from those of all other values.
+    /// The channel of the weights for depths, if depths have weights of their own.
     pub middles_channel: u32,
     /// The fragment count's channel.
     pub count_channel: u32,
@@ -34,7 +34,7 @@ pub const COLOR_CHANNEL: u32 = 1;
 /// u32 words of a pixel's colour in the image.
 const COLOR_WORDS: u32 = 4;
 
-/// The place of a map that is not asked for (`maps.wgsl`).
+/// The word offset of a map that is not asked for (`maps.wgsl`).
 pub const NO_MAP: u32 = u32::MAX;
 
 impl PixelLayout {

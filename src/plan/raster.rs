@@ -55,8 +55,8 @@ pub enum RasterDepth {
     /// compute kernels do.
     Exact,
     /// The rasteriser interpolates and compares depths, which the visibility pass moves away by
-    /// epsilon: along the camera's axis (Botsch et al. 2005), or along the view ray if epsilon lies
-    /// along it (paper 000, section 5.3).
+    /// epsilon: along the camera's axis (Botsch et al. 2005), or along the view ray if epsilon is
+    /// measured along it (paper 000, section 5.3).
     Offset,
 }
 

@@ -22,7 +22,7 @@ pub enum BackendName {
 }
 
 impl BackendName {
-    /// As options, studies and reports have it.
+    /// The name in options, studies and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gpu => "gpu",
@@ -48,10 +48,10 @@ pub enum Organisation {
     /// splats by tiles, unless they are tiny.
     #[default]
     Auto,
-    /// One by one, large ones by a workgroup each.
+    /// All splats one by one, large ones by a workgroup each.
     Scatter,
-    /// All by tiles, where the nearest surface is summed by the accumulator `fixed`; what is drawn
-    /// in another way is drawn as by `Auto`.
+    /// All splats by tiles, if the nearest surface is summed by the accumulator `fixed`; otherwise
+    /// as `Auto`.
     Tile,
 }
 
@@ -68,24 +68,24 @@ impl FromStr for Organisation {
     }
 }
 
-/// Everything a caller may choose, scene and camera apart.
+/// Everything a caller may choose, except scene and camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Depth tolerance.
     pub epsilon: Epsilon,
-    /// Which surfels are left out by the side that they show.
+    /// Which surfels are left out because of the side that they show.
     pub cull: Cull,
-    /// The size of nodes that are drawn in place of all below them, in a scene with levels of
-    /// detail.
+    /// The size in the image below which a node is drawn instead of its descendants, in a scene
+    /// with levels of detail.
     pub detail: Detail,
-    /// How that is measured.
+    /// How the size of nodes is measured.
     pub detail_measure: DetailMeasure,
-    /// Nodes curve as what is below them does, in place of lying flat in their planes.
+    /// Nodes are drawn curved like the surfels below them, instead of flat.
     pub detail_caps: bool,
     /// Coarser and finer cuts fade into each other from view to view, instead of switching.
     pub detail_fades: bool,
-    /// Samples of a pixel's colour. Maps are taken at its centre, as a mean depth of two surfaces
-    /// belongs to neither.
+    /// Samples per pixel for the colour. Maps are taken at the pixel's centre, as the mean depth of
+    /// two surfaces belongs to neither.
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
     pub facing: Option<Facing>,
@@ -109,13 +109,13 @@ pub struct Settings {
     pub low_pass: LowPass,
     /// How the device keeps sums.
     pub accumulator: Accumulator,
-    /// How the device draws splats; other accumulators than `fixed` are scattered.
+    /// How the device draws splats; with other accumulators than `fixed` they are scattered.
     pub organisation: Organisation,
-    /// Sums by the rasteriser instead, on a GPU.
+    /// The rasteriser makes the sums, instead of compute kernels.
     pub raster: Option<Raster>,
     /// Shading model.
     pub shading: Shading,
-    /// Where light falls: on pixels or on splats.
+    /// Where shading is computed: at pixels or at splats.
     pub shading_at: ShadingAt,
     /// Exponent of [`Shading::Phong`], in
     /// [`SHININESS_RANGE`](crate::scene::options::SHININESS_RANGE): the higher, the smaller a
@@ -129,15 +129,16 @@ pub struct Settings {
     pub maps: Maps,
     /// Optimisations that are left out; none changes a bit of the image.
     pub without: Vec<Optimisation>,
-    /// Texts of a user in place of built-in WGSL files.
+    /// User-written WGSL files that replace built-in ones.
     pub sources: Vec<Replacement>,
-    /// The twin of a blending kernel among `sources`. If it is None, the text itself is evaluated
+    /// The f64 twin of a blending kernel among `sources`. If it is None, the WGSL text is evaluated
     /// in f64.
     pub own_kernel: Option<OwnKernel>,
 }
 
 impl Settings {
-    /// Whether identical surfels are drawn once. Tiles list each of them.
+    /// Whether identical surfels are drawn once. The organisation `tile` lists each of them
+    /// instead.
     pub fn draws_copies_once(&self) -> bool {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
     }
@@ -153,15 +154,15 @@ impl Settings {
         self.detail_caps && self.draws_caps()
     }
 
-    /// Whether splats are lit and their lit colours blended. Otherwise pixels are lit, by the mean
-    /// of their normals; where fragments of several surfaces are summed, such a mean belongs to
-    /// none.
+    /// Whether splats are lit and their lit colours blended. Otherwise pixels are lit by their mean
+    /// normals. Order-free composites light splats, as the mean normal of several surfaces belongs
+    /// to none.
     pub fn lights_splats(&self) -> bool {
         let at_splats = self.shading_at == ShadingAt::Splat || self.composite.is_order_free();
         self.shading != Shading::Unlit && at_splats
     }
 
-    /// Whether a pixel of the image differs from 0 where nothing is.
+    /// Whether empty pixels differ from 0 in the image, because of a map or the background.
     pub fn shows_where_nothing_is(&self) -> bool {
         self.maps.iter().any(|map| !map.row().nothing.is_empty())
             || self.background.iter().any(|value| value.to_bits() != 0)
@@ -176,7 +177,7 @@ impl Settings {
         }
     }
 
-    /// Whether an optimisation is not left out.
+    /// Whether an optimisation is on.
     pub fn has(&self, optimisation: Optimisation) -> bool {
         !self.without.contains(&optimisation)
     }

@@ -28,7 +28,7 @@ impl Kernel {
         Self { name, workgroup, lists: None }
     }
 
-    /// Creates a kernel that binds the lists of a kind.
+    /// Creates a kernel that binds the lists of large or of small splats.
     pub const fn listing(name: &'static str, workgroup: [u32; 3], lists: Listed) -> Self {
         Self { name, workgroup, lists: Some(lists) }
     }
@@ -52,12 +52,12 @@ pub enum Over {
     Slots(Part),
     /// One invocation per batch of a page.
     Batches,
-    /// One invocation per [`JUDGED`](crate::gpu::layout::JUDGED) reached nodes of a level of a
-    /// branch, as the device counted them.
+    /// One invocation per [`JUDGED`](crate::gpu::layout::JUDGED) nodes that were reached in one
+    /// level of a branch, as the device counted them.
     Judged,
     /// Like `Judged`, once the nodes of the next level are known.
     Spread,
-    /// Workgroups for the splats that are slow to project, as the device counted them.
+    /// As many workgroups as the device counted for the splats that are slow to project.
     Rare,
     /// One workgroup per large splat.
     Large,
@@ -71,7 +71,7 @@ pub enum Over {
     TriangleTiles,
     /// One workgroup per triangle whose intersections f32 cannot resolve.
     RareTriangles,
-    /// One invocation per large splat, to list it.
+    /// One invocation per large splat, to add it to lists.
     Listing,
     /// One invocation per row of the band.
     Rows,
@@ -81,7 +81,7 @@ pub enum Over {
     Occlusion,
     /// Eight invocations (one row of pixels) per tile of the large splats.
     Tiles,
-    /// One invocation per list that is processed in rounds; the lists may be fewer.
+    /// One invocation per list that may be processed in rounds; there may be fewer such lists.
     LongLists,
     /// One workgroup per covered tile.
     Covered,
@@ -100,7 +100,7 @@ pub struct Run {
     pub over: Over,
 }
 
-/// A range of a buffer, by its name in WGSL, that is set to 0; if pages have the buffer, in each
+/// A range of a buffer that is set to 0. If each page has the buffer, the range is cleared in every
 /// page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clear {
@@ -130,8 +130,8 @@ pub enum Twin {
     Accumulate,
     /// [`oit`](crate::passes::oit): sums.
     Oit,
-    /// [`individuals`](crate::passes::individuals): the surface of one individual, where it is the
-    /// nearest.
+    /// [`individuals`](crate::passes::individuals): the surface of one separate input, where it is
+    /// the nearest.
     Individual(usize),
     /// [`triangles`](crate::passes::triangles): the surfaces of triangles.
     Triangles,
@@ -220,7 +220,7 @@ pub enum Look {
 /// One step of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Chooses the cut of the octree, branch by branch, unless an earlier try has.
+    /// Chooses the cut of the octree, branch by branch, unless an earlier try chose it.
     Select,
     /// Dispatches kernels.
     Stage(Stage),

@@ -27,7 +27,7 @@ pub enum Surface {
     Sorted {
         /// As for [`Surface::Layers`].
         long_lists: bool,
-        /// Lists end where nothing behind shows; without that some would be too long.
+        /// Lists end where nothing behind shows, as some would be too long otherwise.
         veils: bool,
     },
     /// All fragments of a pixel are summed in any order, weighted by an estimate of what lies in
@@ -45,22 +45,22 @@ pub enum Surface {
     },
 }
 
-/// How splats are drawn that compute kernels sum.
+/// How compute kernels draw the splats that they sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Splats {
     /// One by one.
     Scattered,
-    /// One by one, one for all identical ones. This requires the accumulator `fixed`, a surfel with
-    /// many copies, no texture, and no separate inputs.
+    /// One by one, with identical surfels drawn once. This requires the accumulator `fixed`, a
+    /// surfel with many copies, no texture, and no separate inputs.
     Copies,
     /// Tiles draw at least the large ones. This requires the accumulator `fixed`, and options that
     /// do not ask for scatter.
     Tiles {
-        /// Tiles sum all splats, large and small, and resolve their pixels directly (or keep what
-        /// an input shows), so no sums are stored.
+        /// Tiles sum all splats, large and small, and resolve their pixels directly, so no sums are
+        /// stored. With separate inputs they keep what the input shows instead.
         gather: bool,
-        /// The invocations of a subgroup read a splat's record together; a software adapter would
-        /// otherwise read it for each of them.
+        /// The invocations of a subgroup read a splat's record together. A software adapter would
+        /// otherwise read the record once per invocation.
         subgroups: bool,
     },
 }
@@ -71,7 +71,7 @@ pub enum Splats {
 pub enum Winner {
     /// All surfels have one colour, so the nearest depth is enough.
     Depth,
-    /// Depth and colour in one 64-bit number, by one atomic minimum.
+    /// One atomic minimum of a 64-bit number finds depth and colour together.
     Once,
     /// The nearest depth first, then its colour in a second pass.
     Second,
@@ -82,9 +82,9 @@ pub enum Winner {
 pub enum Rasterised {
     /// Fragments within epsilon of the nearest one are blended.
     Blended,
-    /// The nearest one shows, by the depth test.
+    /// The nearest fragment shows, by the depth test.
     Nearest,
-    /// So many layers are peeled, one after the other ([`peel`](crate::passes::peel)).
+    /// This many layers are peeled, one after the other ([`peel`](crate::passes::peel)).
     Layers(u32),
 }
 
@@ -200,7 +200,7 @@ impl Surface {
         matches!(self, Self::Blended { separate: true, .. })
     }
 
-    /// Whether one surfel is drawn for all identical ones.
+    /// Whether identical surfels are drawn once.
     pub fn copies(&self) -> bool {
         matches!(self, Self::Blended { splats: Splats::Copies, .. })
     }
@@ -220,13 +220,14 @@ impl Surface {
         matches!(self, Self::Blended { splats: Splats::Tiles { subgroups: true, .. }, .. })
     }
 
-    /// The surface without what depends on how much is drawn.
+    /// The surface without the properties that depend on the number of drawn surfels.
     pub fn before_cut(self) -> Self {
         self.sized(false, false, false)
     }
 
-    /// The surface for what is drawn: whether tiles gather all splats, lists end early, and some
-    /// are processed in rounds. Each is used by the surfaces that can.
+    /// Sets the properties that depend on the number of drawn surfels: whether tiles gather all
+    /// splats, whether lists end early, and whether some lists are processed in rounds. A surface
+    /// ignores properties that it does not have.
     pub fn sized(self, gather: bool, veils: bool, long_lists: bool) -> Self {
         match self {
             Self::Blended { splats: Splats::Tiles { subgroups, .. }, separate } => {

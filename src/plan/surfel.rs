@@ -11,20 +11,20 @@ use crate::scene::harmonics::terms_of;
 pub struct SurfelLayout {
     /// u32 words of a record. The colour is at word 0, followed by the place in a texture, if any.
     pub words: u32,
-    /// Number of identical surfels that it stands for.
+    /// The number of identical surfels that the surfel stands for.
     pub copies: u32,
-    /// The first of the three low parts of its centre, the digits beyond f32.
+    /// The first of the three low parts of the centre, the digits beyond f32.
     pub low: u32,
-    /// The first of the six words of its clip lines.
+    /// The first of the six words of the clip lines.
     pub clip: u32,
-    /// The first of the three words of its curvature (cap).
+    /// The first of the three words of the curvature (cap).
     pub cap: u32,
-    /// The first of the three words of its own normal.
+    /// The first of the three words of the surfel's own normal.
     pub normal: u32,
-    /// Its place in the octree.
+    /// The surfel's place in the octree.
     pub number: u32,
-    /// The range of fading cuts that contain it. It is the last word; surfels of an octree do
-    /// without it.
+    /// The range of fading cuts that contain the surfel. This is the last word; surfels of an
+    /// octree do not have it.
     pub fade: u32,
 }
 

@@ -1,24 +1,23 @@
-//! Measured thresholds from which a method pays, each with its measurement. No image depends on
-//! one.
+//! Thresholds above which a method is faster, each with its measurement. No image depends on them.
 //!
-//! All were measured on Mesa 22.3's llvmpipe, a software adapter, at 1024x1024; none on a graphics
-//! card yet.
+//! All were measured on Mesa 22.3's llvmpipe, a software adapter, at 1024x1024. None was measured
+//! on a graphics card yet.
 
 use crate::gpu::adapter::AdapterDescription;
 
 /// Batches are culled if there is more than one surfel per this many pixels. With culling, frames
-/// of 300,000 splats take 0.86 times as long, of 100,000 1.08 times, of 1,000 small ones 1.13
-/// times.
+/// of 300,000 splats take 0.86 times as long, frames of 100,000 splats 1.08 times, and frames of
+/// 1,000 small splats 1.13 times.
 pub const PIXELS_A_CULLED_SURFEL: u64 = 6;
 
 /// The rasteriser draws a triangle per splat instead of a quad if there is more than one surfel per
-/// this many pixels. Triangles take 0.6 times as long as quads for 1,000,000 splats, as long for
-/// 100,000, and 1.2 times as long for 10,000.
+/// this many pixels. Triangles take 0.6 times as long as quads for 1,000,000 splats, equally long
+/// for 100,000, and 1.2 times as long for 10,000.
 pub const PIXELS_A_TRIANGLE: u64 = 10;
 
-/// Tiles sum all splats if a splat touches at least this many tiles on average. Frames of 1,000,000
-/// splats that touch 1.4, 1.9 and 2.2 tiles, and of 300,000 that touch 2.8, take 1.5, 1.1, 0.96 and
-/// 0.82 times as long by tiles as by scatter.
+/// Tiles sum all splats if a splat touches at least this many tiles on average. By tiles, frames of
+/// 1,000,000 splats that touch 1.4, 1.9 and 2.2 tiles take 1.5, 1.1 and 0.96 times as long as by
+/// scatter. Frames of 300,000 splats that touch 2.8 tiles take 0.82 times as long.
 pub const GATHERED_TOUCHED_TILES: f64 = 2.0;
 
 /// Splats whose bounds hold more pixels than this are drawn by tiles. Among 64, 128, 256, 512 and
@@ -36,8 +35,8 @@ pub const MOST_FRAGMENT_BYTES: u64 = 1 << 29;
 pub const REFERENCE_ROWS: u32 = 8;
 
 /// Whether the invocations of a tile share what they fetch. A software adapter would otherwise
-/// fetch it for each of them; a graphics card has caches for that, and sharing has not been
-/// measured there.
+/// fetch the same data for each invocation. A graphics card has caches for that, and sharing has
+/// not been measured there.
 pub fn shares(adapter: &AdapterDescription) -> bool {
     adapter.subgroups && adapter.is_software()
 }

@@ -26,9 +26,8 @@ fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
 /// The largest coordinate of an outlier in device units, so that squares of lengths stay finite.
 const FARTHEST_STRAY: f64 = (1u64 << 60) as f64;
 
-/// The scale from world to device units. It is the power of two that brings the extent of the
-/// scene's `body` and its distance from the camera to at most 1, and all of its `bounds` to at most
-/// 2^60.
+/// The scale from world to device units. It is a power of two. It brings the scene's `body` and the
+/// body's distance from the camera to at most 1, and the scene's `bounds` to at most 2^60.
 pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
     let reach = |bounds: &Bounds| {
         let corners = [bounds.min, bounds.max].into_iter();
@@ -106,21 +105,21 @@ impl View {
     }
 }
 
-/// The nearest and farthest depth of the scene's body, in world units. They are those of the box of
-/// its centres, extended by the largest radius, but by at most a quarter of the box's diagonal. The
-/// second is greater than the first, and outliers affect neither.
+/// The nearest and farthest depth of the scene's body, in world units. They are the depths of the
+/// box of its centres, extended by the largest radius, but by at most a quarter of the box's
+/// diagonal. The farthest is greater than the nearest, and outliers affect neither.
 pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
     let eye = camera.eye - facts.origin;
     let (first, last) = (nearest_of(&facts.body, eye, camera), farthest_of(&facts.body, eye, camera));
     let reach = f64::from(facts.largest_radius).min(0.25 * facts.body.extent().length());
     let first = (first - reach).max(camera.near);
-    // A scene of a single depth lies at the first of the two.
+    // If the scene has a single depth, it is the nearest, and the farthest lies just beyond.
     [first, (last + reach).max(first * (1.0 + 1e-6)).max(first + f64::MIN_POSITIVE)]
 }
 
-/// A depth beyond every surfel, with a margin for rounding, in world units. With an epsilon that
-/// accepts everything it keeps the interval in which depths are measured finite and no coarser than
-/// the scene.
+/// A depth beyond every surfel, with a margin for rounding, in world units. If epsilon accepts
+/// every depth, this limit keeps the interval over which depths are summed finite and no longer
+/// than the scene requires.
 pub fn farthest(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     let reach = f64::from(facts.drawn_radius(options));
     (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + reach) * 1.001
@@ -167,8 +166,8 @@ fn mapped([low, high]: [[f32; 4]; 2], composite: Composite) -> [[f32; 4]; 2] {
     [std::array::from_fn(|k| of(k)[0]), std::array::from_fn(|k| of(k)[1])]
 }
 
-/// The area of a drawn octree node in square pixels of the image, then the width and height of a
-/// sample as fractions of a pixel.
+/// The image area below which an octree node is drawn, square pixels, then the width and height of
+/// a sample as fractions of a pixel.
 fn levels(camera: &Camera, options: &Settings) -> [f32; 4] {
     let Samples { across, down } = options.samples;
     let image = camera.pixels() as f64 / f64::from(across * down);

@@ -5,7 +5,8 @@ use crate::error::Result;
 use crate::gpu::buffers::counts_at;
 use crate::passes::select;
 
-/// Unused surfel slots that a page may keep: the size of the cut changes from view to view.
+/// Surfel slots that may stay unused, beyond four times those that the cuts of all branches need:
+/// the size of the cut changes from view to view.
 const SPARE: u64 = 1 << 16;
 
 impl Run<'_> {
@@ -43,8 +44,9 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Returns whether the slots `rooms` of each branch suffice for its cut in `cuts`. If not, or
-    /// if they are far too many, the next try gets as many as it needs.
+    /// Returns whether `rooms`, the slots of each branch, suffice for `cuts`, the sizes of the
+    /// branches' cuts. If there are too few slots, or far too many, the next try gets the slots
+    /// that the cuts need.
     pub(super) fn fits_cut(&mut self, rooms: &[u64], cuts: &[u64]) -> bool {
         let enough: Vec<u64> = cuts.iter().copied().map(with_room).collect();
         let fits = rooms.iter().zip(cuts).all(|(room, cut)| cut <= room);

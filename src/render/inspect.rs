@@ -1,6 +1,6 @@
-//! Reads back what lies between the stages: the device's own splats, depths and sums. [`evaluate`]
-//! runs one function of a kernel over an array. Both are for study and for tests; a render keeps
-//! all of it on the device.
+//! Reads intermediate results back from the device: splats, nearest depths and sums ([`stages`]).
+//! [`evaluate`] runs one function of a kernel over an array. Both are for study and for tests; a
+//! render keeps intermediate results on the device.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -155,8 +155,8 @@ impl Kept {
         store.fit(gpu, plan, &self.known)
     }
 
-    /// Guesses the plan that follows `plan` if that one only measures a cut: a plan for a cut that
-    /// fits one page.
+    /// If `plan` only measures a cut, guesses the plan that will follow it: that of a cut that fits
+    /// one page.
     fn plan_of_cut(&self, gpu: &Gpu, plan: &Plan, camera: &Camera) -> Option<Plan> {
         let known = Known { cut: Some(vec![1]), ..self.known.clone() };
         let next = || Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &known).ok();

@@ -1,5 +1,5 @@
-//! Compiles the kernels of a frame: a module for all passes, one for the tiles, compiled when they
-//! first draw something, and one that chooses a cut.
+//! Compiles the kernels of a frame. There are up to three modules: one for all passes, one for the
+//! tiles, compiled when tiles first draw something, and one that chooses a cut.
 
 use std::sync::{Arc, OnceLock};
 

@@ -31,17 +31,17 @@ impl Run<'_> {
     }
 
     /// Makes the lists of a kind hold the entries that `stages` count, and a quarter more for the
-    /// next view. If a binding or a list cannot hold them, large splats are drawn without lists.
-    /// Returns false if tiles were to gather all splats, which needs the lists: the frame is then
-    /// retried.
+    /// next view. If a binding or a list cannot hold the entries, large splats are drawn without
+    /// lists. But tiles that gather all splats need lists: then this returns false, and the frame
+    /// is retried without gathering.
     pub(super) fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
         self.timing.flush(self.gpu)?;
         let gathers = self.plan.needs.surface.gathers();
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
             let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
-            // If lists cannot hold the large splats of one individual, those of all are drawn
-            // without lists, and later bands skip this look.
+            // If lists cannot hold the large splats of one separate input, the large splats of all
+            // inputs are drawn without lists, and later bands skip the count below.
             let large = large && !(self.plan.needs.surface.separate() && self.unlisted);
             self.by_tiles = large;
             if !large {
@@ -70,8 +70,8 @@ impl Run<'_> {
     }
 
     /// Makes the buffers hold the counted fragments of a band. Returns false if the view must be
-    /// retried: with other bands, because they do not all fit at once, or because lists are longer
-    /// than known.
+    /// retried: with smaller bands, because the fragments do not fit at once, or because a list is
+    /// longer than the kernels are prepared for.
     pub(super) fn look_for_fragments(&mut self, band: usize) -> Result<bool> {
         self.timing.flush(self.gpu)?;
         let Some(starts) = self.store.buffer("starts") else { return Ok(true) };
@@ -114,8 +114,8 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
-    /// Makes lists end where nothing behind shows, from the next try on. Returns false if that
-    /// changes nothing.
+    /// From the next try on, makes lists end where fragments behind do not show
+    /// ([`veils`](crate::passes::veils)). Returns false if lists already do, or cannot.
     fn veil(&mut self) -> bool {
         let veils = self.plan.needs.surface.lists() == Some(Lists::Sorted) && !self.plan.needs.surface.veils();
         if veils {

@@ -85,8 +85,8 @@ pub struct Renderer<S, B> {
     kept: Kept,
     /// The parts that render maps with other options than the colour's ([`parts::parts`]).
     of_maps: Vec<Kept>,
-    /// The level of detail in the options. A number of splats becomes another node size in each
-    /// view.
+    /// The level of detail in the options. A number of splats is converted to a node size anew for
+    /// each view.
     detail: Detail,
 }
 
@@ -94,7 +94,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// Creates a renderer of `source` without uploading anything yet.
     ///
     /// # Errors
-    /// [`Error::Usage`] if options, scene and backend do not go together.
+    /// [`Error::Usage`] if the scene or the backend does not support the options.
     pub fn new(source: S, options: &Settings, backend: B) -> Result<Self> {
         let reference = matches!(backend.borrow(), Backend::Reference);
         check::options(options, reference)?;
@@ -141,8 +141,8 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         Ok((frame, report))
     }
 
-    /// Returns the node size for the view of `camera`. It follows from the colour's part and holds
-    /// for all parts.
+    /// Returns the node size for the view of `camera`. The options of the colour's part determine
+    /// it, and all parts use it.
     fn sized(&self, camera: &Camera) -> Detail {
         let (facts, options) = (&self.kept.facts, Settings { detail: self.detail, ..self.kept.options.clone() });
         let wanted = Wanted::of(&options, culls_back(facts, camera, &options));
@@ -196,7 +196,8 @@ mod tests {
     use crate::hardcases::cases;
     use crate::scene::{Map, Maps};
 
-    /// Opens a device. Returns `None` if there is no adapter and the environment requires none.
+    /// Opens a device. If there is no adapter, returns `None`, or panics if
+    /// `EPSPLAT_REQUIRE_ADAPTER` is 1.
     fn opened() -> Option<Gpu> {
         match Gpu::open(None) {
             Ok(gpu) => Some(gpu),

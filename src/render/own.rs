@@ -9,7 +9,7 @@ use crate::plan::Settings;
 use crate::scene::own_kernel::{Endless, KernelFaults, OwnKernel};
 use crate::scene::{Blend, PointShape};
 
-/// Distances from a disk's centre at which a text is evaluated before it is used.
+/// Distances from a disk's centre at which a kernel's text is evaluated before it is used.
 const TRIED: u32 = 1024;
 
 /// Returns the WGSL files of a render, and its options with the twin of a blending kernel that the
@@ -60,7 +60,8 @@ fn evaluated(text: &str, name: &str, overrides: &[(&'static str, f64)]) -> Resul
         })
     };
     let function = Evaluated::new(text, "kernel_weight", overrides).map_err(refused)?;
-    // Each branch may use something else: distances over the whole disk show most of them.
+    // Each branch of the text may fail in its own way. Distances over the whole disk reach most
+    // branches.
     for k in 0..=TRIED {
         function.at((f64::from(k) / f64::from(TRIED)).powi(2)).map_err(refused)?;
     }

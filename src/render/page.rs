@@ -12,16 +12,16 @@ use crate::passes::upload::{self, BranchBuffers};
 use crate::plan::{SceneNeeds, splat_words};
 
 /// One page of surfels, with slots for their splats. Without culling there is a slot for each
-/// surfel, in the surfels' order. With culling there are slots for the batches that are drawn, one
-/// after the other ([`cull`](crate::passes::cull)).
+/// surfel, in the surfels' order. With culling there are slots only for the batches that are drawn,
+/// one batch after the other ([`cull`](crate::passes::cull)).
 pub struct Page {
     pub(super) buffers: Named,
-    /// The index of the branch that stores the surfels and their attributes, if the page is of a
-    /// cut.
+    /// If the page is of a cut, the index of the branch that stores the surfels and their
+    /// attributes.
     pub(super) branch: Option<usize>,
-    /// Number of surfels in the page; in a page of a cut, the surfels that it has slots for.
+    /// Number of surfels in the page; in a page of a cut, number of its slots.
     pub surfels: u64,
-    /// Number of scene surfels that those of the page stand for; copies are stored once.
+    /// Number of scene surfels that the page stands for, copies included; copies are stored once.
     pub stand_for: u64,
     /// u32 words of a splat's record.
     splat_words: u64,
@@ -37,7 +37,7 @@ impl Page {
     }
 
     /// Creates a page for up to `surfels` surfels of the cut of a branch, starting at number
-    /// `first` of the cut. The cut on the device holds how many there are.
+    /// `first` of the cut. The device stores how many surfels the cut has.
     pub(super) fn of_cut(
         gpu: &Gpu,
         surfels: u64,

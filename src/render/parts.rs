@@ -1,4 +1,4 @@
-//! Splits a frame into renders when its maps are not made in the same way as its colour.
+//! Splits a frame into several renders when its maps need other options than its colour.
 //!
 //! With several samples per pixel, the colour is the mean of the samples, but maps are taken at the
 //! pixel centre: the mean of the depths or normals of two surfaces belongs to neither surface.

@@ -80,9 +80,9 @@ pub(super) fn frame(
     )
 }
 
-/// Returns the cut of `scene` that `camera` draws, and its options; `None` if no cut is drawn.
-/// `camera` has the pixels of the image, not the samples. The whole scene decides whether back
-/// faces are culled.
+/// Returns the cut of `scene` that `camera` draws, and the options to draw it with; `None` if no
+/// cut is drawn. `camera` has the pixels of the image, not the samples. The options settle whether
+/// back faces are culled, because that depends on the whole scene and not on the cut.
 pub(super) fn cut(scene: &Scene, facts: &Facts, camera: &Camera, options: &Settings) -> Option<(Scene, Settings)> {
     facts.nodes_of(options)?;
     let tree = scene.hierarchy.as_deref()?;
@@ -112,7 +112,7 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     let splats = || strip.splats.iter().copied();
     let (mut nearest, mut sums, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let pixels = camera.width as usize * rows as usize;
-    // The nearest surface at each pixel among the individuals drawn so far.
+    // The nearest surface at each pixel among the separate inputs drawn so far.
     let mut kept = None;
     let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
     for twin in twins {

@@ -128,8 +128,8 @@ impl<'a> Run<'a> {
         if self.plan.projects_each_band && !last { self.count(band) } else { Ok(()) }
     }
 
-    /// Records the list entries of the band that needs most, so that the next try has room for
-    /// them. After an overflow it records none, and the next try measures all bands again.
+    /// Records the list entries of the band that needs most, so that the next try allocates them.
+    /// After an overflow nothing is recorded, and the next try measures all bands again.
     fn learn(&mut self) {
         for of in [Listed::Large, Listed::Small] {
             let entries = &mut self.known.entries[of as usize];

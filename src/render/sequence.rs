@@ -83,8 +83,9 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
 }
 
-/// Returns the stage over all pages or, if inputs are kept apart, one copy per page of `pages`. The
-/// reference does the work of these copies in one go elsewhere; clears stay with the first copy.
+/// Returns the stage over all pages or, if inputs are separate, one copy of the stage per page of
+/// `pages`. Only the first copy has the clears. The copies have no twin, because the reference
+/// draws a separate input in one step ([`Twin::Individual`]).
 fn on(plan: &Plan, pages: &Range<usize>, stage: Stage) -> impl Iterator<Item = Stage> {
     let each = if plan.needs.surface.separate() { pages.clone() } else { 0..0 };
     let whole = (!plan.needs.surface.separate()).then(|| stage.clone());
@@ -120,8 +121,8 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
 }
 
-/// Appends the steps that sum the fragments of each pixel of a band; with separate inputs they also
-/// keep what each individual shows. Tiles that gather make the image too.
+/// Appends the steps that sum the fragments of each pixel of a band. With separate inputs the steps
+/// also keep the nearest surface so far. Tiles that gather also make the image.
 fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     // The visibility pass has already found the colours.
     if matches!(plan.needs.surface, Surface::Nearest(Winner::Depth | Winner::Once)) {
@@ -145,8 +146,8 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     }
 }
 
-/// Appends the stages of the large splats, by tiles or by workgroups; if the plan does not know
-/// which, the executor decides after a look at the device.
+/// Appends the stages of the large splats, by tiles or by workgroups. If the plan does not know
+/// which, it includes both, and the executor decides by counts read from the device.
 fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Vec<Stage>), steps: &mut Vec<Step>) {
     // Tiles that gather either have lists, or the frame is retried without gathering.
     let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.surface.gathers();

@@ -1,5 +1,4 @@
-//! Owns the buffers of a scene and its frames, by their names in WGSL: no other module allocates on
-//! the device.
+//! Owns the buffers of a scene and its frames, by their names in WGSL.
 
 use std::collections::BTreeMap;
 
@@ -171,9 +170,9 @@ impl Store {
         })
     }
 
-    /// Returns whether the uploaded buffers serve a render with `needs`. They may not: whether
-    /// copies are drawn once depends on the accumulator, maps may need more attributes than
-    /// colours, and triangles are uploaded only once a view may show them.
+    /// Returns whether the uploaded buffers serve a render with `needs`. Renders of one scene may
+    /// differ: whether copies are drawn once depends on the accumulator, maps may need more
+    /// attributes than colours, and triangles are uploaded only once a view may show them.
     pub fn serves(&self, needs: &SceneNeeds) -> bool {
         let wanted = Uploading::of(needs);
         let Uploading { order, mesh, .. } = self.uploaded;
@@ -252,7 +251,8 @@ impl Store {
             }
         }
         if plan.needs.mesh.is_some() {
-            // The rasteriser stores them in a texture, so one word serves the binding.
+            // The rasteriser stores nearest triangles in a texture, so one word suffices for the
+            // binding.
             let words =
                 if plan.needs.surface.raster().is_some() { 1 } else { pixels * u64::from(NEAREST_TRIANGLE_WORDS) };
             self.frame.insert("nearest_triangles", Buffer::storage(gpu, "nearest triangles", words)?);

@@ -1,6 +1,6 @@
 //! Reads the sums of an image back from the device and resolves them again. Machines that share a
-//! scene exchange sums in this form, whatever the layout on the device. Sums that were read back
-//! resolve to the same picture, bit for bit.
+//! scene exchange sums in this form, which does not depend on the layout on the device. Sums that
+//! were read back resolve to the same picture, bit for bit.
 
 use super::kernels::Kernels;
 use super::run::Run;
@@ -25,8 +25,8 @@ pub struct Sums {
     pub size: [u32; 2],
     /// The nearest depth of each pixel, in device units, stored as bits(+inf) - bits(depth).
     pub nearest: Vec<u32>,
-    /// [`PixelLayout::channels`] integer sums per pixel, in units of `1 / one`. The sums of other
-    /// splats at the pixel can be added to them.
+    /// [`PixelLayout::channels`] integer sums per pixel, in units of `1 / one`. Sums of different
+    /// splats at one pixel can be added.
     pub sums: Vec<u64>,
     /// The channel of each sum.
     pub pixel: PixelLayout,
@@ -131,7 +131,7 @@ fn stored(options: &Settings) -> Result<Settings> {
     Ok(Settings { without, ..options.clone() })
 }
 
-/// Renders what `source` holds and returns its sums.
+/// Renders `source` up to its sums and returns them.
 ///
 /// # Errors
 /// [`Error::Usage`] for an accumulator other than `fixed` or options that leave no sums, and any

@@ -25,11 +25,12 @@ pub fn taken(
     let (facts, origin) = (Facts::of(&part::nothing(levels)), levels.whole.origin);
     let mut all: Vec<(&Camera, Wanted)> = Vec::new();
     for &(camera, options) in views {
-        // The node size for a number of splats depends on all nodes in view, so all are read.
+        // If a number of splats is requested, the node size depends on all nodes in view, so all
+        // are read.
         let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
         let wanted = |part: &Settings| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
-        // Renders for colour and maps may cull different back faces and filter at different sample
-        // sizes.
+        // The renders for colour and for maps may differ in culled back faces and in sample sizes,
+        // so the part must serve each of them.
         all.extend(parts(&facts, &encoded::of(&facts, options)).iter().map(|part| (camera, wanted(part))));
     }
     let any = |tree: &Hierarchy, index: u32| {

@@ -46,8 +46,8 @@ fn answers<'a>(case: &Case<'a>) -> Vec<(Limit, &'a Measurement)> {
     let mut answers: Vec<(Limit, &Measurement)> = Vec::new();
     for measurement in best(&case.measurements).into_iter().rev() {
         let Some(limit) = measurement.numeric_error().map(Limit::of) else { continue };
-        // Later ones on this side of the front are faster, so they replace earlier ones with the
-        // same limit.
+        // Measurements come in the order from slow and exact to fast, so a later one replaces an
+        // earlier one with the same limit.
         if answers.last().is_some_and(|(last, _)| *last == limit) {
             answers.pop();
         }

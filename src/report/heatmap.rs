@@ -24,11 +24,11 @@ const COLORS: [[u8; 3]; 10] = [
     [0xfc, 0xfd, 0xbf],
 ];
 
-/// Where the smallest difference lies on the scale of colours. Only zero has the lowest colour, so
-/// that small differences can be seen.
+/// Position of the smallest difference on the scale of colours, from 0 to 1. Only zero has the
+/// lowest colour, so that small differences can be seen.
 const FIRST: f64 = 0.2;
 
-/// Most decades of a scale. Differences that are smaller, compared with the largest one, are of no
+/// Most decades of a scale. A difference that lies more decades below the largest one is of no
 /// interest.
 const MOST_DECADES: i32 = 8;
 
@@ -131,8 +131,8 @@ pub fn differences(image: &Frame, reference: &Frame) -> Result<Vec<f64>> {
 
 /// The heat map of one image.
 pub(super) struct Map {
-    /// Differences by pixel. If the map is shrunk, each is the largest of a block, so that none is
-    /// lost.
+    /// Differences by pixel. If the map is shrunk, each value is the largest difference in a block
+    /// of pixels, so that no difference is lost.
     pub shown: Grid<f64>,
     /// The largest difference.
     pub largest: f64,

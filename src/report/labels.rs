@@ -36,7 +36,8 @@ pub(super) const HEIGHT: f64 = 13.0;
 /// Width of a character, slightly more than the average of common sans-serif fonts, so that a name
 /// is narrower than the space reserved for it.
 const CHARACTER: f64 = 6.7;
-/// Distances between a name and its marker. From the second on, a line joins them.
+/// Distances between a name and its marker. From the second distance on, a line joins name and
+/// marker.
 const DISTANCES: [f64; 5] = [7.0, 14.0, 24.0, 38.0, 56.0];
 /// Directions of a name from its marker, the preferred one first: readers look to the right first.
 const DIRECTIONS: [(f64, f64); 12] = [

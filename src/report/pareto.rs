@@ -30,7 +30,7 @@ pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     front
 }
 
-/// Returns the measurements that have a time and this error, with both.
+/// Returns the measurements that have a time and this kind of error, each with both values.
 pub(super) fn points<'a>(
     measurements: &[&'a Measurement],
     error: fn(&Measurement) -> Option<f64>,
@@ -139,7 +139,8 @@ mod tests {
     fn a_dominated_point_is_not_on_the_front() {
         assert!(front(&[]).is_empty());
         assert_eq!(front(&[(1.0, 1.0)]), [0]);
-        // A staircase, all of it on the front, and for each of its points one that it dominates.
+        // A staircase whose points are all on the front, and for each of its points one that it
+        // dominates.
         let stairs: Vec<(f64, f64)> = (0..10).map(|i| (f64::from(i), f64::from(10 - i))).collect();
         let above: Vec<(f64, f64)> = stairs.iter().map(|(t, e)| (t + 0.5, e + 0.25)).collect();
         let all: Vec<(f64, f64)> = above.iter().chain(&stairs).copied().collect();

@@ -214,8 +214,8 @@ impl Plot {
         let bounds = if of_curve { Area { left: x, ..INSIDE } } else { INSIDE };
         let (area, joined) = labels::place(text.chars().count(), (x, y), &bounds, &self.taken);
         let middle = (area.left + area.right) / 2.0;
-        // The text is anchored on the side of its point, so that it stays there if its font is
-        // narrower.
+        // The text is anchored on the side of its point, so that it stays near the point if its
+        // font is narrower.
         let (anchor, at) = if area.left >= x {
             ("start", area.left)
         } else if area.right <= x {

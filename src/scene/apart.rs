@@ -16,10 +16,10 @@ use super::body::Places;
 /// farther than twice that are separate.
 const APART: f64 = 0.125;
 
-/// A separate group is left out if it has at most this many points,
+/// A separate group is left out only if it has at most this many points.
 const FEW: u64 = 16;
 
-/// and at most one in so many of all points.
+/// A separate group is left out only if it has at most one in this many of all points.
 const SHARE: u64 = 1000;
 
 /// The points in one cell of the grid: their number, their box, and whether a disk among them has
@@ -44,10 +44,10 @@ impl Cell {
 /// The box of the points in `body` without separate small groups, and the number of points left
 /// out.
 ///
-/// A group is left out if it has at most [`FEW`] points and at most one in [`SHARE`] of all, or if
-/// all its points are at one position; if it is separate from `core` and from all other groups; and
-/// if none of its disks has a cell's edge or more as radius, which could bridge the gap. The result
-/// depends on the set of points alone.
+/// A group is left out if three conditions hold. It has at most [`FEW`] points and at most one in
+/// [`SHARE`] of all, or all its points are at one position. It is separate from `core` and from all
+/// other groups. None of its disks has a radius of a cell's edge or more, which could bridge the
+/// gap. The result depends on the set of points alone.
 pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Places) -> (Bounds, u64) {
     let edge = APART * core.extent().max_element();
     let near = Bounds { min: core.min - 2.0 * edge, max: core.max + 2.0 * edge };
@@ -56,7 +56,7 @@ pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Plac
     if count < SHARE || holds(&near, body.min) && holds(&near, body.max) {
         return (*body, 0);
     }
-    // Points near the core need no cell: the grid has only those beyond.
+    // Points near the core need no cell: the grid holds only points farther away.
     let grid = |p: DVec3| ((p - core.min) / edge).floor().as_ivec3();
     type Beyond = (Bounds, HashMap<IVec3, Cell>);
     let add = |(mut inside, mut cells): Beyond, p: DVec3, radius: f64| {

@@ -2,7 +2,7 @@
 //!
 //! A scanner that saw nothing may write a coordinate of zero, which in map coordinates lies a
 //! thousand kilometres from the scene. If such a point counted, f32 coordinates would be relative
-//! to the middle of the two, and the default view would show neither.
+//! to the middle between the point and the scene, and the default view would show neither.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::random;
 /// The approximate number of positions in the sample that determines the core.
 const SAMPLED: usize = 1 << 13;
 
-/// One in so many sampled positions may lie beyond each side of the core.
+/// One in this many sampled positions may lie beyond each side of the core.
 const CUT: usize = 64;
 
 /// With fewer positions than this, none is a stray.
@@ -43,7 +43,7 @@ pub(crate) trait Places: Sync {
     ) -> T;
 }
 
-/// The positions and radii of the indices below a count, by a function of the index.
+/// A count of positions, and the function that gives the position and radius of each index.
 pub(crate) struct Listed<F>(pub usize, pub F);
 
 impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
@@ -67,8 +67,8 @@ impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
 
 /// The body of `count` positions, and the number of strays outside it.
 ///
-/// The result depends on the set of positions alone, not on their order: the core, which holds all
-/// but one in 64 beyond each side, is that of a sample chosen by a hash of the coordinates.
+/// The result depends on the set of positions alone, not on their order: a hash of the coordinates
+/// chooses a sample, and the core holds all of it but one position in 64 beyond each side.
 /// Positions that are not finite are in no box.
 pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (Bounds, u64) {
     body_of(&Listed(count, |index| (position(index), 0.0)))
@@ -80,7 +80,7 @@ fn body_of(places: &impl Places) -> (Bounds, u64) {
     body_within(core, all, places)
 }
 
-/// As [`body`], where `core` and `all`, the box of all positions, are known.
+/// As [`body`], for a known `core` and a known box `all` of all positions.
 pub(crate) fn body_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, u64) {
     let Some(core) = core else { return (all, 0) };
     let far = FAR * core.extent().max_element();
@@ -101,8 +101,8 @@ pub(crate) fn framed(places: &impl Places) -> (Bounds, u64) {
     (framed, left_out)
 }
 
-/// The body, the box that the default view shows, and the number of positions outside that box,
-/// where `core` and `all`, the box of all positions, are known.
+/// The body, the box that the default view shows, and the number of positions outside that box, for
+/// a known `core` and a known box `all` of all positions.
 pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, Bounds, u64) {
     let (body, strays) = body_within(core, all, places);
     let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
@@ -112,7 +112,8 @@ pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Pla
     (body, bounds, strays + apart)
 }
 
-/// The box of the finite positions that are `wanted`, and the number of the others.
+/// The box of the finite positions that are `wanted`, and the number of finite positions that are
+/// not.
 fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) -> (Bounds, u64) {
     let add = |(bounds, others): (Bounds, u64), p: DVec3, _| {
         let unwanted = p.is_finite() && !wanted(p);

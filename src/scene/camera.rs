@@ -108,15 +108,15 @@ impl Lens {
 }
 
 /// The most pixels in an image. Each takes up to 48 bytes of host memory on the way to a file, plus
-/// 24 for every map.
+/// 8 for each value of a map.
 pub const MAX_PIXELS: u64 = 1 << 27;
 
-/// The largest coordinate, scale or depth of a camera, and the inverse of the smallest, as the
-/// device computes in f32.
+/// The largest scale and near depth of a camera; the smallest is its inverse. The device computes
+/// in f32.
 const LARGEST: f64 = 1e18;
 
-/// The largest distance of a camera from the origin: from there a narrow lens sees a whole scene of
-/// the largest coordinates.
+/// The largest coordinate of a camera's eye. From there a narrow lens sees all of a scene with the
+/// largest coordinates.
 const FARTHEST: f64 = 1e28;
 
 /// Rejects image sizes that no backend supports.
@@ -169,7 +169,7 @@ impl Camera {
 
     /// A camera at `eye` that looks at `target`, both in world coordinates.
     ///
-    /// Without `up`, it is the axis `scene_up`, or the other axis if the view is along that one.
+    /// If `up` is None, up is the axis `scene_up`, or [`Up::other`] if the view is along that axis.
     ///
     /// # Errors
     ///
@@ -281,8 +281,8 @@ impl Camera {
         1.0 / self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).length()
     }
 
-    /// The unit direction in which `point` is seen, world space; for an orthographic camera that of
-    /// its axis.
+    /// The unit direction from the eye to `point`, world space; for an orthographic camera the
+    /// direction of its axis.
     pub fn direction_to(&self, point: DVec3) -> DVec3 {
         match self.projection {
             Projection::Pinhole => (point - self.eye).normalize_or_zero(),

@@ -35,10 +35,10 @@ use crate::error::Error;
 /// The fragments or surfaces that are composited at a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Composite {
-    /// The nearest surface alone; its alpha shows the background.
+    /// The nearest surface alone; the background shows through its alpha.
     #[default]
     Opaque,
-    /// The nearest so many surfaces, front to back; [`ALL_LAYERS`] for all.
+    /// This many of the nearest surfaces, front to back; [`ALL_LAYERS`] for all.
     Layers(u32),
     /// Every fragment, front to back; fragments at one depth in the order of
     /// [`order`](crate::passes::order).

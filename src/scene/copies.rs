@@ -15,8 +15,9 @@ use super::{Colors, Scene};
 /// The most surfels that are sampled to find out whether there are copies.
 const SAMPLED: usize = 4096;
 
-/// The fewest copies of one surfel that are worth a search; for fewer, drawing each costs less than
-/// doing without tiles. A disk that covers a 1024x1024 image takes a software adapter 4 ms.
+/// The fewest copies of one surfel that are worth a search; with fewer, drawing each copy costs
+/// less than drawing the scene without tiles. A disk that covers a 1024x1024 image takes a software
+/// adapter 4 ms.
 const FEWEST: usize = 1024;
 
 /// Whether one surfel of `scene` seems to have at least [`FEWEST`] copies, from a sample of fixed
@@ -34,7 +35,7 @@ pub(crate) fn has_copies(scene: &Scene) -> bool {
         .is_some_and(|most| most >= FEWEST)
 }
 
-/// The number of copies of each surfel: the whole number at the first of equal surfels, 0 at the
+/// The number of copies of each surfel: the full count at the first of equal surfels, 0 at the
 /// others.
 pub(crate) fn copies(scene: &Scene) -> Vec<u32> {
     let mut order: Vec<u32> = (0..scene.surfels.len() as u32).collect();

@@ -23,8 +23,8 @@ pub struct Cut {
 pub(crate) enum Fate {
     /// Neither the node nor anything below it is drawn.
     Unseen,
-    /// In the first so many of the fading cuts, the node's children or surfels are drawn; in the
-    /// other cuts, the node is drawn in their place.
+    /// In this many of the fading cuts, counted from the first, the node's children or surfels are
+    /// drawn. In the other cuts the node is drawn in their place.
     Divided(u8),
 }
 
@@ -131,7 +131,8 @@ impl Cut {
         match &mut cut.colors {
             Colors::Srgb8(codes) => codes.extend(nodes().map(|node| srgb8(node.color))),
             Colors::Linear(colors) => colors.extend(nodes().map(|node| node.color)),
-            // `Constant` has one colour for all; scenes with the others have no levels of detail.
+            // `Constant` has one colour for all. Scenes with textures or harmonics have no levels
+            // of detail.
             Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
         }
         cut

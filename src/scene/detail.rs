@@ -116,8 +116,8 @@ impl DetailMeasure {
         (Self::Extent, "extent", "the area of its bounding sphere's image, larger where surfels lie off its cap"),
     ];
 
-    /// The size of a node in square pixels, with its centre at `center` relative to the eye, in
-    /// world axes. It is infinite up to the near depth of a pinhole camera.
+    /// The size of a node in square pixels. `center` is its centre relative to the eye, in world
+    /// axes. For a pinhole camera the size is infinite up to the near depth.
     pub fn of(self, node: &Node, center: DVec3, camera: &Camera) -> f64 {
         let turned = |v: DVec3| camera.rotation * v;
         let (at, focal) = (turned(center), DVec2::new(camera.fx, camera.fy));

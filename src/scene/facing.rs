@@ -7,8 +7,8 @@ use crate::error::{Error, Result};
 
 /// The drawing of points that face the camera (Schuetz and Wimmer 2015).
 ///
-/// Each is a shape around its position, in a plane parallel to the image. Its radius is the longer
-/// half-axis of its surfel, limited in pixels; the surfel's own plane is ignored.
+/// Each point is a shape around its position, in a plane parallel to the image. The radius is the
+/// longer half-axis of the point's surfel, limited in pixels; the surfel's own plane is ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
     /// The shape of each splat.
@@ -21,7 +21,8 @@ pub struct Facing {
 /// The shapes of points that face the camera.
 ///
 /// A shape with a height is nearer to the camera by its height times the radius. Where points
-/// overlap, each pixel then shows approximately the one whose axis is nearest to it (section III).
+/// overlap, each pixel then shows approximately the point whose axis is nearest to the pixel
+/// (section III).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PointShape {
     /// Flat, `-1 <= u, v < 1`.
@@ -94,7 +95,7 @@ impl Facing {
 /// The size of points that face the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointSize {
-    /// A factor on the radius of each point, or on the common one in a cloud without radii.
+    /// A factor on the radius of each point, or on the common radius of a cloud without radii.
     Radius(f64),
     /// One radius for all points, world units.
     Absolute(f64),

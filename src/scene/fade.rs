@@ -1,10 +1,10 @@
-//! Fades between cuts through levels of detail: the share of a surfel while a coarser or finer cut
-//! replaces its own.
+//! Fades between cuts through levels of detail: the share of a surfel while its cut is replaced by
+//! a coarser or finer one.
 
 /// The number of cuts that fade into each other, one for each dither threshold.
 ///
 /// Cut n divides the nodes whose size in the image is at least `(1 + n / STEPS) / 2` of the
-/// requested one ([`Detail`](super::Detail)), so lower numbers are finer.
+/// requested size ([`Detail`](super::Detail)), so lower numbers are finer.
 pub const STEPS: u8 = 64;
 
 /// The range `from..to` of the [`STEPS`] fading cuts that contain a surfel.

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
 const FILL: f64 = 0.95;
 
-/// The fraction of the way that disks fill, where they would be cut otherwise.
+/// The same fraction for disks, which is used if the image's border would cut a disk otherwise.
 const FILL_OF_DISKS: f64 = 0.98;
 
 /// Rounds of centring. Each multiplies the remaining offset by about the square of the scene's
@@ -81,9 +81,9 @@ impl Camera {
     /// A camera that frames the scene's body: centred, and as large as fits in the image.
     ///
     /// The view is from the front, a little from the right and above; z-up scenes, which tend to be
-    /// terrain, are seen from steeper. The centres leave a margin of 5 %, and the border cuts no
-    /// disk: larger disks move the camera farther away. An orthographic lens keeps its scale, so it
-    /// may show less.
+    /// terrain, are seen from a steeper angle. The centres leave a margin of 5 %, and the border
+    /// cuts no disk: larger disks move the camera farther away. An orthographic lens keeps its
+    /// scale, so it may show less.
     pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
         Ok(Self::framed(size, lens, scene, near, (None, None, Of::Disks))?.0)
     }
@@ -314,8 +314,8 @@ fn median_radius(scene: &Scene) -> f64 {
 
 /// The default view direction for the unit vector `up`.
 ///
-/// It is the direction for a y or z axis, whichever is nearer to the line of `up`, rotated as that
-/// axis is rotated onto `up`.
+/// It is the direction for up along the y or z axis, whichever is nearer to the line of `up`. The
+/// direction is rotated by the rotation that takes that axis to `up`.
 fn forward(up: DVec3) -> DVec3 {
     let (axis, forward) = if up.z.abs() > up.y.abs() {
         (DVec3::Z, DVec3::new(-0.15, 1.0, -1.2))

@@ -1,4 +1,4 @@
-//! Gaussian surfels, and the rules by which their method of origin draws them.
+//! Gaussian surfels, and the rules by which 2D Gaussian splatting draws them.
 //!
 //! Surfels of 2D Gaussian splatting (Huang et al., SIGGRAPH 2024) have two standard deviations, an
 //! opacity o and a view-dependent colour ([`Harmonics`](super::Harmonics)). Along a pixel's ray,
@@ -7,19 +7,20 @@
 //! `alpha = min(0.99, o exp(-rho^2 / 2))`, `rho^2 = min(u^2 + v^2, 2 d^2)`
 //!
 //! with d the distance of the pixel's centre from the image of the surfel's centre, pixels (section
-//! 4.2 of the paper, Eq. 11, and its code). Fragments with an alpha below 1/255 are left out, and
-//! so are all fragments from the one on that would lower the transmittance below 1e-4. Colours are
-//! sRGB codes and are composited as they are, because files are trained to give pictures in this
-//! way.
+//! 4.2 of the paper, Eq. 11, and its code). Fragments with an alpha below 1/255 are left out. So is
+//! the first fragment that would lower the transmittance below 1e-4, with all behind it. Colours
+//! are sRGB codes and are composited as they are, because files are trained to give pictures in
+//! this way.
 //!
 //! epsplat expresses this by three of its options, which a scene of Gaussians uses by default: the
 //! [`KERNEL`] over disks of [`EXTENT`] standard deviations,
 //! [`LowPass::Gaussians`](super::LowPass::Gaussians) and
 //! [`Composite::Gaussians`](super::Composite::Gaussians). Two rules of the original code are not
-//! followed, as they come from its tiles and not from its formulas: it sorts surfels by the depth
-//! of their centres, where here each fragment has its own depth, and it cuts a surfel at a box of
-//! three standard deviations, rounded to tiles, where here a surfel ends at an alpha of 1/255. Kernels get the constants below as
-//! overrides ([`sorted`](crate::passes::sorted)).
+//! followed, as they come from its tiles and not from its formulas. It sorts surfels by the depth
+//! of their centres; here each fragment has its own depth. It cuts a surfel at a box of three
+//! standard deviations, rounded to tiles; here a surfel ends at an alpha of 1/255.
+//!
+//! Kernels get the constants below as overrides ([`sorted`](crate::passes::sorted)).
 
 use super::Kernel;
 

@@ -163,7 +163,7 @@ mod tests {
         }
     }
 
-    /// Compares with the factors that the 3DGS code has as numbers.
+    /// Compares with the numbers that the 3DGS code has for these factors.
     #[test]
     fn the_signs_are_those_of_files() {
         let axis = |x: f64, y: f64, z: f64| basis(DVec3::new(x, y, z).normalize());

@@ -23,11 +23,11 @@ pub struct Node {
     /// The mean colour of the surfels: linear, straight alpha.
     pub color: [f32; 4],
     /// Radius of a sphere around the centre that holds the surfels and the node's own ellipse,
-    /// world units. It is larger than necessary where the surfels lie off the node's cap, because
-    /// cuts measure nodes by it.
+    /// world units. It is enlarged where the surfels lie off the node's cap: cuts measure nodes by
+    /// it, and so divide such nodes sooner.
     pub radius: f32,
-    /// The smallest cosine of the angle between the normals of the surfels and of the node; -1
-    /// where normals have no side.
+    /// The smallest cosine of the angle between the normals of the surfels and of the node; -1 if
+    /// normals are not oriented.
     pub cone: f32,
     /// Index of the first child, or in a leaf of the first surfel in the scene.
     pub first: u32,
@@ -123,8 +123,8 @@ impl Hierarchy {
         if reached == elements { Ok(()) } else { Err(Fault::Loose) }
     }
 
-    /// Gives each leaf of one surfel that surfel's ellipse. The node is drawn in its place, and a
-    /// file of another program may have a different ellipse there.
+    /// Sets the ellipse of each leaf with one surfel to that surfel. Such a node may be drawn in
+    /// place of its surfel, and a file of another program may have a different ellipse there.
     pub(crate) fn settle(&mut self, surfels: &[Surfel], low: &[[f32; 3]]) {
         let settled = |node: &mut Node| -> Option<[f32; 3]> {
             let place = (node.leaf && node.count == 1).then_some(node.first as usize)?;

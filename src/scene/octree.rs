@@ -1,4 +1,5 @@
-//! Point octrees whose levels halve the spacing, as in COPC files: which nodes a picture needs.
+//! Point octrees whose levels halve the spacing, as in COPC files, and the choice of the nodes that
+//! a picture needs.
 //!
 //! The points of a node add to those of the nodes above it, so the finest node read at a place
 //! determines how densely it is sampled. The selection depends on octree and camera alone.
@@ -43,11 +44,11 @@ pub const MOST_LEVELS: u32 = 32;
 /// The number of points that suffice to find the extent of a scene before a camera is known.
 const OVERVIEW: u64 = 50_000;
 
-/// Points outside the view matter up to this distance, in spacings: they are neighbours of visible
-/// points, whose shape is estimated from them.
+/// Points outside the view matter up to this distance, in spacings, because the shape of visible
+/// points is estimated from their neighbours.
 const NEIGHBOURHOOD: f64 = 3.0;
 
-/// Tolerance for places just outside an octree, which are rounded, in units of half its edge.
+/// Tolerance for places that rounding puts just outside an octree, in units of half its edge.
 const PLACES_ROUNDED: f64 = 1e-6;
 
 impl OctreeNode {
@@ -141,8 +142,8 @@ impl PointOctree {
 /// The nodes of each octree that a picture with this `detail` needs.
 ///
 /// For [`Detail::Splats`], it searches the finest size with which at most that many points are
-/// read. The roots, and nodes that reach the camera's plane, are read in any case and may exceed
-/// it.
+/// read. The roots, and nodes that reach the camera's plane, are always read and may exceed that
+/// number.
 pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Vec<usize>> {
     let of_size = |size: f64| octrees.iter().map(|octree| octree.taken(camera, size)).collect::<Vec<_>>();
     let Detail::Splats(most) = detail else { return of_size(detail.pixels(camera.pixels() as f64)) };
@@ -162,8 +163,8 @@ pub struct Thinned<'a> {
 }
 
 impl<'a> Thinned<'a> {
-    /// Compares the `taken` nodes, sorted, with all of `octree`. With each node its parent must be
-    /// among them.
+    /// Compares the `taken` nodes, sorted, with all of `octree`. The parent of each taken node must
+    /// be taken too.
     pub fn new(octree: &'a PointOctree, taken: &'a [usize]) -> Self {
         let mut points: Vec<u64> = octree.nodes.iter().map(|node| node.points).collect();
         for (index, node) in octree.nodes.iter().enumerate().rev() {
@@ -192,8 +193,9 @@ impl<'a> Thinned<'a> {
             let cube = ((within + 1.0) * 0.5 * side).floor().clamp(DVec3::ZERO, DVec3::splat(side - 1.0));
             octree.find(level, cube.to_array().map(|place| place as u32))
         };
-        // Points in the cube of the finest taken node: its own, and of those of its ancestors a
-        // quarter per level, as points on a surface divide among four of the eight child cubes.
+        // Points in the cube of the finest taken node: the node's own, plus a share of its
+        // ancestors' points. The share is a quarter per level, as points on a surface divide among
+        // four of the eight child cubes.
         let (mut taken, mut all) = (1.0, 1.0);
         let mut above = 0.0;
         for node in (0..octree.levels()).map_while(at_level) {

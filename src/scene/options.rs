@@ -103,8 +103,8 @@ pub enum Blend {
     /// The weighted mean of the fragments within epsilon of the nearest depth (paper 000, Eq. 7).
     #[default]
     Weighted,
-    /// The colour of the nearest fragment alone, as with a depth test; of several at one depth, the
-    /// greatest colour.
+    /// The colour of the nearest fragment alone, as with a depth test. Among several at one depth,
+    /// the greatest colour shows.
     Nearest,
 }
 
@@ -120,7 +120,7 @@ impl FromStr for Blend {
     }
 }
 
-/// The surfels that are left out because of the side that they show.
+/// Which surfels are left out because of the side that they show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cull {
     /// Leaves out surfels that face away if none of them can be visible: the scene is closed

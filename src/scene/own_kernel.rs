@@ -1,19 +1,19 @@
-//! Blending kernels that a user wrote: their weights in f64, and what is wrong with them.
+//! User-written blending kernels: their weights in f64, and counts of invalid weights.
 
 use std::fmt;
 use std::sync::Arc;
 
 use serde::Serialize;
 
-/// Steps of the distance from a disk's centre at which a kernel is tried.
+/// Number of steps of the distance from a disk's centre at which a kernel is tested.
 const DISTANCES: u32 = 4096;
 
-/// A loop of a kernel did not end.
+/// The error that a loop of a kernel did not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Endless;
 
-/// A blending kernel that a user wrote, evaluated in f64. It is what the reference draws in place
-/// of a built-in kernel, so that the device's error is its rounding.
+/// A user-written blending kernel, evaluated in f64. The reference draws with it in place of a
+/// built-in kernel, so that the device's error is only its rounding.
 #[derive(Clone)]
 pub struct OwnKernel {
     name: String,
@@ -26,7 +26,7 @@ impl fmt::Debug for OwnKernel {
     }
 }
 
-/// Kernels are equal if they are clones of one.
+/// Two kernels are equal if they are clones of the same kernel.
 impl PartialEq for OwnKernel {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name && Arc::ptr_eq(&self.weight, &other.weight)
@@ -34,13 +34,14 @@ impl PartialEq for OwnKernel {
 }
 
 impl OwnKernel {
-    /// A kernel by its weight, a function of the squared distance from the disk's centre in radii,
-    /// from 1 at 0 to the rim at 1. `name` stands in reports.
+    /// Creates a kernel from its weight, a function of the squared distance from the disk's centre
+    /// in radii. The weight is 1 at the centre, and the rim is at distance 1. Reports call the
+    /// kernel `name`.
     pub fn new(name: impl Into<String>, weight: impl Fn(f64) -> f64 + Send + Sync + 'static) -> Self {
         Self::fallible(name, move |rho2| Ok(weight(rho2)))
     }
 
-    /// The same of a weight that may have none.
+    /// As [`Self::new`], for a weight that may fail to be evaluated.
     pub(crate) fn fallible(
         name: impl Into<String>,
         weight: impl Fn(f64) -> Result<f64, Endless> + Send + Sync + 'static,
@@ -48,13 +49,14 @@ impl OwnKernel {
         Self { name: name.into(), weight: Arc::new(weight) }
     }
 
-    /// The weight at the squared distance `rho2`, in [0, 1]; 0 where it is no number.
+    /// The weight at the squared distance `rho2`, clamped to [0, 1]; 0 if it is NaN or a loop does
+    /// not end.
     pub fn weight(&self, rho2: f64) -> f64 {
         (self.weight)(rho2).ok().filter(|weight| !weight.is_nan()).unwrap_or(0.0).clamp(0.0, 1.0)
     }
 
-    /// Tries the kernel at 4,097 distances from the disk's centre to `farthest` radii, and counts
-    /// wrong weights, which do not lie between 0 and 1. It stops at a loop that does not end.
+    /// Tests the kernel at 4,097 distances from the disk's centre to `farthest` radii, and counts
+    /// weights outside [0, 1]. It stops at a loop that does not end.
     pub fn faults(&self, farthest: f64) -> KernelFaults {
         let mut faults = KernelFaults { kernel: self.name.clone(), ..KernelFaults::default() };
         for k in 0..=DISTANCES {
@@ -68,7 +70,7 @@ impl OwnKernel {
                 Ok(weight) if weight.is_nan() => &mut faults.not_a_number,
                 Ok(weight) if weight.is_infinite() => &mut faults.infinite,
                 Ok(weight) if weight < 0.0 => &mut faults.negative,
-                // A rounding above 1 is no fault.
+                // Rounding may exceed 1 a little, which is no fault.
                 Ok(weight) if weight > 1.0 + 1e-6 => &mut faults.above_one,
                 Ok(_) => continue,
             };
@@ -79,13 +81,13 @@ impl OwnKernel {
     }
 }
 
-/// Counts of weights that are none, of a kernel that a user wrote. The device clamps weights to
-/// [0, 1], so that a picture does not show such faults.
+/// Counts of the invalid weights of a user-written kernel. The device clamps weights to [0, 1], so
+/// that a picture does not show such faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct KernelFaults {
     /// The kernel's file or name.
     pub kernel: String,
-    /// Number of distances from a disk's centre that were tried.
+    /// Number of distances from a disk's centre that were tested.
     pub tried: u32,
     /// Weights that are NaN.
     pub not_a_number: u32,
@@ -103,7 +105,7 @@ pub struct KernelFaults {
 }
 
 impl KernelFaults {
-    /// One line that says what is wrong; None if nothing is.
+    /// Returns a line that says which weights are wrong; None if all are valid.
     pub fn sentence(&self) -> Option<String> {
         let first = self.first?;
         let counts = [
@@ -147,7 +149,7 @@ mod tests {
         let endless = OwnKernel::fallible("endless", |rho2| if rho2 > 0.25 { Err(Endless) } else { Ok(1.0) });
         assert_eq!((endless.faults(1.0).endless, endless.faults(1.0).tried), (1, 2050));
         assert_eq!(endless.weight(0.5), 0.0);
-        // Corners of squares lie at the root of 2.
+        // Corners of squares lie at sqrt(2) radii.
         assert!(OwnKernel::new("cone", |rho2| 1.0 - rho2.sqrt()).faults(2f64.sqrt()).negative > 1000);
     }
 }

@@ -17,8 +17,8 @@ struct Input {
     first: u64,
     /// Sorted numbers of the points that became no surfel.
     left_out: Vec<u64>,
-    /// For each surfel, the number of its point among those that are kept, if a point may have
-    /// several surfels.
+    /// For each surfel, the number of its point among the points that are kept. None if each of
+    /// these points has one surfel.
     numbers: Option<Vec<u32>>,
 }
 
@@ -56,8 +56,8 @@ impl Provenance {
         }
     }
 
-    /// The index ranges of each input's surfels, of `surfels` in all, without empty ones. A
-    /// reordered scene has one range for all inputs.
+    /// The index range of each input's surfels, without empty ranges. `surfels` is the total
+    /// number. A reordered scene has one range for all inputs.
     pub fn ranges(&self, surfels: u64) -> impl Iterator<Item = Range<u64>> {
         let inputs = if self.order.is_some() { &[][..] } else { &self.inputs };
         let firsts = inputs.iter().skip(1).map(|input| input.first);

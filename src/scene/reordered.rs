@@ -1,4 +1,4 @@
-//! Scenes with some of the surfels of another, or with all of them in another order.
+//! Scenes made of some surfels of another scene, or of all its surfels in another order.
 
 use rayon::prelude::*;
 

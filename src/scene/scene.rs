@@ -72,16 +72,16 @@ pub struct Scene {
     /// Whether colours are sRGB codes that are composited as they are, instead of linear light. It
     /// is set if there are Gaussian surfels ([`gaussian`](super::gaussian)).
     pub encoded: bool,
-    /// Whether normals were given and thus tell the two sides of a surface apart; estimated ones do
-    /// not.
+    /// Whether normals were given and thus tell the two sides of a surface apart. Estimated normals
+    /// do not.
     pub oriented: bool,
     /// Whether the surfels form closed surfaces and face outward, so that backs are visible only
     /// from inside.
     pub closed: bool,
     /// The levels of detail; the surfels are in the order of this tree.
     pub hierarchy: Option<Arc<Hierarchy>>,
-    /// The facts about the whole scene if this is a part of it: bounds and ranges are those of the
-    /// whole.
+    /// The facts about the whole scene if this is only a part; bounds and ranges are then those of
+    /// the whole.
     pub part_of: Option<Box<Whole>>,
     /// Triangles beside the surfels.
     pub triangles: Triangles,
@@ -94,7 +94,7 @@ pub struct Scene {
 /// The most surfels that [`Scene::core`] samples.
 const CORE_SAMPLE: usize = 4096;
 
-/// One in so many sampled surfels may lie beyond each side of the core.
+/// One in this many sampled surfels may lie beyond each side of the core.
 const CORE_CUT: usize = 64;
 
 /// An axis-aligned box in world units; a scene's is relative to [`Scene::origin`].
@@ -137,7 +137,7 @@ impl Bounds {
         if point.is_finite() { Self { min: self.min.min(point), max: self.max.max(point) } } else { self }
     }
 
-    /// The bounding box of the finite ones of `points`.
+    /// The bounding box of those `points` that are finite.
     pub fn of(points: impl ParallelIterator<Item = DVec3>) -> Self {
         points.fold(|| Self::EMPTY, Self::with_point).reduce(|| Self::EMPTY, Self::union)
     }
@@ -187,10 +187,11 @@ impl Scene {
     /// The box of the centres and vertices that the default view shows, and the number of points
     /// outside it.
     ///
-    /// The box is in world units relative to [`Scene::origin`]. It leaves out [strays](Self::body),
-    /// and groups of at most 16 points and at most a thousandth of all that lie farther from the
-    /// box of nearly all points, and from all other groups, than a quarter of that box's longest
-    /// edge. For a part of a scene the number is 0.
+    /// The box is in world units relative to [`Scene::origin`]. It leaves out [strays](Self::body)
+    /// and small separate groups. A group is small if it has at most 16 points and at most a
+    /// thousandth of all points. It is separate if it lies farther from the box of nearly all
+    /// points, and from all other groups, than a quarter of that box's longest edge. For a part of
+    /// a scene the number is 0.
     pub fn framed(&self) -> (Bounds, u64) {
         if let Some(whole) = &self.part_of {
             return (whole.framed, 0);
@@ -321,7 +322,7 @@ pub(crate) fn shows(surfel: &Surfel, error: f64) -> bool {
 /// [`Scene::low`] for `surfels` whose exact centres are `center`; empty if f32 centres suffice for
 /// all.
 ///
-/// They suffice for a scene up to 5,000,000 times as wide as its smallest disks.
+/// f32 centres suffice for a scene up to 5,000,000 times as wide as its smallest disks.
 pub(crate) fn low_parts(surfels: &[Surfel], center: impl Fn(usize) -> DVec3 + Sync) -> Vec<[f32; 3]> {
     let low_of = |index: usize| center(index) - DVec3::from_array(surfels[index].center.map(f64::from));
     if !(0..surfels.len()).into_par_iter().any(|index| shows(&surfels[index], low_of(index).abs().max_element())) {

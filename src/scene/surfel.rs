@@ -44,9 +44,9 @@ impl Surfel {
         // In f64, squares of products of f32 values neither overflow nor vanish.
         if s.dot(t).powi(2) > ROUNDING * ROUNDING * s.length_squared() * t.length_squared() {
             // (cos a, sin a) and (-sin a, cos a) are perpendicular in (u, v), so they give the same
-            // ellipse with the same s x t. For this a their images are perpendicular too, the first
-            // one the longer. The second is computed from s x t: as t cos a - s sin a it would be
-            // lost to rounding if it is much shorter.
+            // ellipse with the same s x t. For the angle a below their images are perpendicular
+            // too, and the first is the longer one. The second is computed from s x t: as t cos a -
+            // s sin a it would be lost to rounding if it is much shorter.
             let normal = s.cross(t);
             let angle = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
             s = s * angle.cos() + t * angle.sin();

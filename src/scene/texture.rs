@@ -115,7 +115,7 @@ pub(crate) fn straight([r, g, b, a]: [f64; 4]) -> [f32; 4] {
     if a > 0.0 { [r / a, g / a, b / a, a].map(|c| c as f32) } else { [0.0; 4] }
 }
 
-/// The smallest reach that is used, as a fraction of the coordinates' range. The square of a
+/// The smallest reach that is used, as a fraction of the span of the coordinates. The square of a
 /// smaller reach would be lost in the rounding of f32 means.
 const LEAST_REACH: f64 = 1.0 / 128.0;
 
@@ -134,7 +134,7 @@ pub struct Place {
     pub reach: f32,
 }
 
-/// Textured surfels: the texture is looked up once per pixel, not once per surfel, so it shows
+/// Textured surfels. The texture is looked up once per pixel, not once per surfel, so it shows
 /// detail that is finer than surfels.
 ///
 /// The lookup is at the weighted mean of the texture coordinates of the pixel's fragments (the TexZ
@@ -147,17 +147,17 @@ pub struct Place {
 /// ([`Atlas`]). The mean of their coordinates is then unrelated to either part. Therefore each
 /// surfel also has the mean colour of the texture over its disk, and a *reach*. A pixel takes the
 /// colour of the texture if the variance of its fragments' coordinates is at most
-/// `mean of reach^2`, the blend of the mean colours if it is more than twice that, and interpolates
-/// linearly in between. The lookup is filtered to the area that the pixel covers in the texture,
-/// averaged over its fragments ([`Mipmap`]).
+/// `mean of reach^2`. If the variance is at least twice that, it takes the blend of the mean
+/// colours. In between it interpolates linearly. The lookup is filtered to the area that the pixel
+/// covers in the texture, averaged over its fragments ([`Mipmap`]).
 ///
 /// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its
-/// range. Coordinates err by e times their span, so a colour errs by that times the steepest slope
-/// of the interpolated texture (the largest difference of neighbouring texels times the texels per
-/// unit). The covered area of the texture errs by e: where terms have 24 bits, a pixel that covers
-/// less than a few millionths of the texture may be looked up one or two levels too fine. The
-/// variance errs by less than `3 e span^2`, so the texture's share of an interpolated pixel errs by
-/// `3 e span^2 / mean of reach^2`, which the smallest reach keeps below `5e4 e`.
+/// range. Coordinates err by e times their span, so a colour errs by this error times the steepest
+/// slope of the interpolated texture (the largest difference of neighbouring texels times the
+/// texels per unit). The covered area of the texture errs by e: where terms have 24 bits, a pixel
+/// that covers less than a few millionths of the texture may be looked up one or two levels too
+/// fine. The variance errs by less than `3 e span^2`, so the texture's share of an interpolated
+/// pixel errs by `3 e span^2 / mean of reach^2`, which the smallest reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {
     mipmaps: Arc<[Mipmap]>,
@@ -269,8 +269,8 @@ impl Textured {
     ///
     /// They are the coordinates (u, v) relative to the middle of their range, `u^2 + v^2` and the
     /// squared reach, all in units of the range's span; then `part`, the part of the texture that
-    /// the pixel covers, unchanged. Coordinates beyond the range, which fragments outside the disk
-    /// may have under a low-pass filter, become those of its end.
+    /// the pixel covers, unchanged. Fragments outside the disk, which a low-pass filter may draw,
+    /// can have coordinates beyond the range; these are clamped to its end.
     pub fn terms(&self, index: usize, step: DVec3, part: f64) -> [f64; 5] {
         let PlaceRange { middle, span, .. } = self.range;
         let Place { center, slopes, reach, .. } = self.places[index];

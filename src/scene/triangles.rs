@@ -30,7 +30,7 @@ pub struct Triangle {
 /// Triangles in an order that depends on their set alone: by the Morton codes of their vertices,
 /// then by all other bits.
 ///
-/// A triangle's index is therefore its rank where two triangles have the same depth.
+/// Where two triangles have the same depth, their indices therefore decide which one shows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
     vertices: Vec<[f32; 3]>,
@@ -133,8 +133,8 @@ impl Triangles {
         }
     }
 
-    /// The largest error, world units, of a coordinate stored as two f32, among triangles for which
-    /// it exceeds 1/256 of their width; None if there are none.
+    /// The largest error of a coordinate stored as two f32, world units. Only triangles count for
+    /// which it exceeds 1/256 of their width; None if there are none.
     pub fn rounding(triangles: &[Triangle]) -> Option<f64> {
         let error = |triangle: &Triangle| shown_error(triangle.corners, doubled, LEAST_TOLD);
         triangles.par_iter().filter_map(error).reduce_with(f64::max)
@@ -349,7 +349,7 @@ mod tests {
             let most = error.into_iter().fold(0.0, f64::max);
             assert!(most <= if doubled { 2e-15 } else { 6e-8 } * (far + 1.0), "{far} {most}");
         }
-        // Exact in f32; and one distant triangle among many near the origin.
+        // Corners that are exact in f32, then one distant triangle among many near the origin.
         assert!(!kept([[16_777_216.0, 0.0, 0.0], [16_777_218.0, 0.0, 0.0], [16_777_216.0, 1.0, 0.0]]).1);
         let far = Triangle { corners: near.map(|corner| corner.map(|x| x + 1e7)), ..triangle(0) };
         let all: Vec<_> = (0..100).map(triangle).chain([far]).collect();
@@ -363,8 +363,8 @@ mod tests {
             assert_eq!(kept(tip).0.len(), 3, "{long}");
             assert_eq!(kept(tip.map(|[x, y, z]| [z, x, y])).0.len(), 3, "{long}");
         }
-        // Oblique needles: two f32 resolve the first, and the second is a line. Of those in
-        // `rounding`, the narrower one is resolved in part.
+        // Oblique needles: two f32 resolve the first, and the second is a line. `rounding` tries
+        // two widths, of which the narrower is resolved only in part.
         let aslant = |width: f64| kept([[0.0, 0.0, 0.0], [1e6, 1e6, 1e6], [1e6, 1e6 + width, 1e6]]);
         assert_eq!([aslant(1e-6), aslant(0.0)].map(|(places, _)| places.len()), [3, 0]);
         let rounding = |width: f64| {

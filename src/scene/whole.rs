@@ -64,8 +64,8 @@ impl LevelFacts {
     /// The facts with one more node.
     fn with(self, node: &Node) -> Self {
         let radius = node.surfel.radius();
-        // A cap is at most half the sum of its heights high, up to f32 rounding. This bound saves
-        // the square root for most nodes.
+        // A cap's height is at most half the sum of its coefficients' magnitudes, up to f32
+        // rounding. This bound saves the square root for most nodes.
         let most = f64::from(radius) + 0.500_001 * node.cap.0.iter().map(|height| f64::from(height.abs())).sum::<f64>();
         let may_be_largest = most > f64::from(self.largest_radius);
         let highest = if may_be_largest { node.cap.highest() as f32 } else { 0.0 };
@@ -76,7 +76,7 @@ impl LevelFacts {
         })
     }
 
-    /// The facts about the nodes of both.
+    /// The facts about the nodes of `self` and of `other` together.
     #[must_use]
     pub fn both(self, other: Self) -> Self {
         Self {
@@ -87,7 +87,7 @@ impl LevelFacts {
     }
 }
 
-/// Flags for the lists of a scene that may be empty.
+/// Whether each optional list of a scene has entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Has {
     /// [`Scene::low`].
@@ -101,8 +101,8 @@ pub struct Has {
 }
 
 impl Scene {
-    /// The lists that the scene has. A part of a scene has those of the whole, even where it holds
-    /// no surfel and they are empty.
+    /// The lists that the scene has. For a part of a scene they are those of the whole scene, even
+    /// if the part's own lists are empty.
     pub fn has(&self) -> Has {
         let own = Has {
             low: !self.low.is_empty(),

@@ -1,5 +1,5 @@
-//! The files of a scene: folders stand for their files, and parts that cannot be read are left out
-//! with a note.
+//! The files of a scene. A folder stands for the files in it, and parts that cannot be read are
+//! left out with a note.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions};
 use crate::options::{FormatOptions, InputOptions};
 use crate::progress::Progress;
 
-/// Most unreadable files of folders that a note names.
+/// The most unreadable files of folders that a note names.
 const MOST_NAMED: usize = 8;
 
 /// The input files of a scene, and how they are read.
@@ -53,7 +53,7 @@ impl Files {
         Ok(files)
     }
 
-    /// The files, with those of folders.
+    /// The paths of all files, including those found in folders.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
@@ -63,7 +63,7 @@ impl Files {
         &self.options
     }
 
-    /// Returns an [`Error::EmptyScene`] with the name of the file if there is exactly one.
+    /// Adds the file's name to an [`Error::EmptyScene`] if there is exactly one file.
     pub fn named(&self, error: Error) -> Error {
         error.of_inputs(&self.paths)
     }
@@ -104,7 +104,8 @@ impl Files {
         Ok((all, (count > 0).then_some(sentence)))
     }
 
-    /// Opens a regular file; None for standard input and the like, where no part can be sought.
+    /// Opens a regular file. Returns None for standard input and other paths in which no position
+    /// can be sought.
     fn seekable(&self, path: &Path) -> Result<Option<Input>> {
         let is_file = path.is_file() && path != Path::new("-");
         is_file.then(|| Input::open(path, self.options.file.input_format)).transpose()
@@ -128,8 +129,8 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if a file cannot be read like this, for example because it is not binary
-    /// PLY.
+    /// [`Error::Usage`] if a file cannot be read piece by piece, for example because it is not
+    /// binary PLY.
     pub fn rows(&self, progress: &dyn Progress) -> Result<Vec<Rows>> {
         let open = |path: &Path| {
             let input = self.seekable(path)?;
@@ -234,7 +235,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
 /// Fails if opacities of classes are given and none of the inputs has classes.
 fn check_classes(options: &InputOptions, inputs: &[Points]) -> Result<()> {
     let plain = options.class_opacity.is_none_or(|opacities| opacities.are_plain());
-    // An input without points may be a LAS file: only inputs with points show what is missing.
+    // An input without points may be a LAS file, so it does not show that classes are missing.
     let none = inputs.iter().all(|input| input.classes.is_empty() && !input.positions.is_empty());
     if plain || !none {
         return Ok(());

@@ -23,7 +23,7 @@ pub(super) enum Parts {
 /// The part of the inputs that a picture needs, as a scene.
 pub(super) struct Part {
     pub made: Made,
-    /// Settings to draw it with: without levels of detail if the part is to be drawn whole.
+    /// Settings to draw the scene with: without levels of detail if all of it is to be drawn.
     pub settings: Settings,
     pub read: ReadReport,
 }

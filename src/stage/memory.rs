@@ -1,4 +1,4 @@
-//! A limit of host and device memory together.
+//! The limit of `--memory` on host and device memory together.
 
 use crate::error::{Error, Result};
 use crate::frame::pixel_bytes;
@@ -6,7 +6,7 @@ use crate::plan::Settings;
 use crate::scene::{Camera, Composite};
 use crate::surfels::part::Taken;
 
-/// Buffer size limit with a limit of memory, bytes: that of the smallest devices. Images are
+/// Largest buffer when memory is limited, bytes: what the smallest devices allow. Images are
 /// rendered in bands that fit.
 pub(super) const BUFFER: u64 = 128 << 20;
 
@@ -18,11 +18,11 @@ const PROGRAM: u64 = 320 << 20;
 /// Memory of the fragment lists of transparent pictures, bytes: three buffers.
 const LISTS: u64 = 3 * BUFFER;
 
-/// Memory of each node and surfel that is read, bytes: in the host's scene, the device's tree, the
-/// cut, and as a splat.
+/// Memory per node or surfel that is read, bytes. It covers the host's scene, the device's tree,
+/// the cut and the splat.
 ///
-/// At most 330 were measured, with nearly all of them drawn. That was before rows of nodes stored
-/// their centres, 24 bytes more on host and device.
+/// At most 330 bytes were measured, with nearly all nodes and surfels drawn. Since then each node
+/// also stores its centre, which takes 24 bytes more on host and device.
 const RECORD: u64 = 400;
 
 /// The memory limit of a picture, bytes.
@@ -33,7 +33,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Returns the limit `most` for the picture of `camera` with `settings`.
+    /// Returns the limit of `most` bytes for the picture of `camera` with `settings`.
     ///
     /// `frames` is the number of frames in memory at once.
     ///
@@ -53,7 +53,7 @@ impl Memory {
         )))
     }
 
-    /// Checks that so many nodes and surfels fit into the limit.
+    /// Checks that the `taken` nodes and surfels fit into the limit.
     ///
     /// # Errors
     /// [`Error::Usage`] if they do not.

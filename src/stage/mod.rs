@@ -1,5 +1,4 @@
-//! From files and options to pictures: what the command line, studies and callers of the library
-//! share.
+//! Makes pictures from files and options, for the command line, studies and callers of the library.
 //!
 //! ```text
 //! Scene::open    lists the files; nothing is read yet
@@ -36,8 +35,8 @@ use crate::progress::Progress;
 
 /// Files, or points in memory, that [`Renderer`]s draw.
 ///
-/// A clone shares all data. Surfels that were made for one renderer are used again for the next,
-/// unless its options ask for others.
+/// A clone shares all data. Surfels that were made for one renderer are reused for the next, unless
+/// the next one's options need different surfels.
 #[derive(Clone)]
 pub struct Scene(Arc<Inputs>);
 
@@ -48,13 +47,13 @@ struct Inputs {
     /// Points that are in memory, in place of files.
     given: Vec<Points>,
     options: SceneOptions,
-    /// The surfels and triangles that were made last.
+    /// The surfels and triangles that were made last, and the choices that they depend on.
     made: Mutex<Option<(Making, Arc<Whole>)>>,
-    /// Standard input is read, and at its end.
+    /// Standard input was read to its end.
     pipe_read: AtomicBool,
 }
 
-/// Passes progress on and keeps the notes.
+/// Forwards progress and stores the notes.
 struct Noted<'a> {
     progress: &'a dyn Progress,
     notes: Mutex<Vec<String>>,
@@ -82,8 +81,8 @@ impl Progress for Noted<'_> {
 impl Scene {
     /// Opens files and folders, which together make one scene. The path `-` is standard input.
     ///
-    /// The files are read when a [`Renderer`] needs them, and of files with levels of detail only
-    /// the parts that a view needs.
+    /// The files are read when a [`Renderer`] needs them. Files with levels of detail are read only
+    /// as far as a view needs them.
     ///
     /// # Errors
     ///
@@ -92,7 +91,7 @@ impl Scene {
         Self::of_files(Files::new(paths, &options.input)?, options)
     }
 
-    /// Makes a scene of files that are listed already; they say how they are read.
+    /// Makes a scene of files that are listed already, with the options for reading them.
     ///
     /// # Errors
     ///
@@ -104,18 +103,19 @@ impl Scene {
         Ok(Self(Arc::new(Inputs { files, options: options.clone(), ..Inputs::default() })))
     }
 
-    /// Makes a scene of points in memory. They stay there, beside the surfels that replace them.
+    /// Makes a scene of points in memory. The points stay in memory in addition to the surfels made
+    /// of them.
     pub fn from_points(points: Vec<Points>, options: &SceneOptions) -> Self {
         Self(Arc::new(Inputs { given: points, options: options.clone(), ..Inputs::default() }))
     }
 
-    /// The files of the scene, with those of folders.
+    /// The files of the scene, including those found in folders.
     pub fn files(&self) -> &Files {
         &self.0.files
     }
 }
 
-/// A picture of a scene as it was asked for; the view apart.
+/// A request for pictures of a scene: everything except the view.
 #[derive(Clone, Copy)]
 struct Request<'a> {
     scene: &'a Inputs,
@@ -138,12 +138,12 @@ impl Request<'_> {
         &self.scene.options.triangles
     }
 
-    /// The backend, or None for the best that there is.
+    /// The backend, or None for the best available one.
     fn backend(&self) -> Option<BackendName> {
         self.device.backend.0
     }
 
-    /// Whether the f64 twins render by choice.
+    /// Whether the f64 reference was chosen as the backend.
     fn is_reference(&self) -> bool {
         self.backend() == Some(BackendName::Reference)
     }
@@ -169,8 +169,8 @@ impl Request<'_> {
         Ok(())
     }
 
-    /// Returns the surfels and triangles of all inputs, as they were made before if the same are
-    /// needed. Other renderers of the scene wait meanwhile.
+    /// Returns the surfels and triangles of all inputs. Those that were made last are returned
+    /// again if the choices are the same. Other renderers of the scene wait meanwhile.
     fn whole(&self, progress: &dyn Progress) -> Result<Arc<Whole>> {
         let making = Making::of(self);
         let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
@@ -181,7 +181,7 @@ impl Request<'_> {
             whole.notes.iter().for_each(|line| progress.note(line));
             return Ok(whole.clone());
         }
-        // The memory of what was made before is needed for what is made now.
+        // Frees the previous surfels first, as making new ones needs the memory.
         *made = None;
         let noted = Noted { progress, notes: Mutex::default() };
         let (scene, preparation) = whole::scene(self, &noted)?;
@@ -191,7 +191,7 @@ impl Request<'_> {
         Ok(whole)
     }
 
-    /// Returns the same surfels and triangles with levels of detail, which later renderers use too.
+    /// Builds levels of detail for `whole`, and keeps the result for later renderers.
     fn with_levels(&self, whole: Arc<Whole>, progress: &dyn Progress) -> Result<Arc<Whole>> {
         let making = Making::of(self);
         let mut made = self.scene.made.lock().unwrap_or_else(PoisonError::into_inner);
@@ -202,7 +202,7 @@ impl Request<'_> {
         {
             return Ok(whole.clone());
         }
-        // Surfels that nobody else draws are not copied.
+        // Without this reference, surfels that no other renderer uses are moved instead of copied.
         *made = None;
         let Whole { scene, preparation, notes } = Arc::unwrap_or_clone(whole);
         let scene = levels::made(Arc::unwrap_or_clone(scene), progress)?;

@@ -24,7 +24,7 @@ pub(super) struct Octrees {
 }
 
 impl Octrees {
-    /// Opens the inputs if they can be read in part: if all of them are COPC files.
+    /// Opens the inputs if they can be read in part, that is, if all of them are COPC files.
     ///
     /// Returns None if an option needs all points: `--outliers`, `--surfel-size` or `--triangles`.
     ///
@@ -84,7 +84,7 @@ impl Octrees {
         let bounds = self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds));
         let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
         let thinned: Vec<Thinned> = thinned.collect();
-        // Where files overlap, their points lie between each other's: the largest fraction is used.
+        // Where files overlap, their points are interleaved, so the largest fraction is used.
         let part = |place| thinned.iter().filter_map(|octree| octree.part_of_size(place)).reduce(f64::max);
         borders::end_at(scene, &bounds, |place| part(place).unwrap_or(1.0));
     }

@@ -14,8 +14,8 @@ use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
 use crate::scene::{self, Bounds, Camera, KernelFaults};
 
-/// Renders views of a scene with the same options. All that views share is kept from one to the
-/// next: surfels, buffers and compiled kernels.
+/// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
+/// from one view to the next.
 pub struct Renderer {
     inputs: Arc<Inputs>,
     options: RenderOptions,
@@ -24,11 +24,11 @@ pub struct Renderer {
     settings: Settings,
     backend: Arc<Backend>,
     drawn: Drawn,
-    /// Frames in memory at once, for a limit of memory.
+    /// Number of frames in memory at once, which counts against the limit of memory.
     frames: u64,
 }
 
-/// The scene of all views.
+/// The data that views are drawn from.
 enum Drawn {
     /// Surfels and triangles that all views share.
     Whole {
@@ -39,7 +39,7 @@ enum Drawn {
     /// Files of which each view reads a part.
     Parts {
         parts: Box<Parts>,
-        /// The notes of a first view were given: those of the next would be the same.
+        /// Whether the notes of the first view were given; later views would repeat them.
         noted: bool,
     },
 }
@@ -51,24 +51,24 @@ pub struct Picture {
     pub frame: Frame,
     /// Times and counts.
     pub report: Report,
-    /// The camera, complete with the scene's values.
+    /// The camera, with values from the scene filled in.
     pub camera: Camera,
-    /// The camera as options that give it again.
+    /// The camera as the options that reproduce it.
     pub view: ViewReport,
     /// Counts of what was read for this view; None if the inputs were read whole.
     pub read: Option<ReadReport>,
-    /// Why nothing is seen, if nothing is.
+    /// Why nothing is visible; None if something is.
     pub unseen: Option<Unseen>,
 }
 
 impl Renderer {
     /// Makes a renderer of `scene`: checks the options, opens the device, and reads and prepares
-    /// all that its views share. What a user should know is given to [`Progress::note`].
+    /// all that its views share. Notes for the user go to [`Progress::note`].
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if the options do not go together or do not suit the scene,
-    /// [`Error::NoAdapter`] if there is none that the device options name, and errors of reading.
+    /// [`Error::Usage`] if the options cannot be combined or do not suit the scene,
+    /// [`Error::NoAdapter`] if no adapter fits the device options, and errors of reading.
     pub fn new(
         scene: &Scene,
         options: &RenderOptions,
@@ -118,7 +118,7 @@ impl Renderer {
         Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
     }
 
-    /// Fails for options that do not go together, before any input is read.
+    /// Rejects options that cannot be combined, before any input is read.
     ///
     /// # Errors
     ///
@@ -128,14 +128,14 @@ impl Renderer {
         Request { scene: &inputs, options, device, views: false }.settings().map(drop)
     }
 
-    /// Sets how many frames the caller has in memory at once, which counts against a limit of
-    /// memory: 1 by default.
+    /// Sets how many frames the caller has in memory at once (1 by default). They count against the
+    /// limit of memory.
     #[must_use]
     pub fn with_frames(self, frames: u64) -> Self {
         Self { frames, ..self }
     }
 
-    /// The maps, filters and all else that the options and the scene decided.
+    /// The settings that the options and the scene resolve to.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -145,8 +145,8 @@ impl Renderer {
         &self.backend
     }
 
-    /// The box of what is drawn, world coordinates; of files that are read in part it is the box of
-    /// the coarsest nodes' centres.
+    /// The box of the scene's centres, world coordinates. If files are read in part, it is the box
+    /// of the overview, which is made from the coarsest nodes.
     pub fn bounds(&self) -> Bounds {
         let scene = self.scene();
         let Bounds { min, max } = scene.bounds();
@@ -161,7 +161,7 @@ impl Renderer {
         }
     }
 
-    /// Returns the camera of a view, complete with the scene's values.
+    /// Returns the camera of a view, with values from the scene filled in.
     ///
     /// # Errors
     ///
@@ -174,8 +174,8 @@ impl Renderer {
     ///
     /// # Errors
     ///
-    /// [`Error::Limit`] if a limit of the adapter is too small, [`Error::Usage`] if a limit of
-    /// memory is, and errors of reading and of the device.
+    /// [`Error::Limit`] if a limit of the adapter is too small, [`Error::Usage`] if the limit of
+    /// memory is too small, and errors of reading and of the device.
     pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
@@ -219,7 +219,7 @@ impl Renderer {
 ///
 /// # Errors
 ///
-/// [`Error::NoAdapter`] if there is none that the options name.
+/// [`Error::NoAdapter`] if no adapter fits the options.
 fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result<Backend> {
     if device.backend.0 == Some(BackendName::Reference) {
         if device.adapter.is_some() {
@@ -260,7 +260,7 @@ fn whole(
     Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
 }
 
-/// Puts a rendered frame together with what is known of it.
+/// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
 fn picture(
     scene: &scene::Scene,
     settings: &Settings,

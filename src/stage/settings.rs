@@ -8,10 +8,10 @@ use crate::progress::Progress;
 use crate::scene::{Blend, Colors, Composite, Scene};
 
 impl Request<'_> {
-    /// Returns the settings of a scene that has no Gaussians, before anything is read.
+    /// Returns the settings before any input is read, as if the scene had no Gaussians.
     ///
     /// # Errors
-    /// [`Error::Usage`] for options that do not go together.
+    /// [`Error::Usage`] for options that cannot be combined.
     pub fn settings(&self) -> Result<Settings> {
         let settings = self.settled(false)?;
         if self.surfels().textures.is_empty() {
@@ -20,8 +20,8 @@ impl Request<'_> {
         if self.options.points.facing.is_some() {
             return Err(Error::Usage("--facing leaves points no plane to paint: leave it or --texture out".into()));
         }
-        // In transparent pictures surfels have their texture's mean colour (whole.rs), so that the
-        // check is that of an opaque picture.
+        // In transparent pictures each surfel takes its texture's mean colour (whole.rs), so the
+        // check is made as if the picture were opaque.
         let opaque = Settings { composite: Composite::Opaque, ..settings.clone() };
         check::textured(&opaque, self.is_reference())?;
         Ok(settings)

@@ -23,7 +23,7 @@ const OVERVIEW: u32 = 50_000;
 /// A file of `epsplat lod` that is the only input.
 pub(super) struct Tree {
     levels: Levels,
-    /// Points at the centres of its coarsest nodes.
+    /// Points at the centres of the file's coarsest nodes.
     pub overview: Scene,
 }
 
@@ -60,8 +60,8 @@ impl Tree {
         let nodes: Vec<Node> = levels.nodes(&rows, |part| part.nodes)?.concat();
         // Leaves, and nodes whose children are not among the read ones.
         let lowest = nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.len());
-        // Points, not disks: nodes reach past the surfels below them, and few of them by more than
-        // the margin of the framed view.
+        // Points instead of disks, as the ellipses of nodes reach past the surfels below them. Few
+        // surfels reach past these points by more than the margin of the framed view.
         let surfels = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
         let overview = Scene { surfels, ..nothing(&levels) };
         Ok(Some(Self { levels, overview }))

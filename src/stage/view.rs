@@ -13,7 +13,7 @@ use crate::options::parse::{up_argument, vector_argument};
 use crate::scene::camera::{DEFAULT_FOV, check_near};
 use crate::scene::{Camera, Lens, Scene, Side, Up};
 
-/// A view: complete but for values from the scene, such as its centre.
+/// A view, complete except for values from the scene, such as the scene's centre.
 ///
 /// `View::default()` shows the whole scene.
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ impl From<Camera> for View {
 }
 
 impl View {
-    /// The size of a picture that nothing gives a size, pixels.
+    /// The default size of a picture, pixels.
     pub const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
 
     /// Returns the view that the options describe.
@@ -86,8 +86,8 @@ impl View {
         Given { size, lens, place, near: options.near }.checked()
     }
 
-    /// Returns the view of a camera of the file at `path`, completed by the options' size and near
-    /// depth. Its size is multiplied by `scale`.
+    /// Returns the view of `file`, a camera that was read from `path`. The options may supply size
+    /// and near depth. The size in the file is multiplied by `scale`.
     ///
     /// # Errors
     /// [`Error::Usage`] if file and options contradict each other or give no camera.
@@ -137,7 +137,7 @@ impl View {
 }
 
 impl Given {
-    /// Checks the view with stand-ins for values from the scene, such as its centre.
+    /// Checks the view with stand-ins for values from the scene, such as the scene's centre.
     ///
     /// Errors thus come before the inputs are read, which may take minutes.
     fn checked(self) -> Result<View> {
@@ -193,13 +193,13 @@ impl Given {
 pub(super) struct Seen {
     /// The point, world coordinates. For a pose of a file it is at the depth of the scene's centre.
     target: DVec3,
-    /// Direction of up as given or as the pose has it; None for the scene's.
+    /// Direction of up from the options or the pose; None for the scene's.
     up: Option<DVec3>,
     by: By,
 }
 
 impl Seen {
-    /// The point that a camera looks at whose rotation and eye are given.
+    /// Returns the point that a camera with known rotation and eye looks at.
     fn of_pose(camera: &Camera, scene: &Scene) -> Self {
         let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(camera.near);
         let target = camera.eye + camera.rotation.row(2) * distance;
@@ -210,7 +210,7 @@ impl Seen {
 /// Source of a view's pose.
 #[derive(Clone, Copy, PartialEq)]
 enum By {
-    /// Framed by the scene, though up may be given.
+    /// The scene decides; only the eye or up may be given.
     Choice,
     /// Eye and target of the options or of a file.
     Arguments,

@@ -37,7 +37,7 @@ pub(super) struct Making {
     /// How surfaces show through each other: [`seen_through`].
     composite: Composite,
     transparent: bool,
-    /// Levels of detail are needed: building them orders surfels anew.
+    /// Levels of detail are needed. Building them reorders the surfels.
     levels: bool,
 }
 

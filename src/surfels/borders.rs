@@ -1,8 +1,8 @@
 //! Clips the disks of a part of a cloud where the whole cloud ends.
 //!
-//! The fewer points of a cloud are used, the larger are their disks, and the farther the disks at
-//! its borders stand out past them. Surveys are cut into tiles, so their clouds end at the faces of
-//! a box, and the files state the box of all their points.
+//! The fewer points of a cloud are used, the larger their disks are, and the farther disks at the
+//! cloud's borders reach past those borders. Surveys are cut into tiles, so their clouds end at the
+//! faces of a box, and the files state the box of all their points.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,16 +13,16 @@ use crate::scene::{Bounds, Clip, Scene, Surfel};
 /// surface that merely touches a face does not end there.
 const MOST_ALONG: f64 = 0.5;
 
-/// A centre counts as inside the box up to this fraction of the disk's reach across the face
-/// outside it. Positions are rounded, in files and in f32, but by less than is visible at the
-/// disk's size.
+/// A centre at most this far outside a face counts as inside the box. The unit is the disk's extent
+/// along the face's normal. Positions are rounded, in files and in f32, but by less than is visible
+/// at the disk's size.
 const ROUNDED: f64 = 1.0 / 128.0;
 
 /// Clips the disks of a part of a cloud near the faces of `bounds`, the box of all its points.
 ///
-/// `bounds` is in world coordinates. `part` returns the radius that a disk of all points would have
-/// at a centre, as a fraction of the radius of the disk there: past a face, disks are kept as far
-/// as a disk of all points around a point on the face would reach. The clip lines lie in the disks'
+/// `bounds` is in world coordinates. `part` takes a centre and returns a ratio of radii there: that
+/// of a disk if all points were used, to that of the actual disk. Past a face, a disk is kept only
+/// as far as the smaller disk of a point on the face would reach. The clip lines lie in the disks'
 /// planes and clip their caps too. A scene that already has clip lines is left unchanged.
 pub fn end_at(scene: &mut Scene, bounds: &Bounds, part: impl Fn(DVec3) -> f64 + Sync) {
     if bounds.is_empty() || !scene.clips.is_empty() {
@@ -82,7 +82,7 @@ mod tests {
         end_at(&mut scene, &bounds(), |_| 0.25);
         // A disk in the middle is not clipped, nor is one whose centre is outside the box.
         assert!(scene.clips[0].is_none() && scene.clips[3].is_none());
-        // Along x, disk 1 reaches 2. It is kept to 1 inside the face and 2 / 4 past it: u <= 0.75.
+        // Along x, disk 1 reaches 2. It is kept 1 up to the face and 2 / 4 past it: u <= 0.75.
         let inside = |surfel: usize, u: f64, v: f64| scene.clips[surfel].inside(u, v);
         assert!(inside(1, 0.749, 0.6) > 0.0 && inside(1, 0.751, 0.0) < 0.0 && inside(1, -1.0, 0.0) > 0.0);
         // At a corner both lines clip: x at 0.5 + 2 / 4 of 2, and y at 0.25 + 1 / 4 of 1.

@@ -1,4 +1,4 @@
-//! Builds the scene that is rendered from points.
+//! Builds a scene from points.
 
 use std::sync::Arc;
 
@@ -32,9 +32,9 @@ pub(super) const LARGEST_PLACE: f32 = 1e4;
 
 /// Builds one scene from the points of all inputs, within the default [`Limits`].
 ///
-/// Surfels keep the order of the points. A point with half-axes becomes that ellipse, one with a
-/// normal and a radius a disk. Missing attributes are estimated from the neighbours among all
-/// points. The result for a point is the same to the bit for any order of the points.
+/// Surfels keep the order of the points. A point with half-axes becomes an ellipse; a point with a
+/// normal and a radius becomes a disk. Missing attributes are estimated from the neighbours among
+/// all points. The result for a point is the same to the bit for any order of the points.
 ///
 /// # Errors
 ///
@@ -54,7 +54,7 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
 /// # Errors
 ///
 /// The errors of [`build`], and [`Error::Usage`] if no input has texture coordinates, or the number
-/// of textures is none of these.
+/// of textures is none of these three.
 pub fn build_textured(
     inputs: Vec<Points>,
     textures: Vec<Texture>,
@@ -136,7 +136,7 @@ pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coordinates {
     /// Coordinates (u, v) at the surfels' centres, origin bottom left, in the common plane of the
-    /// textures; empty for a scene without any.
+    /// textures; empty for a scene without texture coordinates.
     pub centers: Vec<[f32; 2]>,
     /// The gradients of u and of v along x, y and z, per world unit; all zero where they are
     /// unknown.
@@ -225,8 +225,8 @@ fn usable_caps(caps: Vec<Cap>, surfels: &[Surfel]) -> Vec<Cap> {
     if caps.iter().all(Cap::is_flat) { Vec::new() } else { caps }
 }
 
-/// The ellipse with the half-axes `axes` turned into the plane across `normal`: s is projected onto
-/// that plane, and both keep their lengths.
+/// The ellipse with the half-axes `axes` turned into the plane perpendicular to `normal`: s is
+/// projected onto that plane, t follows, and both keep their lengths.
 fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
     let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
     let normal = normal.as_dvec3().normalize();
@@ -235,7 +235,8 @@ fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
     Surfel::ellipse(center, s.as_vec3(), t.as_vec3())
 }
 
-/// A given normal that differs from the half-axes' by less than this angle, radians, equals it.
+/// A given normal counts as equal to the normal of the half-axes if the angle between them is at
+/// most this, radians.
 const LEAST_TURN: f32 = 1e-3;
 
 /// The unit normal of a surfel's plane; +z if it is degenerate.
@@ -243,15 +244,16 @@ pub(super) fn plane_of(surfel: &Surfel) -> Vec3 {
     unit(surfel.normal().to_array()).unwrap_or(Vec3::Z)
 }
 
-/// The given normal of point `i` if it also has half-axes and their normal is another one; else the
-/// normal of the surfel's plane.
+/// The shading normal of point `i`: the given one if the point also has half-axes and their normal
+/// differs, else the normal of the surfel's plane.
 pub(super) fn own_normal(given: &Given<'_>, i: usize, surfel: &Surfel) -> [f32; 3] {
     let normal = given.axes(i).and_then(|_| given.normal(i));
     let plane = plane_of(surfel);
     normal.filter(|normal| normal.angle_between(plane) > LEAST_TURN).unwrap_or(plane).to_array()
 }
 
-/// The normal of each surfel, if any given normal differs from that of its half-axes; else empty.
+/// The shading normals of all surfels, if one of them differs from the normal of its surfel's
+/// plane; else empty.
 fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
     let own = |(i, surfel): (usize, &Surfel)| own_normal(given, i, surfel);
     let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane_of(surfel).to_array();
@@ -262,7 +264,7 @@ fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
     surfels.par_iter().enumerate().map(own).collect()
 }
 
-/// The attributes of points, of which unusable ones count as missing.
+/// The attributes of points. Unusable attributes count as missing.
 pub(super) struct Given<'a>(pub(super) &'a Gathered);
 
 impl Given<'_> {
@@ -332,8 +334,9 @@ impl Estimated {
         self.of_position[self.distinct.of_point()[i] as usize]
     }
 
-    /// The cap of each surfel: the given one, or where the size was estimated, the curvature of the
-    /// surface. `sided` says whether the normals tell its two sides apart.
+    /// The cap of each surfel: the given one, or, where the size was estimated, one with the
+    /// curvature of the surface. `sided` says whether the normals distinguish the surface's two
+    /// sides.
     fn caps(&self, given: &Given<'_>, surfels: &[Surfel], sided: bool) -> Vec<Cap> {
         let of_point = self.distinct.of_point();
         let normals = normals_at(&self.distinct, |i| given.normal(i));
@@ -351,9 +354,9 @@ impl Estimated {
     }
 }
 
-/// Estimates the missing attributes, with the direction of `up` and the largest ratio of a radius
-/// to those of its neighbours. Returns the estimate for each position and the neighbours, and fills
-/// in the counts of `preparation`.
+/// Estimates the missing attributes. `up` is the scene's up direction, and `largest_ratio` limits
+/// the ratio of a radius to the radii of its neighbours. Returns the estimate for each position and
+/// the neighbour graph, and fills in the counts of `preparation`.
 fn estimated(
     given: &Given<'_>,
     distinct: &DistinctPositions,
@@ -393,7 +396,8 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     if extent >= SMALLEST_SCENE && f64::from(largest) <= LARGEST_IN_EXTENTS * extent {
         return Ok(0);
     }
-    // If most disks are larger than the box of their centres, their size is that of the scene.
+    // If most disks are larger than the box of their centres, the median diameter is the scene's
+    // size.
     let typical = estimate::median(&mut surfels.par_iter().map(|surfel| surfel.radius().into()).collect::<Vec<_>>());
     let size = extent.max(2.0 * typical.unwrap_or(0.0));
     if size < SMALLEST_SCENE {
@@ -403,7 +407,7 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     }
     let most = LARGEST_IN_EXTENTS * size;
     let limit = |surfel: &mut Surfel| {
-        // Each half-axis is limited by itself, so that a thin ellipse stays one.
+        // Each half-axis is limited separately, so that a thin ellipse stays thin.
         let shortened = |axis: [f32; 3]| {
             let axis = DVec3::from_array(axis.map(f64::from));
             axis.clamp_length_max(most).as_vec3().to_array()
@@ -415,8 +419,9 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     Ok(surfels.par_iter_mut().map(limit).sum())
 }
 
-/// The largest rounding error of a centre's coordinate, world units, among surfels at whose size it
-/// is visible; None if there are none. `center` returns exact centres relative to the origin.
+/// The largest rounding error of a centre's coordinate, world units, among surfels small enough to
+/// show it; None if no surfel shows its error. `center` returns exact centres relative to the
+/// origin.
 fn rounding(surfels: &[Surfel], low: &[[f32; 3]], center: impl Fn(usize) -> DVec3 + Sync) -> Option<f64> {
     let error = |(index, low): (usize, &[f32; 3])| {
         let surfel = &surfels[index];

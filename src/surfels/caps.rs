@@ -13,8 +13,8 @@ use crate::io::Points;
 use crate::scene::{Bounds, Cap, body};
 use crate::{Progress, Result};
 
-/// The caps of surfels with these `normals` and half-axes; `sided` says whether the normals tell
-/// the two sides of the surface apart.
+/// The caps of surfels with these `normals` and half-axes; `sided` says whether the normals
+/// distinguish the two sides of the surface.
 pub(super) fn caps_of(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     (normals, sided): (&[[f32; 3]], bool),
@@ -29,8 +29,8 @@ pub(super) fn caps_of(
 
 /// Gives points with half-axes the caps of the surface that is tangent to their planes.
 ///
-/// The normals of the half-axes count, not those that the points are lit by. Points without
-/// half-axes are returned unchanged.
+/// The curvature is estimated from the normals of the half-axes, not from the shading normals.
+/// Points without half-axes are returned unchanged.
 ///
 /// # Errors
 ///

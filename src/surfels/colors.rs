@@ -13,9 +13,10 @@ pub(crate) struct ColorGatherer {
 
 struct Input {
     colors: Option<Colors>,
-    /// The number of its points, with or without colours.
+    /// The number of the input's points, with or without colours.
     count: usize,
-    /// The colours are sRGB codes of Gaussians ([`Scene::encoded`](crate::scene::Scene::encoded)).
+    /// The colours are sRGB-encoded, as those of Gaussians are
+    /// ([`Scene::encoded`](crate::scene::Scene::encoded)).
     encoded: bool,
 }
 
@@ -23,7 +24,7 @@ struct Input {
 pub(crate) struct GatheredColors {
     /// None if no input has any.
     pub colors: Option<Colors>,
-    /// The colours are sRGB codes, because those of an input are.
+    /// The colours are sRGB-encoded, because those of at least one input are.
     pub encoded: bool,
     /// The number of unusable colours, which became [`DEFAULT_COLOR`], plus the number of points
     /// with unusable coefficients of harmonics, which became 0.
@@ -33,8 +34,8 @@ pub(crate) struct GatheredColors {
 }
 
 impl ColorGatherer {
-    /// Adds the colours of `count` points, codes if `encoded`. Missing ones become the default,
-    /// surplus ones are ignored.
+    /// Adds the colours of `count` points, sRGB-encoded if `encoded`. Missing colours become the
+    /// default, surplus colours are ignored.
     pub fn append(&mut self, colors: Option<Colors>, count: usize, encoded: bool) {
         self.inputs.push(Input { colors, count, encoded });
     }
@@ -74,8 +75,8 @@ impl ColorGatherer {
 type Terms = (u32, Vec<f32>);
 
 impl Input {
-    /// A colour per point with straight alpha, encoded if the scene's colours are, and the
-    /// coefficients of its harmonics with their degree.
+    /// Returns a colour per point with straight alpha, and the coefficients of the harmonics with
+    /// their degree. Colours are sRGB-encoded if those of `all` are.
     fn linear(self, all: &mut GatheredColors) -> (Vec<[f32; 4]>, Option<Terms>) {
         let (mut colors, terms) = match self.colors {
             None => (Vec::new(), None),

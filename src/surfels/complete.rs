@@ -1,5 +1,5 @@
-//! Builds surfels from points that lack no attribute, as [`build`](super::build()) does, but from
-//! any part of the points by itself.
+//! Builds surfels from points that lack no attribute. The result is that of
+//! [`build`](super::build()), but each part of the points can be built separately.
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -12,12 +12,12 @@ use super::sizes::{Surroundings, surroundings};
 use crate::scene::{Clip, Scene, Surfel};
 use crate::{Progress, Result};
 
-/// The number of neighbours between which gaps are searched. In random samples, 16 neighbours do
-/// not bound the wide gaps; seen aslant, points at other heights shift in between.
+/// The number of neighbours among which gaps are searched. In random samples, 16 neighbours do not
+/// bound wide gaps. In oblique views, points at other heights are projected between the neighbours.
 const NEIGHBOURS: usize = 64;
 
-/// For oblique lines of sight, the cell is only known within this fraction of the radius within
-/// which the neighbours bound it in the plane.
+/// In oblique views, the neighbours bound the cell only within a smaller radius: this fraction of
+/// the radius that holds in the surfel's plane.
 const KNOWN_ASLANT: f64 = 0.7;
 
 /// The least cosine between the normals of two surfels of the same side: 60 degrees.
@@ -53,10 +53,10 @@ pub struct Coverage {
     pub covered: f64,
     /// The number of surfels with an open gap around them.
     ///
-    /// A gap is open if a point between the centre and a corner of its Voronoi cell in the surfel's
-    /// plane is covered neither by a disk at the centre nor by one of the 64 nearest neighbours'.
-    /// Beyond a clip line at which the surface ends, nothing has to be covered. At a ragged
-    /// boundary, such a point may lie outside the surface.
+    /// Gaps are searched in the surfel's plane, between its centre and the corners of its Voronoi
+    /// cell. A gap is open if no disk at the centre and no disk of the 64 nearest neighbours covers
+    /// a point there. Beyond a clip line at which the surface ends, nothing has to be covered. At a
+    /// ragged boundary, such a point may lie outside the surface.
     pub open: u64,
     /// The number of surfels that do not lie on a surface, such as those of leaves and wires. They
     /// are not examined for gaps.
@@ -136,7 +136,7 @@ struct Gaps<'a, 'n, At> {
     distinct: &'a DistinctPositions,
     near: &'n [Neighbour],
     at: At,
-    /// All disks at the position, and then the largest of them.
+    /// All disks at the position, the largest first. `own` is the largest.
     here: &'a [(&'a Surfel, Clip)],
     own: (&'a Surfel, Clip),
     /// From the position to its neighbours, scaled units.
@@ -153,8 +153,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         let own = *here.first()?;
         let offset = |other: &Neighbour| distinct.position(other.index) - distinct.position(position);
         let offsets: Vec<DVec3> = near.iter().map(offset).collect();
-        // The surface ends at the clip lines, unless there is a surfel of the same side beyond
-        // them.
+        // The surface ends at the clip lines, unless a surfel beyond them faces the same side.
         let same_side = |disk: &(&Surfel, Clip)| side(disk).dot(side(&own)) > SAME_SIDE;
         let goes_on = |(other, offset): (&Neighbour, &DVec3)| {
             is_past(own, *offset / distinct.scale()) && at(other.index).iter().any(same_side)
@@ -216,16 +215,17 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         })
     }
 
-    /// Whether a line of sight along `sight`, a unit vector, passes all disks at a corner of the
-    /// cell in the image.
+    /// Whether a line of sight through a corner of the cell in the image misses all disks. `sight`
+    /// is the unit vector along it.
     ///
-    /// For this cell, the neighbours are projected along the line of sight into the own disk's
-    /// plane. Only corners count that lie among surfels that face the eye; others may lie past an
-    /// outline.
+    /// This cell is the Voronoi cell among the neighbours that face the eye, projected along the
+    /// line of sight into the own disk's plane. Corners that do not lie among them may lie past an
+    /// outline and are left out.
     fn is_open_along(&self, sight: DVec3) -> bool {
         let scale = self.distinct.scale();
         let into_plane = |offset: DVec3| offset - sight * (offset.dot(self.normal) / sight.dot(self.normal));
-        // The sign of normals may be arbitrary, so each is taken on the side of the own one.
+        // The sign of normals may be arbitrary, so each normal is flipped to the side of the own
+        // disk's normal.
         let faces = |normal: DVec3| normal.dot(sight) * normal.dot(self.normal).signum() > EDGE_ON;
         let facing = |other: &Neighbour| (self.at)(other.index).iter().any(|disk| faces(side(disk)));
         let seen = self.near.iter().zip(&self.offsets).filter(|(other, _)| facing(other));
@@ -331,8 +331,8 @@ mod tests {
             };
             coverage(&build(vec![points], &()).unwrap().0, &()).unwrap().unwrap()
         };
-        // Disks close a grid if their radius is half the diagonal of its squares; its rim is no
-        // gap.
+        // Disks close a grid if their radius is half the diagonal of the grid's squares. The rim of
+        // the grid is no gap.
         let (small, large) = (of_radius(0.0705), of_radius(0.0709));
         assert!((small.spacing - 0.1).abs() < 1e-6, "{small:?}");
         assert_eq!((small.covered, small.open), (0.0, 2500));

@@ -13,38 +13,38 @@ use crate::scene::Clip;
 /// degrees. Rough surfaces have many creases of smaller angles.
 pub(super) const SHARP: f64 = 0.5;
 
-/// A crease is at least this fraction of the points' distance away from either point, so that no
-/// cell is empty.
+/// The least distance of a crease from either of its points, as a fraction of the distance between
+/// the points. It keeps cells from being empty.
 pub(super) const NARROWEST: f64 = 0.01;
 
 /// Below this sine of the angle between two planes, rounding and noise decide where they meet: 3
 /// degrees.
 const LEAST_SINE: f64 = 0.05;
 
-/// A point is too far away for a crease beyond this many radii of the surfel.
+/// The largest distance between two points with a crease, in radii of the surfel.
 const REACH: f64 = 5.0;
 
 /// Two points lie on one smooth piece of the surface if the cosine between their normals is larger
 /// than this: 30 degrees.
 pub(super) const SMOOTH: f64 = 0.866_025_403_784_438_6;
 
-/// A surfel is clipped only where it stands out past an edge by more than this many times the
-/// largest distance of the neighbours on its own side from its plane.
+/// A surfel is clipped only where it reaches past an edge by more than this many times the
+/// roughness: the largest distance from its plane among the neighbours on its own side of the edge.
 const ROUGH: f64 = 4.0;
 
 /// A surfel extends past an edge by this distance, on its unit disk.
 const MARGIN: f64 = 0.05;
 
-/// Finds the crease between a point and another one at `offset`: the unit direction toward it in
-/// the point's tangent plane, and its distance. The normals are unit vectors, and `radius` is the
-/// radius of the surfel, or of the smaller one of the two.
+/// Finds the crease between a point and another one at `offset`. Returns the unit direction toward
+/// the crease in the point's tangent plane, and the distance to it. The normals are unit vectors,
+/// and `radius` is the radius of the point's surfel, or of the smaller one of both surfels.
 ///
 /// There is a crease if
 ///
 /// - each point lies below the plane of the other, or each above it, and the sum of both distances
 ///   exceeds `least`;
 /// - the points lie across the line where the planes meet, rather than along it;
-/// - the points are within reach of their surfels, which an outlier is not.
+/// - the points are at most `REACH` radii apart, which excludes outliers.
 pub(super) fn crease([normal, other]: [DVec3; 2], offset: DVec3, radius: f64, least: f64) -> Option<(DVec3, f64)> {
     if offset.length() > REACH * radius {
         return None;
@@ -70,7 +70,7 @@ pub(super) fn crease([normal, other]: [DVec3; 2], offset: DVec3, radius: f64, le
 ///
 /// An edge is found only if the normals show it, as those of a drawing or of a sampled mesh do.
 /// Estimated normals are blurred across edges and show none. Where a cloud ends without an edge,
-/// its points do not tell where: clip lines would cut gaps between them.
+/// the points do not show its exact boundary, and clip lines would cut gaps between them.
 pub(super) fn clips(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -93,8 +93,8 @@ pub(super) fn clips(
         let own: Vec<DVec3> =
             others.clone().filter(|(other, _)| other.dot(normal) > SMOOTH).map(|(_, offset)| offset).collect();
         let rough = own.iter().map(|offset| offset.dot(normal).abs()).fold(0.0, f64::max);
-        // The part of the own cell that must be kept, on the unit disk: halfway to the points of
-        // its own side.
+        // The part of the own cell that must be kept, on the unit disk: up to halfway to the points
+        // on the same side of the edge.
         let cell: Vec<DVec2> = own.iter().map(|offset| on_disk(*offset * 0.5)).filter(|p| p.length() < 1.0).collect();
         let line = |(other, offset): (DVec3, DVec3)| {
             let (toward, distance) = crease([normal, other], offset, radius, ROUGH * rough)?;

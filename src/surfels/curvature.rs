@@ -15,8 +15,8 @@ use crate::scene::Cap;
 const ONE_PIECE: f64 = 0.5;
 
 /// The least determinant of the normal equations, as a fraction of their trace cubed. Below it, the
-/// neighbours lie on a line or on one side and do not determine the curvature across it. For
-/// neighbours evenly around the point the fraction is 1/27.
+/// neighbours lie on a line or on one side and do not determine the curvature in all directions.
+/// For neighbours evenly around the point the fraction is 1/27.
 const LEAST_SPREAD: f64 = 1e-3;
 
 /// The surface around a position, given by the positions around it and their normals.
@@ -25,8 +25,8 @@ pub(crate) struct Around<'a, N: Fn(u32) -> DVec3> {
     pub graph: &'a NeighbourGraph,
     /// Returns the unit normal at a position.
     pub normal: N,
-    /// Normals tell the two sides of the surface apart: neighbours whose normals point the other
-    /// way lie on another sheet.
+    /// Whether normals distinguish the two sides of the surface. If they do, neighbours whose
+    /// normals point the other way lie on another sheet.
     pub sided: bool,
 }
 
@@ -43,9 +43,9 @@ impl<N: Fn(u32) -> DVec3> Around<'_, N> {
     }
 }
 
-/// The normal at each position, where points may have none or several. The one with the smallest
-/// bits is taken, so that the result is the same for any order of the points. Empty if no point has
-/// a normal.
+/// Returns the normal at each position; empty if no point has a normal. Among several points'
+/// normals at one position, the one with the smallest bits is taken, so that the order of the
+/// points has no influence.
 pub(crate) fn normals_at(
     distinct: &DistinctPositions,
     given: impl Fn(usize) -> Option<Vec3> + Sync,
@@ -66,23 +66,24 @@ pub(crate) fn normals_at(
 /// Fits the cap of a surfel with the half-axes s and t, whose plane is tangent to the surface, to
 /// the offsets and unit normals of neighbours on the surface. All lengths have the same unit.
 ///
-/// The cap is the paraboloid of least squares in heights and slopes, each relative to the distance.
-/// It is multiplied by the fraction of their squares that it explains: a paraboloid that explains
-/// little would stand out of the surface. It is flat where it would be higher than
+/// A paraboloid is fitted by least squares to the neighbours' heights and slopes, each relative to
+/// the distance. The cap is the paraboloid times the fraction of the squares that it explains,
+/// because a poor fit would stand out of the surface. The cap is flat if it would be higher than
 /// [`Cap::HIGHEST`].
 fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]) -> Cap {
     let normal = s.cross(t).normalize_or_zero();
     let (a, b) = (s / s.length_squared(), t / t.length_squared());
     let near = near.filter(|(offset, other)| is_beside(*offset, normal) && other.dot(normal) > ONE_PIECE);
-    // On the unit disk, with heights in units of the longer half-axis, each neighbour has three
+    // On the unit disk, with heights in units of the longer half-axis, each neighbour gives three
     // equations in the coefficients of uu, uv and vv.
     let unit = s.length().max(t.length());
     let equations = |(offset, other): (DVec3, DVec3)| {
         let (u, v) = (offset.dot(a), offset.dot(b));
         let rise = -other / (other.dot(normal) * unit);
-        // For a curvature of 1, a height is half the squared distance, and a slope is the distance.
-        // Divided by the squared distance and the distance, a height counts a quarter of a slope:
-        // where planes are estimated, a point does not lie on its own.
+        // For a curvature of 1, the height is half the squared distance, and the slope equals the
+        // distance. Heights are divided by the squared distance and slopes by the distance, so
+        // heights have a quarter of the weight. They are less certain, because a point does not lie
+        // on its own estimated plane.
         let (far, farther) = (u.hypot(v).recip(), (u * u + v * v).recip());
         [
             (DVec3::new(0.5 * u * u, u * v, 0.5 * v * v) * farther, offset.dot(normal) / unit * farther),

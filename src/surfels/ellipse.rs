@@ -2,7 +2,7 @@
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-/// Up to this many ellipses are tried as the shape of the one around all of them.
+/// Up to this many ellipses, the shape of each is tried for the ellipse around all of them.
 const MANY: usize = 32;
 
 /// A point q lies inside an ellipse if `q^T S^-1 q` is at most this: 1, plus rounding.
@@ -31,10 +31,10 @@ impl Ellipse {
 
     /// Returns the smallest ellipse that contains all `points` and has half-axes of at least the
     /// length `least`. Where that length limits the shorter half-axis, only some directions are
-    /// tried.
+    /// tried, and the result may be larger.
     ///
-    /// If the smallest ellipse of some points contains the others, it is the smallest of all. So
-    /// points are added one by one, each time the one that lies farthest outside.
+    /// If the smallest ellipse of some points contains the others, it is the smallest ellipse of
+    /// all points. So points are added one by one, each time the point that lies farthest outside.
     pub fn around_points(points: &[DVec2], least: f64) -> Self {
         let mut some = Vec::with_capacity(points.len().min(8));
         loop {
@@ -48,7 +48,7 @@ impl Ellipse {
         }
     }
 
-    /// The same for a few points, by trial.
+    /// The ellipse of [`Self::around_points`] for a few points, by trial.
     ///
     /// An ellipse around the origin that cannot shrink passes through two points that are its
     /// conjugate half-diameters, or through three points; if the points lie on a line, through the
@@ -87,8 +87,8 @@ impl Ellipse {
         (a > 0.0 && shape.determinant() > 0.0).then(|| Self(shape.inverse())).filter(|found| found.0.is_finite())
     }
 
-    /// The ellipse with half-axes of at least the length `least`. If the shorter one is lengthened,
-    /// the other is made as short as `points` permit, in its direction.
+    /// The ellipse with half-axes of at least the length `least`. If the shorter half-axis is
+    /// lengthened, the longer one keeps its direction and becomes as short as `points` permit.
     fn at_least(self, least: f64, points: &[DVec2]) -> Self {
         let [major, minor] = self.half_axes();
         if minor.length() >= least {

@@ -10,16 +10,16 @@ use super::positions::DistinctPositions;
 use super::sizes::{Rough, cell_ellipse, grown, local_limits, lone_radius};
 use crate::Progress;
 
-/// The number of neighbours that a plane is fitted to. Few follow edges and curvature, many average
-/// noise.
+/// The number of neighbours that a plane is fitted to. Fewer neighbours follow edges and curvature
+/// more closely, more neighbours average noise.
 ///
 /// RMS error of the normal in degrees on spheres of random points, for 8, 12, 16 and 24 neighbours:
-/// 200,000 points with radial noise of 0.1 spacings 4.6, 2.8, 2.0, 1.3; with 0.3 spacings 17, 9.2,
-/// 6.3, 4.0; 2,000 points without noise 1.8, 1.5, 1.4, 1.3. Beyond 16, further neighbours gain less
-/// than they lose by rounding edges more widely.
+/// 4.6, 2.8, 2.0, 1.3 (200,000 points with radial noise of 0.1 spacings); 17, 9.2, 6.3, 4.0 (noise
+/// of 0.3 spacings); 1.8, 1.5, 1.4, 1.3 (2,000 points without noise). Beyond 16, further neighbours
+/// gain less than they lose by rounding edges more widely.
 pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
 
-/// A radius is at most this many times the median of the estimated ones, so that sparse noise does
+/// A radius is at most this many times the median of the estimated radii, so that sparse noise does
 /// not hide the scene.
 pub(crate) const LARGEST_MEDIAN_RATIO: f64 = 8.0;
 
@@ -62,7 +62,7 @@ fn at_most(axis: [f32; 3], limit: f64) -> [f32; 3] {
 
 /// The estimates for a set of distinct positions.
 pub(crate) struct Estimates {
-    /// The estimate at each position; the default where none was wanted.
+    /// The estimate at each position; the default where no estimate was wanted.
     pub of_position: Vec<Estimate>,
     /// Median over the wanted positions of the distance to the nearest other position, world units;
     /// None if there is only one position.
@@ -157,8 +157,8 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
 }
 
 /// The direction in which the offsets vary least, in the half-space of the unit vector `up`. For
-/// offsets on a line it is the direction across the line nearest to `up`; if all are equal, it is
-/// `up`.
+/// offsets on a line it is the direction perpendicular to the line that is nearest to `up`; if all
+/// are equal, it is `up`.
 pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
     let largest = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs().max_element()));
     if largest == 0.0 {

@@ -1,10 +1,10 @@
-//! Computes the minimum spanning forest of a graph whose links say whether their ends have the same
-//! sign, and the sign of each node that follows.
+//! Computes the minimum spanning forest of a graph whose links state whether their two ends have
+//! the same sign. The links in the forest determine the sign of each node.
 //!
-//! Borůvka's algorithm: all trees at once take their lightest link to another tree, until there are
-//! none. The order of the links is total (weight, then index), so the forest is unique, whatever
-//! the schedule. Signs are kept relative to the root of the tree, so no tree has to be traversed
-//! afterwards.
+//! Borůvka's algorithm: in each round, every tree takes its lightest link to another tree, until no
+//! such link is left. The order of the links is total (weight, then index), so the forest is
+//! unique, whatever the schedule. Signs are kept relative to the root of the tree, so no tree has
+//! to be traversed afterwards.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

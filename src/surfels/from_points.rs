@@ -40,8 +40,8 @@ pub struct FromPoints {
 }
 
 impl Default for FromPoints {
-    /// Ellipses that hold their points' cells, normals outward, all points, no half-axis longer
-    /// than three times the median of the neighbours'.
+    /// Ellipses that contain the points' cells, with outward normals. No point is left out, and a
+    /// half-axis is at most three times the median of the neighbours' half-axes.
     fn default() -> Self {
         Self {
             size: Size::Knn,
@@ -56,12 +56,13 @@ impl Default for FromPoints {
 #[derive(Clone, Debug)]
 pub struct Surfels {
     /// One surfel for each point that was not left out, in the points' order, with normals and
-    /// radii. There are half-axes too, unless all surfels are disks ([`Size::is_of_disks`]) without
-    /// an edge. Colours and texture coordinates are the given ones.
+    /// radii. There are half-axes too, unless all surfels are disks ([`Size::is_of_disks`]) and
+    /// none ends at an edge. Colours and texture coordinates are the given ones.
     pub points: Points,
     /// The counts that every scene has.
     pub preparation: Preparation,
-    /// The number of connected parts of the surface, each oriented on its own; None if none was.
+    /// The number of connected parts of the surface, each oriented separately; None if no normals
+    /// were propagated.
     pub parts: Option<u64>,
     /// For [`Size::Bsp`], the number of positions whose cluster of three points is collinear; else
     /// 0.
@@ -146,7 +147,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
-    // It is unknown which surfels cover a closed surface.
+    // The cloud counts as not closed, because it is unknown which surfels cover a closed surface.
     let unsided = gathered.points.unsided && preparation.estimated_normals < preparation.surfels;
     let points =
         Points { unsided, normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
@@ -190,9 +191,10 @@ fn longer(axes: &HalfAxes) -> Vec<f32> {
 /// The half-axes of points, and the clip lines at which their surfels end at edges.
 ///
 /// If no surfel ends at an edge, `axes` is returned unchanged. Otherwise ellipses away from edges
-/// keep their half-axes, and so do all of [`Size::Ellipse`]. Cell ellipses ([`Size::Knn`]) at an
-/// edge become disks, because points across the edge do not bound the cell on this side. Disks are
-/// enlarged by [`AT_EDGE`].
+/// keep their half-axes, and so do all ellipses of [`Size::Ellipse`]. Cell ellipses ([`Size::Knn`])
+/// at an edge become disks, because points across the edge do not bound the cell on this side.
+/// Disks are enlarged by [`AT_EDGE`]; for sizes that give disks, this includes disks away from
+/// edges.
 fn cut(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -271,8 +273,8 @@ fn check(options: &FromPoints) -> Result<()> {
     }
 }
 
-/// The usable given normals, of unit length, where those of half-axes take precedence. None if no
-/// input has any.
+/// The usable given normals, of unit length. The normal of half-axes takes precedence. None if no
+/// input has normals or half-axes.
 fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
     let Points { normals, axes, .. } = &gathered.points;
     (normals.is_some() || axes.is_some()).then(|| {

@@ -4,8 +4,8 @@
 //! in any direction, the next point may be far away. A point's Voronoi cell is the part of the
 //! surface that is nearer to it than to any other point, so disks that contain their points' cells
 //! leave no hole. The farthest point of a cell is one of its corners, where three points are
-//! equally far away: the middle of a gap, or beside one. Where the surface ends, a cell has no
-//! corner, so no disk is enlarged for it.
+//! equally far away: the middle of a gap, or beside one. Where the surface ends, the cell is open
+//! and has no such corner, so no disk is enlarged there.
 
 use glam::{DVec2, DVec3};
 
@@ -13,8 +13,8 @@ use glam::{DVec2, DVec3};
 /// cosine: 60 degrees.
 const STEEPEST: f64 = 0.5;
 
-/// Whether a neighbour at `offset` lies beside a point in the plane across the unit vector
-/// `normal`, and not above or below it.
+/// Whether a neighbour at `offset` lies beside a point in its tangent plane, and not above or below
+/// it. `normal` is the plane's unit normal.
 pub(crate) fn is_beside(offset: DVec3, normal: DVec3) -> bool {
     let squared = offset.length_squared();
     squared - offset.dot(normal).powi(2) > STEEPEST * STEEPEST * squared
@@ -31,7 +31,7 @@ struct Corner {
     across: Option<DVec2>,
 }
 
-/// The Voronoi cell of a point in its tangent plane, as far as its neighbours are known.
+/// The Voronoi cell of a point in its tangent plane, bounded by its nearest neighbours.
 pub(crate) struct Cell {
     corners: [Corner; MOST_CORNERS],
     count: usize,
@@ -40,7 +40,7 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// Computes the cell of a point in the plane across the unit vector `normal`.
+    /// Computes the cell of a point in the plane with the unit normal `normal`.
     ///
     /// `offsets` are those of its neighbours, the nearest first. Where no neighbour bounds the
     /// cell, it ends at `reach`, in the unit of the offsets. A cell whose corners are all within
@@ -70,7 +70,7 @@ impl Cell {
     }
 
     /// Cuts off the part that is nearer to `neighbour` than to the point; returns whether there was
-    /// one.
+    /// such a part.
     fn clip(&mut self, neighbour: DVec2) -> bool {
         let half = 0.5 * neighbour.length_squared();
         let beyond = |corner: &Corner| corner.at.dot(neighbour) - half;
@@ -110,7 +110,8 @@ impl Cell {
         self.basis
     }
 
-    /// The corners between two neighbours, as (x, y) in the tangent plane relative to the point.
+    /// The corners where the edges of two neighbours meet, as (x, y) in the tangent plane relative
+    /// to the point. Corners of the initial square are left out.
     pub fn closed(&self) -> impl Iterator<Item = DVec2> {
         let corners = self.corners();
         let before = |k: usize| corners[if k > 0 { k - 1 } else { corners.len() - 1 }].across;
@@ -118,7 +119,7 @@ impl Cell {
         corners.iter().enumerate().filter_map(closed)
     }
 
-    /// The corners between two neighbours, relative to the point.
+    /// The corners of [`Self::closed`] in space, relative to the point.
     pub fn closed_corners(&self) -> impl Iterator<Item = DVec3> {
         let [e1, e2] = self.basis;
         self.closed().map(move |corner| e1 * corner.x + e2 * corner.y)

@@ -10,11 +10,11 @@ use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
 pub(crate) struct Gathered {
-    /// The points. An attribute that only some inputs have is zero, or
-    /// [`Clip::NONE`](crate::scene::Clip::NONE), for the points of the others; one that no input
-    /// has is None. No coordinate is -0.
+    /// The points. If only some inputs have an attribute, it is zero, or
+    /// [`Clip::NONE`](crate::scene::Clip::NONE), for the points of the other inputs. If no input
+    /// has it, it is None. No coordinate is -0.
     pub points: Points,
-    /// The input and point that each comes from.
+    /// The input of each point, and the point's number in that input.
     pub provenance: Provenance,
     /// The counts so far.
     pub preparation: Preparation,

@@ -29,8 +29,8 @@ impl NeighbourGraph {
     /// Finds the `count` nearest neighbours of each `wanted` position, calls `make` with them, and
     /// stores the `kept` nearest.
     ///
-    /// `values` has one value per position: `make` returns the new one. Positions that are not
-    /// wanted keep theirs, and their stored neighbours are meaningless.
+    /// `values` has one value per position, which is replaced by the result of `make`. Positions
+    /// that are not wanted keep their values; their stored neighbours are meaningless.
     pub fn visit<T: Send>(
         (distinct, count, kept): (&DistinctPositions, usize, usize),
         wanted: impl Fn(usize) -> bool + Sync,
@@ -80,8 +80,8 @@ impl NeighbourGraph {
         &self.neighbours[first..first + self.degree]
     }
 
-    /// The links from each position to its `count` nearest neighbours, without direction: each pair
-    /// once, ordered by the position that it starts from.
+    /// The links from each position to its `count` nearest neighbours, as undirected pairs. Each
+    /// pair occurs once, and pairs are ordered by their first position.
     pub fn links(&self, count: usize) -> impl ParallelIterator<Item = (u32, u32)> {
         let near = move |index: u32| &self.of(index)[..count.min(self.degree)];
         let len = self.neighbours.len().checked_div(self.degree).unwrap_or(0);

@@ -1,12 +1,12 @@
 //! Chooses the triangles of a mesh that become surfels (Tien 2008, chapter 5: splats and triangles
 //! in one picture).
 //!
-//! Triangles are exact, but each takes time, however small it is. Surfels as wide as half a pixel,
-//! the spacing of the four samples per pixel that pictures have by default, are as many as the
-//! picture needs. So a triangle becomes surfels if
+//! Triangles are exact, but each takes time, however small it is. Surfels at a spacing of half a
+//! pixel are as many as a picture needs, because its default four samples per pixel have that
+//! spacing. So a triangle becomes surfels if
 //!
 //! 1. the triangles around it have an area of less than [`LARGEST`] square pixels on average: then
-//!    there are at least [`COST`] of them per surfel, which costs about as much;
+//!    each surfel replaces at least [`COST`] triangles, which together cost about as much;
 //! 2. it belongs to a patch of such triangles, joined at edges, of at least [`LEAST_PATCH`] square
 //!    pixels: smaller patches would be mostly rims.
 //!
@@ -137,7 +137,7 @@ pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     let areas: Vec<u64> = corners.iter().map(|corners| units(mesh, *corners, pixel)).collect();
     let sizes = (0..ROUNDS).fold(areas.clone(), |sizes, _| around(&corners, &sizes, mesh.positions.len()));
     let edges = edges(&corners);
-    // Triangles without an area stay, so that whoever draws triangles reports them.
+    // Triangles without an area stay, so that the code that draws triangles reports them.
     let has_area = |corners: &[u32; 3]| area(mesh, *corners) > 0.0;
     let chosen: Vec<bool> = sizes
         .iter()
@@ -177,7 +177,7 @@ fn area(mesh: &Mesh, corners: [u32; 3]) -> f64 {
     if twice.is_finite() { 0.5 * twice } else { 0.0 }
 }
 
-/// For each triangle, the mean over its corners of the mean area of the triangles there.
+/// For each triangle, the mean over its corners of the mean size of the triangles at the corner.
 fn around(corners: &[[u32; 3]], sizes: &[u64], vertices: usize) -> Vec<u64> {
     let mut of_vertex = vec![(0u64, 0u64); vertices];
     for (corners, size) in corners.iter().zip(sizes) {

@@ -1,5 +1,5 @@
-//! Chooses the clip lines of a disk: of all ends of the surface around it, the two that cut off
-//! most.
+//! Chooses the clip lines of a disk: among all ends of the surface around the disk, the two lines
+//! that cut off most.
 
 use glam::DVec2;
 
@@ -8,9 +8,9 @@ use crate::scene::Clip;
 /// The largest number of lines that are considered per disk.
 const MOST: usize = 32;
 
-/// Two lines are the same if the cosine between their directions is larger than the first value, 2
-/// degrees, and their offsets differ by less than the second. Only one of them is considered: an
-/// end has a line for each triangle or point along it.
+/// Two lines count as the same if the cosine between their directions is larger than the first
+/// value, 2 degrees, and their offsets differ by less than the second. Only one of them is
+/// considered, because an end of the surface has a line for each triangle or point along it.
 const SAME: (f64, f64) = (0.9994, 0.02);
 
 /// A line on the unit disk, which keeps the points q with `inward . q >= offset`.
@@ -69,7 +69,7 @@ pub(super) fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
 }
 
 /// Returns the `lines` to consider, each with its data, among those that cut the disk. Lines that
-/// cut off most come first, and of several nearly equal ones only the first remains.
+/// cut off most come first, and of several nearly equal lines only the first remains.
 pub(super) fn apart<T: Copy>(mut lines: Vec<(Line, T)>) -> Vec<(Line, T)> {
     lines.retain(|(line, _)| line.offset > -1.0);
     lines.sort_by(|(a, _), (b, _)| {
@@ -106,7 +106,8 @@ pub(super) fn clip(lines: Vec<Line>) -> Clip {
 /// The number of points, distributed evenly over the unit disk, by which areas are compared.
 const POINTS: u32 = 128;
 
-/// The first best choice, where one line comes before two.
+/// The line or pair of lines that cuts off most. Among equals, single lines come before pairs, and
+/// lower indices first.
 fn best(lines: &[Line]) -> [Option<Line>; 2] {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let point = |k: u32| DVec2::from_angle(golden * f64::from(k)) * ((f64::from(k) + 0.5) / f64::from(POINTS)).sqrt();

@@ -63,8 +63,8 @@ use crate::io::Points;
 use crate::scene::{Bounds, Up};
 
 /// The largest absolute coordinate of a point, world units (in metres, a hundred light years).
-/// Points with larger ones are left out like those that are not finite, because products of f32
-/// lengths would overflow on the way to the image.
+/// Points with larger coordinates are left out like those that are not finite, because products of
+/// f32 lengths would overflow during rendering.
 pub const LARGEST_COORDINATE: f64 = 1e18;
 
 /// The normal with unit length; None if it has no direction.
@@ -136,8 +136,8 @@ fn origin_for(bounds: &Bounds) -> DVec3 {
     )
 }
 
-/// The up axis for inputs whose format does not define one: z if the box is flat in z, as of survey
-/// data, else y, as for models.
+/// The up axis for inputs whose format does not define one: z if the box is flat in z, as in survey
+/// data, else y, as in models.
 fn guess_up(bounds: &Bounds) -> Up {
     let extent = bounds.extent();
     if extent.z < 0.5 * extent.x.min(extent.y) { Up::Z } else { Up::Y }

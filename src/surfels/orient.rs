@@ -18,7 +18,7 @@ pub enum Orientation {
     /// Toward the nearest of these positions, world coordinates, from which the points were
     /// scanned.
     Toward(Vec<DVec3>),
-    /// The half-space of the up axis, as they were estimated.
+    /// Toward the half-space of the up axis, as normals are estimated.
     Up,
 }
 
@@ -30,16 +30,16 @@ const COMPARED: usize = 10;
 /// part. Farther ones only join parts that would otherwise stay separate.
 const NEAREST: usize = 6;
 
-/// A part is a sheet, and not closed, if its mean normal is at least this long: that of half a
-/// sphere is 0.5.
+/// A part is a sheet, and not closed, if its mean normal is longer than this. The mean normal of
+/// half a sphere has the length 0.5.
 const SHEET: f64 = 0.5;
 
 /// A neighbour lies beside a point, and not on another sheet, if the sine of its elevation over the
 /// point's plane is below this.
 const BESIDE: f64 = 0.25;
 
-/// Counts the points whose normal, a unit vector, is opposed to that of the nearest point at
-/// another position, if that lies beside it.
+/// Counts the points whose unit normal is opposed to the normal of the nearest point at another
+/// position, if that point lies beside them on the surface.
 pub(crate) fn opposed(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -58,14 +58,15 @@ pub(crate) fn opposed(
 }
 
 /// Flips `normals` (unit vectors, one per position) so that neighbours agree and the surface faces
-/// outward. Returns the number of its connected parts, each of which is oriented on its own.
+/// outward. Returns the number of connected parts of the surface, each of which is oriented
+/// separately.
 ///
 /// Signs propagate along the minimum spanning forest whose weights are the doubts of [`continued`]:
 /// first over links to the nearest neighbours, and then over links to farther ones that join
 /// separate trees. A part then faces as most of its `given` normals do (pairs of position and
-/// normal). Without any, a sheet that does not stand upright faces `up`. All other parts face
-/// outward where they are outermost, by a vote of the extreme positions in 26 directions, which lie
-/// on the convex hull.
+/// normal). Without given normals, a sheet that does not stand upright faces `up`. All other parts
+/// face outward where they are outermost, by a vote of the extreme positions in 26 directions,
+/// which lie on the convex hull.
 pub(crate) fn propagate(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
@@ -177,8 +178,8 @@ fn outward(
         .collect()
 }
 
-/// Turns each of `normals` toward the nearest of `scanners`; `centers` returns their positions,
-/// world coordinates.
+/// Turns each of `normals` toward the nearest of `scanners`; `centers` returns the position of each
+/// normal, world coordinates.
 pub(crate) fn toward(centers: impl Fn(usize) -> DVec3 + Sync, normals: &mut [[f32; 3]], scanners: &[DVec3]) {
     let faces_away = |index: usize, normal: [f32; 3]| {
         let center = centers(index);

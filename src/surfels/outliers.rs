@@ -11,8 +11,8 @@ use crate::Progress;
 /// Relative tolerance, larger than the rounding error of the mean of all distances.
 const ROUNDING: f64 = 1e-9;
 
-/// Leaves out the points whose distance to their neighbours exceeds the mean by more than this many
-/// standard deviations; returns their number.
+/// Leaves out the points whose mean distance to their neighbours exceeds the mean over all
+/// positions by more than `deviations` standard deviations. Returns the number of these points.
 pub(crate) fn drop_outliers(
     gathered: &mut Gathered,
     distinct: &mut DistinctPositions,
@@ -43,7 +43,8 @@ pub(crate) fn drop_outliers(
 /// all positions plus `deviations` standard deviations (Rusu et al. 2008, "Towards 3D point cloud
 /// based object maps for household environments", section 3.1).
 ///
-/// The mean of equal distances may be rounded to less than them; none of them is an outlier.
+/// Rounding may put the mean of equal distances below each of them. The tolerance [`ROUNDING`]
+/// keeps their positions inliers.
 fn inliers(distances: &[f64], deviations: f64) -> Vec<bool> {
     // Serial sums, so that their rounding is the same for any number of threads.
     let count = distances.len() as f64;

@@ -22,7 +22,7 @@ const MOST: u64 = 1024;
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if the number of textures is none of these, or no input has texture
+/// [`Error::Usage`] if the number of textures is none of these three, or no input has texture
 /// coordinates.
 pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     let bare = bare_inputs(inputs)?;
@@ -92,8 +92,8 @@ pub(super) fn number_together(inputs: &mut [Points]) -> Result<()> {
     Ok(())
 }
 
-/// The largest number of texels of all material images together that surfels are painted with: with
-/// their mipmaps they fit into 128 MiB, which any device can bind.
+/// The largest total number of texels of the material images that surfels are painted with. Images
+/// of this size and their mipmaps fit into 128 MiB, which any device can bind.
 const MOST_TEXELS: u64 = 1 << 24;
 
 /// The images that the materials of inputs name.
@@ -154,7 +154,7 @@ fn own(inputs: &mut [Points]) -> Own {
 }
 
 /// Returns how often images of these sizes are halved until they have at most [`MOST_TEXELS`]
-/// together: always the largest next.
+/// together. Each time, the largest image is halved.
 fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     let mut halvings = vec![0; sizes.len()];
     let texels =
@@ -168,8 +168,8 @@ fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     halvings
 }
 
-/// The surfels of an input in a scene with painted ones: surfels of an input without images have no
-/// texture.
+/// Returns the surfels of an input for a scene in which some inputs are painted. Surfels of an
+/// input without images get no texture.
 fn beside_painted(mut points: Points, has_images: bool) -> Points {
     if !has_images || points.texture_slopes.is_none() {
         let count = points.positions.len();
@@ -205,7 +205,7 @@ pub fn build_painted(
     Ok((scene, Preparation { halved_images: own.halved, ..preparation }))
 }
 
-/// Builds the scene of points that are numbered by `textures`.
+/// Builds the scene of points whose texture numbers are indices of `textures`.
 pub(super) fn painted(
     inputs: Vec<Points>,
     textures: Vec<Arc<Texture>>,

@@ -1,5 +1,5 @@
-//! Reads the part of a file with levels of detail that a picture needs, as a scene whose picture is
-//! that of the whole file, to the bit.
+//! Reads the part of a file with levels of detail that a picture needs. The part is a scene whose
+//! picture equals that of the whole file to the bit.
 //!
 //! The tree is read from the root down, level by level: the children or surfels of a node are read
 //! if the picture may need them. Other nodes become leaves without surfels, so the part is a tree,
@@ -16,9 +16,9 @@ use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::scene::whole::LevelFacts;
 use crate::{Progress, Result};
 
-/// The number of nodes or points that are read at once, which bounds the memory for decoding. For
-/// nodes it is three times as much, because one block is read and another one is appended
-/// meanwhile.
+/// The number of nodes or points that are read at once, which bounds the memory for decoding. While
+/// a block of nodes is decoded, the next block is read and the previous one is appended, so nodes
+/// take three times as much.
 const BLOCK: u32 = 1 << 16;
 
 /// The size of a part of a file.
@@ -28,11 +28,11 @@ pub struct Taken {
     pub nodes: u64,
     /// The number of surfels.
     pub surfels: u64,
-    /// Their size in the file, bytes.
+    /// The size of both in the file, bytes.
     pub bytes: u64,
 }
 
-/// A scene without surfels, with the facts that the file states about all of them.
+/// A scene without surfels, with the facts that the file states about all its surfels.
 pub fn nothing(levels: &Levels) -> Scene {
     let whole = levels.whole;
     let oriented = !levels.unsided;
@@ -74,8 +74,8 @@ pub fn part(
     Ok((scene?, taken))
 }
 
-/// Reads the nodes of a part, whose leaves hold the indices of surfels in the file. Returns them,
-/// the size of the part, and the facts about all its nodes.
+/// Reads the nodes of a part, whose leaves hold the indices of surfels in the file. Returns the
+/// nodes, the size of the part, and the facts about all nodes of the part.
 fn grown(
     levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
@@ -146,7 +146,7 @@ struct Below {
     numbers: Vec<Range<u32>>,
     /// The indices of further children are at least this.
     reached: u32,
-    /// The index in the part of the next child.
+    /// The index that the next child gets in the part.
     place: u32,
     /// The number of surfels of the divided leaves.
     surfels: u64,
@@ -207,8 +207,8 @@ fn push(ranges: &mut Vec<Range<u32>>, next: Range<u32>) {
     }
 }
 
-/// Returns the indices in the file of the leaves' surfels from left to right, and replaces them by
-/// indices in the part. None if they do not ascend.
+/// Returns the indices in the file of the leaves' surfels from left to right, and replaces them in
+/// the leaves by indices in the part. None if the indices in the file do not ascend.
 fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
     let (mut all, mut reached, mut held) = (Vec::new(), 0, 0);
     let mut open = vec![0];
@@ -216,7 +216,7 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
         let node: &mut Node = &mut tree.nodes[index as usize];
         let own = node.first..node.first.checked_add(node.count)?;
         if !node.leaf {
-            // Children have larger indices than their parent, so this ends.
+            // Children have larger indices than their parent, so the loop ends.
             open.extend(own.rev());
             continue;
         }

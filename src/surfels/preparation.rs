@@ -72,7 +72,7 @@ pub struct Preparation {
     pub halved_images: u64,
     /// The number of distinct positions of the surfels; None if nothing was estimated.
     pub distinct_positions: Option<u64>,
-    /// No input states which axis points up, so it was guessed.
+    /// Whether the up axis was guessed, because no input states it.
     pub guessed_up: bool,
     /// The number of stray points: they lie so far from nearly all others that the default view
     /// leaves them out ([`Scene::framed`]).
@@ -85,7 +85,7 @@ pub struct Preparation {
     pub limited_radii: u64,
     /// The largest rounding error of a centre's coordinate, world units, among the errors that may
     /// be visible: more than 1/256 of the surfel's shorter half-axis, although coordinates are
-    /// stored as two f32. None if there are none.
+    /// stored as two f32. None if there are no such errors.
     pub rounding: Option<f64>,
     /// Median distance from a position to the nearest other one, world units; None if nothing was
     /// estimated or there is only one position.

@@ -2,8 +2,8 @@
 //! rims.
 //!
 //! A plane fitted to points of two sheets lies in neither, and where a part is thinner than its
-//! points' spacing, it stands across both. Once normals have sides, the sheets can be separated:
-//! the neighbours on one sheet face the same way, and the point lies in their planes.
+//! points' spacing, the plane stands across both. Once normals have sides, the sheets can be
+//! separated: the neighbours on one sheet face the same way, and the point lies in their planes.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ use super::positions::DistinctPositions;
 /// to 1/e: 11 degrees.
 const SAME_PLANE: f64 = 0.2;
 
-/// The neighbours lie to one side if the mean of the unit vectors to them is longer than this: it
-/// is 0.64 for a half-plane and 0 for a plane.
+/// The neighbours lie to one side if the mean of the unit vectors to them is longer than this: the
+/// mean is 0.64 long for points of a half-plane, and 0 for points of a plane.
 const ONE_SIDED: f64 = 0.5;
 
 /// The number of points, besides the position itself, that a plane needs.
@@ -27,11 +27,11 @@ const FEWEST: usize = 3;
 /// neighbours of its own sheet.
 ///
 /// The own sheet is that of the neighbours in whose planes the position lies. At the rim of a thin
-/// part there is none, or one on either side: then all neighbours lie behind the position, and the
-/// normal points away from them. Other normals do not change. On the 1,839 points of
-/// `data/bunny.obj`, whose ears are thinner than the points' spacing, this reduces the mean error
-/// from 7.1 to 6.1 degrees, the 99th percentile from 47 to 34 degrees, and the normals on the wrong
-/// side from 3 to 0.
+/// part, there is no such sheet, or one on either side. All neighbours then lie behind the
+/// position, and the normal is turned to point away from them. Other normals do not change. On the
+/// 1,839 points of `data/bunny.obj`, whose ears are thinner than the points' spacing, this reduces
+/// the mean error from 7.1 to 6.1 degrees, the 99th percentile from 47 to 34 degrees, and the
+/// normals on the wrong side from 3 to 0.
 pub(crate) fn refit(distinct: &DistinctPositions, graph: &NeighbourGraph, normals: &mut [[f32; 3]]) {
     let before = normals.to_vec();
     let at = |index: u32| DVec3::from_array(before[index as usize].map(f64::from));

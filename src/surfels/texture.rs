@@ -1,5 +1,5 @@
-//! Paints surfels with a texture: computes how its coordinates change over their disks, and its
-//! mean over each disk.
+//! Paints surfels with a texture: computes how the texture coordinates change over each disk, and
+//! the mean of the texture over each disk.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -45,7 +45,8 @@ pub(super) fn painted(
     for (index, (surfel, slopes)) in given.filter(|(_, given)| are_known(*given)) {
         places[index] = of_slopes(surfel, coordinates.centers[index], *slopes);
     }
-    // Disks overlap: half a disk to each side is about the surfel's own part of the surface.
+    // Disks overlap, so the surfel's own part of the surface reaches about half a radius to each
+    // side.
     let color = |(index, place): (usize, &Place)| {
         let center = place.center.map(f64::from);
         let texture = textures.get(coordinates.atlas.number(center) as usize);
@@ -78,8 +79,8 @@ fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
     all.then(|| centers.iter().map(|&center| Place { center, ..Place::default() }).collect())
 }
 
-/// The place of a surfel with given slopes. Its reach covers overlapping surfels as far away as its
-/// radius.
+/// The place of a surfel with given slopes. The place's reach covers overlapping surfels up to one
+/// radius away.
 fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     // Only the change within the surfel's plane counts.

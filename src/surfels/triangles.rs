@@ -29,9 +29,9 @@ pub struct MeshPreparation {
     pub replaced_colors: u64,
     /// The largest rounding error of a corner's coordinate, world units, among the errors that may
     /// be visible: more than 1/256 of the triangle's width, although coordinates are stored as two
-    /// f32. None if there are none.
+    /// f32. None if there are no such errors.
     pub rounding: Option<f64>,
-    /// No mesh states which axis points up, so it was guessed.
+    /// Whether the up axis was guessed, because no mesh states it.
     pub guessed_up: bool,
 }
 

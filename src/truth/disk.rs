@@ -27,8 +27,8 @@ pub(super) struct Disk {
 }
 
 impl Disk {
-    /// A flat disk. If s and t are not perpendicular, its axes are the principal half-axes of the
-    /// same ellipse.
+    /// Creates a flat disk. If s and t are not perpendicular, its axes are the principal half-axes
+    /// of the same ellipse.
     pub fn new(center: DVec3, s: DVec3, t: DVec3) -> Self {
         // The rotation by which (s, t) become perpendicular: tan 2x = 2 s.t / (s.s - t.t).
         let turn = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
@@ -41,15 +41,15 @@ impl Disk {
         Self { center, axes: [long, short, long.cross(short)], half, clip: Clip::NONE, heights: [0.0; 3], turn }
     }
 
-    /// The disk cut by clip lines, which are given in terms of the original half-axes.
+    /// Returns the disk cut by clip lines, which are given in terms of the original half-axes.
     pub fn cut(self, clip: Clip) -> Self {
         Self { clip, ..self }
     }
 
-    /// The disk with a cap, whose coefficients are given for the original half-axes.
+    /// Returns the disk with a cap, whose coefficients are given for the original half-axes.
     ///
-    /// They are converted to the principal half-axes: p = u' s' + v' t' with s' = s cos + t sin and
-    /// t' = t cos - s sin.
+    /// The coefficients are converted to the principal half-axes: p = u' s' + v' t' with s' = s cos
+    /// + t sin and t' = t cos - s sin.
     pub fn curved(self, [uu, uv, vv]: [f64; 3]) -> Self {
         let (c, s) = (self.turn.x, self.turn.y);
         let heights = [
@@ -75,10 +75,10 @@ impl Disk {
         0.5 * (uu * a.x * b.x + uv * (a.x * b.y + a.y * b.x) + vv * a.y * b.y)
     }
 
-    /// The parameter t at which the line `point + t * direction` meets the disk.
+    /// Returns the parameter t at which the line `point + t * direction` meets the disk.
     ///
     /// If the line meets a cap twice, this is the intersection nearer to `point`. None if the line
-    /// misses the disk, or lies in the plane of a flat one.
+    /// misses the disk, or lies in the plane of a flat disk.
     pub fn met_at(&self, point: DVec3, direction: DVec3) -> Option<f64> {
         let [long, short, normal] = self.axes;
         let local = |v: DVec3| DVec2::new(v.dot(long) / self.half[0], v.dot(short) / self.half[1]);
@@ -139,11 +139,11 @@ impl Disk {
         least
     }
 
-    /// The point of the ellipse, cut by its clip lines, that is nearest to `foot`; infinite if
-    /// nothing is kept.
+    /// Returns the point nearest to `foot` of the part of the ellipse that the clip lines keep;
+    /// infinite if they keep nothing.
     ///
-    /// It is the nearest point of the whole ellipse if the lines keep that one. Otherwise it lies
-    /// on the chord of a line, as the kept part is convex.
+    /// If the lines keep the nearest point of the whole ellipse, it is that point. Otherwise the
+    /// nearest point lies on the chord of a line, as the kept part is convex.
     fn nearest_in_plane(&self, foot: DVec2) -> DVec2 {
         let whole = self.nearest_of_ellipse(foot);
         let half = DVec2::from_array(self.half);
@@ -197,8 +197,8 @@ impl Disk {
     }
 }
 
-/// The ends of the part of a line's chord across the unit disk that the `other` line keeps; None if
-/// there is no such part.
+/// Returns the ends of a line's chord across the unit disk, shortened to the part that the `other`
+/// line keeps; None if there is no such part.
 fn chord(line: DVec3, other: DVec3) -> Option<[DVec2; 2]> {
     let length = line.truncate().length();
     let (toward, distance) = (line.truncate() / length, -line.z / length);

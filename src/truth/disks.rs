@@ -68,8 +68,8 @@ impl DiskTree {
         };
         let all = (0..scene.surfels.len()).map(placed);
         let mut surfels: Vec<Placed<'_>> = all.filter(|placed| sized(&placed.surfel)).collect();
-        // Boxes cannot separate disks in one position: of thousands, each would be tested for each
-        // point.
+        // Boxes cannot separate disks in one position: if there were thousands, all would be tested
+        // for every point.
         surfels.par_sort_unstable_by_key(Placed::bits);
         surfels.dedup_by_key(|placed| placed.bits());
         let bounds = surfels.par_iter().fold(
@@ -114,8 +114,8 @@ impl DiskTree {
     pub fn covers(&self, point: DVec3, direction: DVec3, reach: f64) -> bool {
         let point = (point - self.center) / self.radius;
         let farthest = reach * self.widest + f64::from(PADDING);
-        // From outside the ball around the boxes nothing is in reach; inside it, the f32 numbers
-        // below are small.
+        // From a point outside the ball around the boxes, no disk is in reach. Inside the ball, the
+        // f32 numbers below are small.
         if self.is_empty() || point.is_nan() || point.length() > 1.1 + farthest {
             return false;
         }

@@ -2,8 +2,8 @@
 //!
 //! Rays and hits are f64. An analytic [`Shape`] is intersected by its formula, a mesh triangle by
 //! triangle, with candidates from a tree of boxes ([`triangles`]); the disks that represent a
-//! surface are found in the same way ([`disks`]). The first surface on a ray is shaded and, through
-//! transparent ones, those behind it.
+//! surface are found in the same way ([`disks`]). The first surface on a ray is shaded, and if it
+//! is transparent, so are the surfaces behind it.
 
 mod disk;
 pub mod disks;
@@ -60,8 +60,8 @@ pub const DEFAULT_GRID: u32 = 4;
 /// The largest side of the grid of samples.
 const LARGEST_GRID: u32 = 64;
 
-/// Intersections on a ray closer together than this fraction of depth plus size of the surface
-/// count as one, as a ray through an edge meets both of its triangles.
+/// Two intersections on a ray count as one if they are closer together than this fraction of the
+/// depth plus the surface's size: a ray through an edge meets both of its triangles.
 const SAME_SURFACE: f64 = 1e-9;
 
 impl Surface {
@@ -141,13 +141,13 @@ struct Pixel {
 }
 
 impl Truth {
-    /// Casts `grid` x `grid` rays per pixel, at the centres of equal squares, for the colour and
-    /// coverage, and one through its centre for the maps.
+    /// Casts `grid` x `grid` rays per pixel for colour and coverage, at the centres of equal
+    /// squares, and one ray through the pixel's centre for the maps.
     ///
     /// The centre ray continues behind the first surface for the second depth. Surfaces nearer than
     /// the camera's near depth are invisible. The options used are shading, lights, background,
-    /// opacity and composite: if the opacity is below 1, or surfaces are composited, the sample
-    /// rays continue through each surface, attenuated by its alpha times the opacity.
+    /// opacity and composite. If the opacity is below 1, or surfaces are composited, the sample
+    /// rays continue through each surface, attenuated by the surface's alpha times the opacity.
     ///
     /// # Errors
     ///

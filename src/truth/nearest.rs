@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 
-/// The least `squared_distance` over the tree's primitives and the index of that primitive; +inf
-/// and None for an empty tree.
+/// Returns the least `squared_distance` over the tree's primitives, and the index of that
+/// primitive; +inf and None for an empty tree.
 ///
 /// Each box must contain its primitive, as boxes farther than the best distance so far are skipped.
 pub(super) fn nearest(tree: &Bvh2, point: DVec3, squared_distance: impl Fn(usize) -> f64) -> (f64, Option<usize>) {

@@ -10,9 +10,9 @@ use crate::scene::{Light, Shading};
 /// The linear colour that a point with colour `albedo` and unit `normal` sends toward the eye, seen
 /// along `ray`.
 ///
-/// A light of intensity I from the unit direction l has the irradiance `E = I max(0, n . l)`, a
-/// headlight, which is at the eye, `E = I |n . l|`. Lambert: `albedo E`. Phong: additionally
-/// [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
+/// A light of intensity I from the unit direction l gives the irradiance `E = I max(0, n . l)`. A
+/// headlight, which is at the eye, gives `E = I |n . l|`. Lambert shading sends `albedo E`. Phong
+/// shading adds [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
 /// `m = 2 (n . l) n - l` the mirrored light.
 pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &Settings) -> DVec3 {
     if options.shading == Shading::Unlit {

@@ -2,9 +2,9 @@
 //!
 //! The mesh is translated and scaled into the unit ball. A tree of f32 boxes (the crate obvhs)
 //! finds candidates: boxes are padded by more than the rounding of its ray test, so no candidate is
-//! missed. Each is then decided in f64 with the edge functions of Woop, Benthin and Wald 2013, in
-//! coordinates across the ray. Two triangles compute their common edge from the same two points, so
-//! no ray slips between them.
+//! missed. Each candidate is then decided in f64 with the edge functions of Woop, Benthin and Wald
+//! 2013, in coordinates across the ray. Two triangles compute their common edge from the same two
+//! points, so no ray slips between them.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ use crate::scene::Bounds;
 use crate::surfels::LARGEST_COORDINATE;
 
 /// The padding of each box, in radii of the mesh. A ray starts within 2 radii of the centre and is
-/// followed for 3, so its f32 origin, direction and box distances err by less than 2e-6 of a
+/// followed for 3 radii, so its f32 origin, direction and box distances err by less than 2e-6 of a
 /// radius.
 pub(super) const PADDING: f32 = 8e-6;
 
@@ -174,8 +174,8 @@ impl Triangle {
 
 /// The line of a ray, in units of the mesh's radius, relative to its centre.
 struct Line {
-    /// The line's point nearest to the centre. Starting from it, a distant eye loses digits of the
-    /// distance only.
+    /// The line's point nearest to the centre. Intersections are computed from this point, so that
+    /// with a distant eye only the distance loses digits.
     nearest: DVec3,
     /// The unit direction.
     direction: DVec3,
@@ -186,7 +186,7 @@ struct Line {
 }
 
 impl Line {
-    /// None if the line cannot meet the unit ball.
+    /// Creates the line of a ray; None if it cannot meet the unit ball.
     fn new(start: DVec3, direction: DVec3) -> Option<Self> {
         let direction = direction.try_normalize()?;
         let shift = -start.dot(direction);

@@ -101,7 +101,7 @@ fn accuracy(found: &Value, out: &Path) {
 fn determinism(found: &Value) {
     let found = rows(found);
     let of = |what: &str| found.iter().filter(|row| row["what"].as_str().unwrap().starts_with(what)).count();
-    // Each at two sizes of splats.
+    // Each comparison is made at two sizes of splats.
     assert!(of("organisation") == 4 && of("without") >= 20 && of("surfels in reverse") == 2, "{found:?}");
     assert!(of("the second frame") >= 4 && of("the second frame") == of("another renderer"));
     for row in found {

@@ -60,13 +60,14 @@ fn the_reference_draws_the_same_kernel() {
     });
     let by_closure = Settings { own_kernel: Some(closure), ..Settings::default() };
     assert!(apart(&drawn(&Backend::Reference, by_closure).unwrap().0, &reference) < 1e-7);
-    // Control: the built-in kernel is another.
+    // Control: the built-in kernel gives another picture.
     let (built_in, report) = drawn(&device, Settings::default()).unwrap();
     assert!(apart(&own, &built_in) > 1e-2);
     assert!(report.kernel.is_none());
 }
 
-/// The example of a kernel that shows nothing of its fault in the picture.
+/// Faults of a kernel's weights are counted and reported, even where the picture does not show
+/// them.
 #[test]
 fn wrong_weights_are_counted_and_named() {
     let Some(gpu) = common::gpu() else { return };
@@ -95,7 +96,8 @@ fn faults_of_a_text_are_refused_with_their_file_and_line() {
     assert!(arguments.contains("kernel_ellipse.wgsl:2:"), "{arguments}");
     let vector = refusal(&text("return length(vec2<f32>(rho2, 0.0));"));
     assert!(vector.contains("cannot be evaluated in f64") && vector.contains("vectors"), "{vector}");
-    // Another file than a kernel's is not evaluated: the compiler's error has its place.
+    // A replaced file that is no kernel is not evaluated in f64: the compiler reports the error and
+    // its place.
     let sources = vec![Replacement::new("shade_lambert.wgsl", "fn shade() -> f32 {\n    return nothing;\n}\n")];
     let options = Settings { sources, ..Settings::default() };
     let shade = drawn(&device, options).err().unwrap();

@@ -42,7 +42,7 @@ fn frame(size: u32, error: f64) -> Frame {
     Frame::of_colors(size, size, (0..size * size).map(pixel).collect())
 }
 
-/// A study as the runner would fill it: two scenes, one at four sizes, and images of the other.
+/// A study as the runner would fill it: the bunny, with images, and the sphere at three sizes.
 fn study() -> Study {
     let mut measurements = Vec::new();
     let scenes =

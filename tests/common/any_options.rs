@@ -1,4 +1,4 @@
-//! Random options: for the matrix of pictures, and for the needs of all renders.
+//! Random options: for the tests that render random pictures, and for random sets of needs.
 //!
 //! Most options keep their default, so that several features meet in one picture and few pictures
 //! are refused.
@@ -23,7 +23,7 @@ pub fn pick<T: Copy>(random: &mut Random, choices: &[T]) -> T {
     choices[random.below(choices.len())]
 }
 
-/// Draws options for a picture of `scene`, which may not go with it or with each other.
+/// Draws options for a picture of `scene`. They may be refused, for this scene or in combination.
 pub fn sampled(scene: &Scene, random: &mut Random) -> Settings {
     let mut options = Settings {
         epsilon: epsilon(random),
@@ -75,8 +75,8 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> Settings {
         options.accumulator = pick(random, &[Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64]);
     }
     if options.facing.is_some() && has_few_digits(options.accumulator) {
-        // Points are measured in pixels, so the reference knows what a sample weighs only with one
-        // sample per pixel.
+        // Point sizes are in pixels, so only with one sample per pixel does the reference know the
+        // weight of a sample.
         options.samples = Samples::ONE;
     }
     if random.one_in(4) {
@@ -89,7 +89,7 @@ pub fn sampled(scene: &Scene, random: &mut Random) -> Settings {
         options.background = [random.unit(), random.unit(), random.unit(), random.unit()].map(|c| c as f32);
     }
     if scene.encoded && random.one_in(2) {
-        // The defaults for such scenes.
+        // The defaults for scenes of Gaussians.
         (options.composite, options.shading) = (Composite::Gaussians, Shading::Unlit);
         (options.kernel, options.low_pass) = (gaussian::KERNEL, LowPass::Gaussians);
     }
@@ -138,8 +138,8 @@ fn composite(random: &mut Random) -> Composite {
     }
 }
 
-/// Often no map, otherwise mostly one alone: what a second map needs could hide a fault of the
-/// first.
+/// Draws maps: often none, otherwise mostly one alone, as the needs of a second map could hide a
+/// fault of the first.
 fn maps(random: &mut Random) -> Maps {
     let of_device: Vec<Map> = MAPS.iter().filter(|row| row.image_word.is_some()).map(|row| row.map).collect();
     let count = pick(random, &[0, 0, 1, 1, 1, 2, 3, 5]);

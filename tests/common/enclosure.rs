@@ -44,12 +44,12 @@ pub struct Pixel {
     pub nearest: Interval,
     pub count: (u32, u32),
     pub weight: Interval,
-    /// Weighted colour sums, mapped to [0, 1].
+    /// Weighted sums of colours that are mapped to [0, 1].
     pub color: [Interval; 4],
     pub normal: [Interval; 3],
-    /// Depths of the accepted fragments, so of their mean too; world units.
+    /// Bounds of the depths of all accepted fragments, and so of their mean; world units.
     pub depth: Interval,
-    /// Largest relative width of the depth interval of one of its fragments.
+    /// Largest relative width of a depth interval, over the pixel's fragments.
     pub depth_error: f64,
     /// For front faces (0) and back faces (1): the least possible depth, and an upper bound of the
     /// nearest depth.
@@ -127,8 +127,8 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &Settings, splats: &[Spl
     for (index, splat) in splats.iter().enumerate() {
         let precision = Precision::of(splat, scene, camera);
         open[index] = precision.side_is_open();
-        // One pixel more on each side: pixels outside the twin's bounds must fail the other tests
-        // too.
+        // Searches one pixel more on each side, as pixels outside the twin's bounds must fail the
+        // other tests too.
         for y in splat.first[1].saturating_sub(1)..=(splat.last[1] + 1).min(height - 1) {
             for x in splat.first[0].saturating_sub(1)..=(splat.last[0] + 1).min(width - 1) {
                 let Some((at, _)) = footprint(splat, camera, LowPass::None, x, y) else { continue };
@@ -190,7 +190,8 @@ fn accumulate(
         if side.is_some_and(|back| back != (splat.away && splat.sides == Sides::Nearest)) && !open[candidate.splat] {
             continue;
         }
-        // Only a fragment in front of the limit for the nearest possible depth is surely accepted.
+        // A fragment is surely accepted only if it is in front of the limit for the least possible
+        // nearest depth.
         let sure =
             candidate.sure && side.is_some() && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - rounding);
         let weight_at = |rho: f64| options.kernel.weight(rho.min(1.0).powi(2));

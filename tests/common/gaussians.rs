@@ -179,8 +179,8 @@ impl Seen {
 pub fn picture(gaussians: &[Gaussian], camera: &Camera) -> Vec<([f64; 4], bool)> {
     let mut lists = vec![Vec::new(); camera.pixels()];
     for seen in gaussians.iter().map(|gaussian| Seen::of(gaussian, camera)) {
-        // Half the width of the searched square: a bounding sphere, and at least the low-pass;
-        // pixels.
+        // Half the width of the searched square, pixels: the radius of a bounding sphere, and at
+        // least that of the low-pass.
         let nearest = seen.depths[0].max(1e-3);
         let reach = (extent() * seen.sigmas[0].max(seen.sigmas[1]) * camera.fx / nearest * 1.5).max(4.0);
         let range = |k: usize, size: u32| {

@@ -40,8 +40,8 @@ pub fn of_las_1_5(bytes: &[u8]) -> Vec<u8> {
     newer
 }
 
-/// A compressed file with a decoy LASzip record, whose name differs by one letter, before the valid
-/// one, which has no items.
+/// A compressed file with two LASzip records: a decoy, whose name differs by one letter, and behind
+/// it the real one, with no items.
 pub fn with_another_record(bytes: &[u8]) -> Vec<u8> {
     let data = laszip_record(bytes);
     let length = 54 + usize::from(u16::from_le_bytes([bytes[data - 34], bytes[data - 33]]));

@@ -58,7 +58,7 @@ pub fn cut(scene: &Scene, camera: &Camera, options: &Settings) -> (Cut, Settings
     let whole = Facts::of(scene);
     let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
     let surfels = cut.surfels.len() as u64;
-    // Caps are declared as for the whole scene.
+    // The facts claim caps as those of the whole scene do.
     let caps = whole.caps || (options.draws_node_caps() && whole.levels.is_some_and(|levels| levels.caps));
     let facts = Facts {
         surfels,

@@ -1,5 +1,5 @@
-//! Shared by the tests: the adapter, the needs of all renders, random numbers, scenes and options,
-//! and the derived error bounds.
+//! Code that the tests share: the adapter, sets of needs, random numbers, scenes and options, and
+//! the derived error bounds.
 
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -29,8 +29,8 @@ use epsplat::low_level::scene::Map;
 /// One unit of a sum of the accumulator `fixed`, as a fraction of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
 
-/// Opens the adapter under test; `None`, with a line on stderr, if there is none and none is
-/// required.
+/// Opens the adapter under test. Without an adapter, returns `None` and says so on stderr, or
+/// panics if `EPSPLAT_REQUIRE_ADAPTER` is 1.
 pub fn gpu() -> Option<Gpu> {
     open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref(), "EPSPLAT_REQUIRE_ADAPTER")
 }
@@ -42,7 +42,8 @@ pub fn core_gpu() -> Option<Gpu> {
     gpu().map(|_| CORE.get_or_init(open).clone())
 }
 
-/// Opens an OpenGL adapter even if there are others; `None` as for [`gpu`].
+/// Opens an OpenGL adapter even if there are others. Without one, returns `None` or panics as
+/// [`gpu`] does, by `EPSPLAT_REQUIRE_OPENGL`.
 pub fn opengl() -> Option<Gpu> {
     open(Some("gl"), "EPSPLAT_REQUIRE_OPENGL")
 }
@@ -69,8 +70,8 @@ fn open(name: Option<&str>, required: &str) -> Option<Gpu> {
     }
 }
 
-/// The adapter, limited so that `fixed` runs the kernel in `file`: without 64-bit atomics, or
-/// without subgroups for gathering tiles, where those would select another kernel.
+/// Returns the adapter, limited so that `fixed` uses the WGSL file `file`. Without the limit,
+/// 64-bit atomics, or subgroups (by which tiles gather), could select another file.
 pub fn gpu_for(file: &str) -> Option<Gpu> {
     let mut gpu = gpu()?;
     gpu.adapter.subgroups &= !file.starts_with("accum");
@@ -79,7 +80,7 @@ pub fn gpu_for(file: &str) -> Option<Gpu> {
     Some(gpu)
 }
 
-/// The accumulators that the adapter can run; each other one is reported on stderr.
+/// Returns the accumulators that the adapter can run, and reports the others on stderr.
 pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
     let able = |row: &&AccumulatorRow| {
         check::sums(&gpu.adapter, row.of).inspect_err(|why| eprintln!("skipped: {why}")).is_ok()

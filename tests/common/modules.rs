@@ -1,4 +1,5 @@
-//! The WGSL modules of all needs, joined, parsed and validated once for all tests of a program.
+//! The WGSL modules of all sets of needs, joined, parsed and reflected once for all tests of a
+//! program.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -28,12 +29,12 @@ pub struct Made {
     pub files: Vec<&'static str>,
     /// The kernels that the render dispatches.
     pub kernels: Vec<Kernel>,
-    /// Index of its text in [`All::texts`].
+    /// Index of the module's text in [`All::texts`].
     text: usize,
 }
 
 impl Made {
-    /// Whether it is a module of tiles.
+    /// Whether this is a module of tiles.
     pub fn of_tiles(&self) -> bool {
         self.files.contains(&"tile.wgsl")
     }
@@ -62,7 +63,7 @@ static ALL: LazyLock<All> = LazyLock::new(|| {
                 texts.push(sources.join(&files));
                 texts.len() - 1
             });
-            // Modules that select a cut are built before it is known how much is drawn.
+            // Modules that select a cut are made before the number of drawn splats is known.
             let needs = if kernels == CHOOSING { needs.before_cut() } else { needs };
             made.push(Made { needs, files, kernels, text });
         }

@@ -21,7 +21,7 @@ pub enum Kind {
     Large,
     /// The cosine between view ray and normal is 1e-2 to 1e-1.
     Tilted,
-    /// The same cosine is 1e-6 to 1e-1, and the centre projects to a pixel.
+    /// The cosine between view ray and normal is 1e-6 to 1e-1, and the centre projects to a pixel.
     EdgeOn,
     /// Ratio of half-axes up to 1000:1.
     Anisotropic,
@@ -42,8 +42,8 @@ pub struct Case {
 
 pub const SIZE: (u32, u32) = (160, 120);
 
-/// A camera for the region of a few `length` about `origin`, off-centre and with different focal
-/// lengths in x and y.
+/// A camera that sees a region of a few `length` about `origin`, with an off-centre principal point
+/// and different focal lengths in x and y.
 fn camera(projection: Projection, origin: DVec3, length: f64, near: f64) -> Camera {
     let lens = match projection {
         Projection::Pinhole => Lens::Intrinsics([150.0, 140.0, 52.3, 71.9]),
@@ -239,7 +239,7 @@ pub fn front(size: u32) -> Camera {
     Camera::posed((size, size), lens, DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap()
 }
 
-/// `count` coincident disks that cover the image, of linear colour `value`, and two hidden ones
+/// `count` coincident disks of linear colour `value` that cover the image, and two hidden disks
 /// that stretch the colour range to [0, 1]. Draw them with a kernel of weight 1.
 pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
     let mut surfels = vec![Surfel::disk(Vec3::new(0.2, 0.1, 5.0), Vec3::NEG_Z, 20.0); count];
@@ -272,7 +272,7 @@ pub fn generated(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Sc
     build(vec![points], &()).unwrap().0
 }
 
-/// A sphere with one or several textures, of which the second is transparent.
+/// A sphere with `pictures` textures, of which the second is transparent.
 pub fn painted(pictures: u32) -> Scene {
     let scene = sphere(2000, 1.7);
     let centers: Vec<[f32; 3]> = scene.surfels.iter().map(|surfel| surfel.center).collect();

@@ -1,5 +1,5 @@
-//! The needs of renders, drawn at random: options that the checks accept, planned for scenes, views
-//! and adapters. So the checks alone say what goes together, and no test repeats them.
+//! Random sets of needs: random options that the checks accept, planned for random scenes, views
+//! and adapters. Only the checks decide which options go together; no test repeats that.
 
 use std::collections::HashSet;
 use std::sync::LazyLock;
@@ -15,16 +15,17 @@ use super::any_options::{self, pick};
 use super::any_scene::{self, Sampled};
 use super::{Random, any_options::without};
 
-/// Scenes that are drawn.
+/// The number of random scenes.
 const SCENES: u64 = 300;
 
-/// Pictures that are drawn of each scene.
+/// The number of random renders of each scene.
 const PICTURES: usize = 120;
 
-/// Every so many pictures one is kept, whatever others show.
+/// One in this many renders is kept even if its needs show no new pair of values.
 const REGULAR: usize = 20;
 
-/// The needs of renders: every two values that meet in one of the pictures drawn meet here too.
+/// The needs of a selection of the random renders. Every pair of values that occurs together in any
+/// of them also occurs here.
 pub fn all_needs() -> &'static [SceneNeeds] {
     static ALL: LazyLock<Vec<SceneNeeds>> = LazyLock::new(|| {
         let (mut kept, mut known, mut pairs) = (Vec::new(), HashSet::new(), HashSet::new());
@@ -61,14 +62,15 @@ pub fn plain() -> SceneNeeds {
     *all_needs().iter().find(is_plain).expect("some picture is plain")
 }
 
-/// The value of each need: alternatives by their names, optional ones by whether they are set.
+/// The value of each need: the names of the chosen alternatives, and whether each optional need is
+/// set.
 fn values(needs: &SceneNeeds) -> Vec<(&'static str, bool)> {
     let set = needs.names().into_iter().map(|name| (name, true));
     let left_out = needs.flags().into_iter().filter(|(on, _)| !on).map(|(_, name)| (name, false));
     set.chain(left_out).chain([(needs.accumulator.name(), true)]).collect()
 }
 
-/// The needs of a random picture of a scene; `None` if its options are refused.
+/// The needs of a random render of a scene; `None` if its options are refused.
 fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random) -> Option<SceneNeeds> {
     let mut options = Settings {
         organisation: pick(random, &[Organisation::Auto, Organisation::Tile, Organisation::Scatter]),
@@ -90,8 +92,8 @@ fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random
     Plan::of(&facts, &adapter(random), camera, &options, &sizes(random)).ok().map(|plan| plan.needs)
 }
 
-/// Gives the scene what small scenes do not have: many surfels, levels of detail, fades, and low
-/// digits of corners.
+/// Gives the facts what small scenes do not have: many surfels, levels of detail, fades, and low
+/// digits of triangle corners.
 fn change(facts: &mut Facts, options: &mut Settings, random: &mut Random) {
     if random.one_in(2) {
         let factor = random.scale(1.0, 1e5) as u64;
@@ -100,7 +102,8 @@ fn change(facts: &mut Facts, options: &mut Settings, random: &mut Random) {
     }
     facts.mesh.doubled = random.one_in(2);
     facts.copies = random.one_in(4);
-    // Nodes have a colour each, and none is made of inputs that are kept separate.
+    // Levels of detail exclude textures, harmonics, points that face the camera and separate
+    // inputs.
     let of_colors = matches!(facts.colors, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
     if of_colors && facts.surfels > 0 && random.one_in(4) {
         (options.facing, options.separate) = (None, false);
@@ -131,7 +134,7 @@ fn adapter(random: &mut Random) -> AdapterDescription {
     }
 }
 
-/// Sizes as earlier frames may have measured them.
+/// Random values of sizes that earlier frames may have measured.
 fn sizes(random: &mut Random) -> Known {
     Known {
         touched_tiles: pick(random, &[0.0, 100.0]),

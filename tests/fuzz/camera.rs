@@ -61,7 +61,8 @@ pub fn array(values: impl IntoIterator<Item = f64>) -> String {
     format!("[{}]", values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(", "))
 }
 
-/// A file with each field once. It holds no points, so the returned count is ignored.
+/// A valid camera file with random fields in random order. It holds no points, so the returned
+/// count is ignored.
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let mut fields = Vec::new();
     let mut size = random.one_in(2);

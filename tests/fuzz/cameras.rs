@@ -48,7 +48,7 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-/// A file with the required fields. It holds no points, so the returned count is ignored.
+/// A valid file of one to four cameras. It holds no points, so the returned count is ignored.
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let lens = |random: &mut Random| match random.below(3) {
         0 => format!("\"camera_angle_x\": {}, ", random.between(0.1, 3.0)),

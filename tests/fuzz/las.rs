@@ -76,7 +76,8 @@ const HEADER: [(usize, usize); 30] = [
     (335, 8),
 ];
 
-/// The same, with the LASzip record, the chunk table and the layers of the first chunk.
+/// Offsets and sizes of the numbers in the header, in the LASzip record, in the chunk table and in
+/// the layers of the first chunk.
 pub(super) fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut places = HEADER.to_vec();
     if let Some(record) = bytes.windows(14).position(|window| window == b"laszip encoded") {

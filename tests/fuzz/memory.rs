@@ -7,9 +7,9 @@ pub struct Peak {
     pub reserved: u64,
 }
 
-/// A limit on both that no small input may exceed.
+/// The limit on the growth of both peaks, which no small input may exceed.
 ///
-/// A chunk of a damaged LAZ file may be decoded into 256 MiB before it proves too short, and an
+/// A chunk of a damaged LAZ file may be decoded into 256 MiB before it proves too short. An
 /// allocator's arenas reserve address space for each thread.
 pub fn bound() -> Peak {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);

@@ -129,8 +129,8 @@ fn on_byte(random: &mut Random, bytes: &mut [u8], change: impl FnOnce(&mut Rando
     }
 }
 
-/// Overwrites a binary number with an extreme pattern or changes it by one; its offset is a known
-/// one if the format has any.
+/// Overwrites a binary number with an extreme pattern or changes it by one. If `grammar` knows
+/// offsets of numbers, most numbers are at these.
 fn extreme_bits(random: &mut Random, grammar: &Grammar, bytes: &mut [u8]) {
     let known = (grammar.numbers)(bytes);
     let (at, size) = match known.get(random.below(known.len())) {

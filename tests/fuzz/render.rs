@@ -47,9 +47,10 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     };
     let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {
         Ok(camera) => camera,
-        // A camera must be as close to the world's origin as points must be, and one that sees a
-        // scene edge-on is moved far away; so a scene near that limit may be out of reach. Nor can
-        // a camera keep a distance that is below the precision of its position.
+        // A camera has the same limit on coordinates as points. A camera that sees a scene edge-on
+        // is moved far away, so for a scene near that limit there may be no camera. Nor is there
+        // one for a scene so small that the camera's distance is below the precision of its
+        // position.
         Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE || size(&scene) < 1e-12 * reach(&scene) => {
             return sentence(&error, None).map(|()| Outcome::Read);
         }

@@ -15,8 +15,8 @@ const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Serialises the targets, so that memory and panics can be attributed.
 static TURN: Mutex<()> = Mutex::new(());
-/// While an input is read, panics are recorded, not printed: those of a decoder are survived, ours
-/// fail the test.
+/// While an input is read, panics are recorded, not printed. Readers survive panics of a decoder;
+/// panics of epsplat fail the test.
 static QUIET: AtomicBool = AtomicBool::new(false);
 static PANICS: AtomicU64 = AtomicU64::new(0);
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
@@ -28,7 +28,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn note_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // The readers install a hook that silences decoders when one first runs; ours must be
+        // When a decoder first runs, the readers install a hook that silences it; ours must be
         // installed over it.
         let _ =
             epsplat::io::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/readers/deep_gps_time.laz")), &());

@@ -1,7 +1,7 @@
 //! Tests every accumulator, with every kernel and form of epsilon, against the f64 reference.
 //!
-//! A pixel may differ by the stated bound of the sums and the derived uncertainty of the fragments'
-//! weights, and by no more. Also tests overflowing sums.
+//! A pixel may differ by at most the stated bound of the sums plus the derived uncertainty of the
+//! fragments' weights. Also tests overflowing sums.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -25,7 +25,7 @@ const KERNELS: [&str; 7] =
 const EPSILONS: [Epsilon; 4] =
     [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4), Epsilon::Ray(0.05)];
 
-/// A scene and everything that a device's frame of it is compared with.
+/// A scene with the reference frame and the bounds that a device's frame is compared with.
 struct Case {
     name: String,
     scene: Scene,
@@ -36,8 +36,8 @@ struct Case {
     view: View,
 }
 
-/// A sphere of overlapping disks behind three large, tilted ones that fill the image; so some disks
-/// are drawn by one invocation and some by a workgroup.
+/// A sphere of overlapping disks behind three tilted disks that fill the image. One invocation
+/// draws each small disk, a workgroup each large one.
 fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
     let mut scene = sphere(2500, 2.0);
     let camera = sphere_camera(96, projection);
@@ -78,7 +78,7 @@ struct Findings {
     covered: usize,
     open: usize,
     wrong: Vec<String>,
-    /// The largest used fraction of a bound: colour, depth, normal, weight.
+    /// The largest difference as a fraction of its bound, for colour, depth, normal and weight.
     used: [f64; 4],
 }
 
@@ -112,8 +112,8 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
             }
         };
         let sums = (row.error_bound)(n, weight, fraction_bits);
-        // The relative uncertainty of the weights bounds the change of the means; attributes are
-        // mapped in f32.
+        // The relative uncertainty of the weights bounds the change of the means. Attributes are
+        // mapped to [0, 1] in f32, which adds 8 E.
         let weights = (known.weight.high - known.weight.low) / weight;
         let mean = sums + weights + 8.0 * E;
         for k in 0..4 {
@@ -174,7 +174,7 @@ fn broken(file: &str, from: &str, to: &str, gpu: Gpu) -> Backend {
 fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let noticed = |case: &Case, row: &AccumulatorRow, file: &str, from: &str, to: &str| {
-        // A more capable adapter runs `fixed` in other files.
+        // On an adapter with optional features, `fixed` may consist of other WGSL files.
         let gpu = if row.of == Accumulator::Fixed { common::gpu_for(file) } else { common::gpu() };
         let Some(gpu) = gpu else { return };
         let findings = run(case, row, &broken(file, from, to, gpu));
@@ -249,8 +249,8 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                     "{name}"
                 );
                 let n = disks as f64;
-                // All terms are equal and float's weights are exact, so only the error of one
-                // colour sum counts.
+                // All terms are equal and the weights of `float` are exact, so the only error is
+                // that of one colour sum.
                 let bound = (row.error_bound)(n, n, row.fraction_bits(scene.surfels.len() as u64)) + 2.0 * E;
                 let color = |frame: &Frame| f64::from(frame.color[9][0]);
                 let apart = (color(&frame) - color(&expected)).abs();

@@ -188,8 +188,8 @@ fn batches_left_out_do_not_change_a_bit() {
     let every = replaced("!near && any(pixels.first > pixels.last)", "false");
     let wrong = replaced("!(reached > deepest_accepted(", "!(1.5 * reached > deepest_accepted(");
     let scene = sphere(200_000, 1.5);
-    // The control's epsilon reaches the back of the sphere, which is visible if surfels have no
-    // sides.
+    // The control needs fragments at the back of the sphere: its epsilon is deep enough for them,
+    // and this scene shows both sides of its surfels.
     let without_sides = Scene { oriented: false, ..scene.clone() };
     let look = |eye: DVec3, lens| Camera::look_at((128, 128), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
     let outside = DVec3::new(1.0, 0.7, 3.0);
@@ -237,8 +237,8 @@ fn pages_and_bands_do_not_change_a_bit() {
     let whole = Backend::gpu(whole);
     for row in all.into_iter().filter(|row| row.deterministic) {
         let (name, options) = (row.name, options(row.of));
-        // A band of one row, which has 160 pixels of 12 sums, or of 10 image words, and pages of
-        // about 200 surfels.
+        // Buffers of `one_row` bytes hold a band of one row (160 pixels of 12 sums or 10 image
+        // words) and pages of about 200 surfels.
         let one_row = 160 * 4 * u64::from(12 * row.words).max(10) + 700;
         for limit in [one_row, 40_000] {
             let Some(small) = common::gpu() else { return };
@@ -284,8 +284,8 @@ fn pile() -> (Scene, Camera) {
     (scene, front(16))
 }
 
-/// Accumulators that depend on the order may differ from run to run; their means stay within their
-/// bounds.
+/// Frames of order-dependent accumulators may differ from run to run; their means stay within the
+/// stated bounds.
 #[test]
 fn sums_that_show_the_order_stay_within_their_bounds() {
     let Some(gpu) = common::gpu() else { return };
@@ -314,7 +314,8 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
             assert_eq!(run.map(Map::Count), exact.map(Map::Count), "{}", row.name);
             for pixel in 0..camera.pixels() {
                 let (n, w) = (counts[pixel].into(), weights[pixel].into());
-                // Both frames have errors, and both are mapped back in f32 to a range of at most 1.
+                // Both frames have errors. Both are mapped from [0, 1] in f32, to ranges of at most
+                // 1.
                 let bound = (row.error_bound)(n, w, 24) + (Accumulator::Fixed.row().error_bound)(n, w, 24);
                 for k in 0..3 {
                     let difference = f64::from((run.color[pixel][k] - exact.color[pixel][k]).abs());

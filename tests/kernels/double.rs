@@ -44,8 +44,8 @@ fn evaluate(
 
 const NAMES: [&str; 6] = ["two_sum", "two_product", "sum", "product", "quotient", "tail"];
 
-/// Pairs of doubles of both signs: exponents up to 12 apart; significands random, short, or all
-/// ones.
+/// Pairs of doubles of both signs. Their exponents differ by up to 12, their significands are
+/// random, short, or all ones.
 fn pairs() -> Vec<[f32; 4]> {
     let mut random = Random(11);
     let mut double = |near: f64| {
@@ -76,10 +76,10 @@ fn pairs() -> Vec<[f32; 4]> {
     all
 }
 
-/// The largest error of each function, and last the largest ratio of trailing to leading part.
+/// Returns the largest error of each function, then the largest ratio of trailing to leading part.
 ///
-/// Errors of exact functions are absolute; that of the sum is relative to the magnitudes of its
-/// terms, those of product and quotient to the result.
+/// The errors of `two_sum` and `two_product` are absolute. That of `sum` is relative to the
+/// magnitudes of its terms, those of `product` and `quotient` are relative to the result.
 fn errors(gpu: &Gpu, double: &str) -> [f64; 6] {
     let layout = FILES.iter().find(|(name, _)| *name == "layout.wgsl").unwrap().1;
     let text = [

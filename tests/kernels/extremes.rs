@@ -82,7 +82,7 @@ fn radii_of_all_sizes_are_right_and_none_is_larger_than_a_plane() {
     assert!(preparation.notes().iter().any(|note| note.contains("20 points had a radius")));
     assert!(!scene.low.is_empty(), "disks of 1e-9 need more digits than f32 has");
     check("radii", &scene, &view(1.0, DVec3::ZERO), Epsilon::Relative(0.01));
-    // A huge disk must not push the near depth out: it stays below 1e-5.
+    // A huge disk must not raise the default near depth, which stays below 1e-5.
     assert!(Camera::default_near(&scene) < 1e-5);
 }
 

@@ -1,8 +1,8 @@
-//! The imports at the heads of WGSL files: each name that a file uses from another one, and no
-//! other, under the files that define it.
+//! The import lines at the heads of WGSL files: each names exactly the functions, types and
+//! constants that the file uses from another file, and the file that defines them.
 //!
-//! Files are joined into modules by the passes' rows, so an import is no instruction: it says to a
-//! reader where a name is from. `EPSPLAT_WRITE_IMPORTS=1` writes the lines as they should be.
+//! The tables of passes decide which files are joined into a module, so an import has no effect: it
+//! tells a reader where a name is defined. `EPSPLAT_WRITE_IMPORTS=1` rewrites all import lines.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -11,17 +11,17 @@ use std::path::PathBuf;
 
 use epsplat::low_level::gpu::sources::FILES;
 
-/// The start of an import's line.
+/// The start of an import line.
 const IMPORT: &str = "// #import ";
 
-/// The longest line.
+/// Columns of the longest import line.
 const COLUMNS: usize = 100;
 
 /// Words that declare the name that follows them.
 const DECLARATIONS: [&str; 7] = ["fn", "struct", "const", "override", "alias", "var", "let"];
 
-/// The names of a file: those that it defines for others, and those that it uses and does not
-/// define.
+/// The names of a file: those that it defines at module scope, and those that it uses without
+/// defining them.
 struct Names {
     defined: BTreeSet<String>,
     used: BTreeSet<String>,
@@ -77,8 +77,8 @@ fn names(text: &str) -> Names {
     Names { defined, used: used.difference(&own).cloned().collect() }
 }
 
-/// How an import names the files that define something: one file, a file and the one without it, a
-/// family by its prefix, up to three files, or any.
+/// Returns how an import names the files that define something: one file (also for a pair with its
+/// `_absent` counterpart), a family by its prefix, up to three files, or any (`*`).
 fn provider(files: &BTreeSet<&str>) -> String {
     let all: Vec<&str> = files.iter().copied().collect();
     match all[..] {
@@ -118,7 +118,7 @@ fn imports(files: &BTreeMap<String, String>) -> BTreeMap<String, Vec<String>> {
     names.iter().map(|(file, names)| ((*file).to_owned(), of(names))).collect()
 }
 
-/// One import in lines of at most [`COLUMNS`].
+/// Formats one import, in lines of at most [`COLUMNS`].
 fn lines(provider: &str, names: &[&str]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for name in names {

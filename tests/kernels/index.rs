@@ -58,7 +58,7 @@ fn frame(scene: &Scene, options: &Settings, backend: &Backend) -> Frame {
     render(scene, &sphere_camera(96, Projection::Pinhole), options, backend, &()).unwrap().0
 }
 
-/// The pair (input, point) of each pixel.
+/// The surfel's (input file, point in that file) for each pixel.
 fn named(frame: &Frame) -> &[[u32; 2]] {
     frame.numbers(Map::Index).unwrap().as_chunks().0
 }
@@ -105,7 +105,7 @@ fn a_kernel_that_takes_any_fragment_is_noticed() {
 #[test]
 fn every_organisation_page_and_band_names_the_same() {
     let Some(gpu) = common::gpu() else { return };
-    // Enough surfels to skip batches and to gather tiles.
+    // With this many surfels, batches are skipped and tiles gather.
     let scene = scene(&points(20_000));
     let all = |gpu: Gpu| -> Vec<Frame> {
         let backend = Backend::gpu(gpu);

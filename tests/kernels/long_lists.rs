@@ -18,8 +18,8 @@ use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
 use glam::Vec3;
 
-/// A scene for 8 x 8 pixels: about `deep` disks cover the middle, facing to and fro; fewer cover
-/// the corners.
+/// A scene for 8 x 8 pixels: `deep` disks, about half of them facing the camera. Nearly all overlap
+/// in the middle of the image, fewer in its corners.
 fn pile(deep: usize) -> Scene {
     let mut random = Random(9);
     let mut disk = |_| {
@@ -59,7 +59,8 @@ fn all_bits(frame: &Frame) -> Vec<u32> {
     bits(frame).into_iter().chain(maps.into_iter().flat_map(of)).collect()
 }
 
-/// The adapter, if it is a software one, which limits loops; a card processes any list in one go.
+/// Returns the adapter if it is a software one. Only these limit loops; a card processes any list
+/// in one go.
 fn software() -> Option<Gpu> {
     common::gpu().filter(|gpu| gpu.adapter.is_software())
 }
@@ -70,8 +71,8 @@ fn with(changes: &[(&str, &str, &str)]) -> Backend {
     Backend::Gpu { gpu: Box::new(software().unwrap()), sources }
 }
 
-/// Composite modes that traverse lists differently: all surfaces, three and a long tail, every
-/// fragment.
+/// Composite modes that traverse lists differently: all layers, three layers and a long tail, and
+/// every fragment in order.
 const WAYS: [Composite; 3] = [Composite::Layers(ALL_LAYERS), Composite::Layers(3), Composite::Sorted];
 
 #[test]
@@ -94,7 +95,7 @@ fn the_twin_composites_alike() {
             let mut compared = 0;
             for (pixel, (a, b)) in twin.color.iter().zip(&device.color).enumerate() {
                 // With thousands of fragments, almost any pixel has some near a decision, but each
-                // changes little.
+                // of them changes the colour little.
                 let near = if decided[pixel] > DECISION_MARGIN { 2e-5 } else { 2e-3 };
                 compared += usize::from(a[3] > 0.002);
                 assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < near), "{composite:?} {pixel}: {a:?} {b:?}");
@@ -107,7 +108,8 @@ fn the_twin_composites_alike() {
 /// The work per dispatch, the order of fragments and the threshold for long lists do not change a
 /// bit.
 ///
-/// State that is lost between dispatches does, and so do loops that the adapter cuts off.
+/// Controls: state that is lost between dispatches changes bits, and so do loops that the adapter
+/// cuts off.
 #[test]
 fn rounds_do_not_show() {
     let Some(gpu) = software() else { return };
@@ -141,8 +143,8 @@ fn rounds_do_not_show() {
     }
 }
 
-/// The limit divides by the number of samples, as the lists of a pixel's samples are processed
-/// together.
+/// The limit of a list's length is divided by the number of samples, as the lists of all samples of
+/// a pixel are processed together.
 #[test]
 fn a_list_is_long_by_its_samples() {
     assert_eq!(most_at_once(Samples::ONE), 2048);

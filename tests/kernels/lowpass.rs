@@ -57,7 +57,7 @@ fn a_surface_of_small_disks_has_no_holes() {
     }
 }
 
-/// A checkerboard with squares of 1.5 pixels: both filters come closer to rays in PSNR and SSIM.
+/// A checkerboard with squares of 1.5 pixels: both filters raise PSNR and SSIM against rays.
 #[test]
 fn a_far_checkerboard_aliases_less() {
     let scene = surfels(Shape::Checkerboard, 200_000, 1.5);

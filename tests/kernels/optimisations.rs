@@ -22,8 +22,8 @@ fn options(without: &[Optimisation]) -> Settings {
     }
 }
 
-/// Splats of many sizes, too few for culling; and a closed surface of small ones, half of it
-/// hidden.
+/// Returns two scenes, and whether each is culled: splats of many sizes, which are too few for
+/// culling, and a closed surface of small splats, half of it hidden.
 fn scenes() -> Vec<((Scene, Camera), bool)> {
     vec![(crowded().swap_remove(1), false), ((sphere(3000, 1.8), sphere_camera(90, Projection::Pinhole)), true)]
 }
@@ -68,8 +68,8 @@ fn no_optimisation_shows() {
     }
 }
 
-/// Disabling an optimisation really skips its code: if that code is broken, the frame changes when
-/// it is disabled.
+/// Disabling an optimisation really skips its code: if that code is broken, frames with and without
+/// the optimisation differ.
 #[test]
 fn what_is_left_out_is_not_done() {
     let backend = |file: &str, from: &str, to: &str| {
@@ -90,7 +90,7 @@ fn what_is_left_out_is_not_done() {
     ) else {
         return;
     };
-    // The first half-axis of every other surfel is cut short.
+    // The last component of every other surfel's first half-axis becomes 0.
     let odd = "array<f32, 3>(b.y, c.x, c.y)";
     let Some(long) = backend("words_long.wgsl", odd, "array<f32, 3>(b.y, c.x, select(c.y, 0.0, odd))") else { return };
     let backends = [(Optimisation::Hiding, hiding), (Optimisation::Order, first), (Optimisation::LongWords, long)];

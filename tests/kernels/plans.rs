@@ -35,8 +35,8 @@ fn camera(size: u32) -> Camera {
     sphere_camera(size, Projection::Pinhole)
 }
 
-/// Formats a stage: its pass, its kernels with their extents, and its page and band unless there is
-/// only one.
+/// Formats a stage: its pass, its kernels with their extents, its page if it has one, and its band
+/// unless that is 0.
 fn line(stage: &Stage) -> String {
     let runs: Vec<_> = stage
         .runs
@@ -207,8 +207,8 @@ fn small_buffers_make_bands_and_pages() {
     let plan = planned(&scene, 64, &small, &culled, &known);
     assert!(plan.needs.cull && plan.projects_each_band && plan.looks_for_slots && plan.bands.len() == 4);
     assert_eq!(self::lines(&plan).iter().filter(|line| line.starts_with("project")).count(), 4 * 4);
-    // The pixel limit of Mesa's software adapter does not apply to a card: 16 million pixels of 16
-    // bytes.
+    // The pixel limit of Mesa's software adapter does not apply to a card. The image has 16 million
+    // pixels of 16 bytes.
     let large = AdapterDescription { max_storage_buffer_binding_size: 1 << 30, ..AdapterDescription::core() };
     let large = AdapterDescription { max_buffer_size: 1 << 30, ..large };
     let bands_of = |kind| {
@@ -234,7 +234,8 @@ fn copies_are_drawn_once_and_without_tiles() {
     assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.surface.copies());
 }
 
-/// Transparent surfaces are counted and listed; if all are opaque, the plan has no trace of that.
+/// The plan counts and lists the fragments of transparent surfaces. If all surfaces are opaque, it
+/// has no such steps.
 #[test]
 fn what_shows_through_is_listed() {
     let scene = sphere(1000, 1.5);
@@ -255,7 +256,7 @@ fn what_shows_through_is_listed() {
             "read back 0",
         ]
     );
-    // Bands that were cut by their number of fragments.
+    // An earlier frame has cut the bands by their number of fragments.
     let cuts = vec![Band::of(64, 0, 40), Band::of(64, 40, 24)];
     let cut = planned(&scene, 64, &software(), &options, &Known { cuts: Some(cuts.clone()), ..Known::default() });
     assert_eq!((cut.bands, cut.pages), (cuts, 1));

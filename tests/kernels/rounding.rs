@@ -62,7 +62,7 @@ fn wrong(a: &[[f32; 4]], b: &[[f32; 4]]) -> usize {
     a.as_flattened().iter().zip(b.as_flattened()).filter(|(a, b)| a.to_bits() != b.to_bits()).count()
 }
 
-/// Asserted for Vulkan; other APIs give no such guarantee, so there the result is only printed.
+/// Asserts equality on Vulkan. Other APIs do not guarantee it, so there the result is only printed.
 #[test]
 fn sums_and_products_are_those_of_the_processor() {
     let Some(gpu) = common::gpu() else { return };
@@ -81,7 +81,7 @@ fn other_roundings_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let inputs = inputs();
     let expected = on_the_processor(&inputs);
-    // WGSL's fma may be rounded once or twice, so the processor shows that fusing would make a
+    // WGSL's `fma` may round once or twice, so the CPU's `mul_add` shows that fusing would make a
     // difference.
     let once = inputs.iter().filter(|[x, y, z, _]| x.mul_add(*y, *z).to_bits() != (x * y + z).to_bits()).count();
     assert!(once > 1000, "{once}");

@@ -1,5 +1,5 @@
-//! Every kernel of every set of needs is valid, portable WGSL, and matches the state that the host
-//! sets.
+//! Every kernel is valid, portable WGSL, and its overrides and bindings match the host, for every
+//! set of needs (the facts of scene and options that choose the WGSL files).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -83,8 +83,8 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         };
         let drawn = drawn.iter().chain(of_mesh).copied();
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
-        // Modules of tiles and of cuts have entry points that other modules use; weights by depth
-        // need no visibility pass.
+        // Some modules contain entry points that they do not run: tiles and cuts share files with
+        // other modules, and order-free weights need no visibility pass.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles()
             || needs.levels
@@ -110,8 +110,8 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     assert_eq!(Accumulator::Fixed.row().features, Features::None);
 }
 
-/// Each need is set in some pictures and not in others: the pictures that are drawn show what
-/// options can ask for.
+/// Each need is set in at least ten random renders and absent in at least ten, so the random
+/// renders cover all that options can ask for.
 #[test]
 fn pictures_meet_every_need_and_its_absence() {
     let all = common::variants::all_needs();
@@ -271,7 +271,8 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
             assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());
         }
-        // At most one channel completes the last pair, and at most two align the start of a pair.
+        // Padding: at most one channel completes the last pair, and at most two align the starts of
+        // pairs.
         assert!(pixel.channels as usize <= sums.len() + 3 && pixel.image_words as usize == image.len());
         // Values that are added in pairs start at an even channel; the second pair of the colour
         // starts at 2.
@@ -299,7 +300,7 @@ fn text_of(name: &str) -> &'static str {
 /// A file `*_absent.wgsl` has the interface of its partner: each of its functions exists there with
 /// the same signature.
 ///
-/// (That none is missing follows from the validity of every combination.)
+/// Each combination of files is valid, so no function of the partner is missing either.
 #[test]
 fn absent_parts_have_their_partners_signatures() {
     let absent: Vec<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| name.ends_with("_absent.wgsl")).collect();
@@ -389,13 +390,13 @@ fn beginnings(text: &str) -> Vec<(&str, &str)> {
     text.split("@compute").skip(1).map(of_entry).collect()
 }
 
-/// Only hold() reads uniforms. Entry points that use them call it first, while all invocations
-/// still take part.
+/// Only `hold` and `hold_view` read uniforms. Entry points that use uniforms call one of them
+/// first, while all invocations still take part.
 #[test]
 fn uniforms_are_read_once_and_first() {
     for (file, text) in FILES {
         let read = names(text).into_iter().filter(|name| ["view", "band"].contains(name)).count();
-        // Both are declared and read in that file.
+        // `layout.wgsl` declares both uniforms and reads each once.
         assert_eq!(read, if *file == "layout.wgsl" { 4 } else { 0 }, "{file}");
         for (entry, first) in beginnings(text) {
             let arranges = ["arrange", "arrange_rare", "arrange_triangles"].contains(&entry);

@@ -18,8 +18,8 @@ const OUTSIDE: DVec3 = DVec3::new(1.0, 0.7, 3.0);
 
 /// 199,998 disks on a sphere, and behind it a very large one that faces [`OUTSIDE`].
 ///
-/// The large disk's centre is 60,000 pixels outside the image, and its rim is inside it. The last
-/// batch is not full.
+/// The large disk's centre is 60,000 pixels outside the image, but its rim reaches into the image.
+/// The last batch is not full.
 fn scene() -> Scene {
     let mut scene = sphere(200_000, 1.5);
     let last = scene.surfels.len() - 1;
@@ -47,7 +47,7 @@ fn views() -> Vec<Camera> {
 }
 
 fn options() -> Vec<Settings> {
-    // An epsilon that is independent of the large disk; otherwise all surfels would be visible.
+    // This epsilon does not depend on the large disk. One that does would make all surfels visible.
     let plain = Settings { epsilon: Epsilon::Relative(0.01), ..Settings::default() };
     let lit = Settings { maps: Maps::ON_DEVICE, ..plain.clone() };
     vec![
@@ -94,8 +94,8 @@ fn what_is_left_out_takes_no_room() {
         };
         // A surfel needs 36 bytes and its colour 4.
         let surfels = 40.0 * scene.surfels.len() as f64;
-        // The first view shows part of the sphere, the second half of it. With tiles, nothing is
-        // drawn early enough to hide splats from the projection.
+        // The first view shows part of the sphere, the second half of it. With tiles, no splat is
+        // drawn early enough to hide others before they are projected.
         let half = if options.organisation == Organisation::Tile { 1.01 } else { 0.9 };
         for (view, most) in views().iter().zip([0.15, half]) {
             let ((all, _), (own, drawn)) = (room(&without_culling(&options), view), room(&options, view));

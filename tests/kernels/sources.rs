@@ -1,4 +1,4 @@
-//! A source without a scene in memory, which makes its pages when a device asks for them, draws
+//! A source that has no scene in memory, and makes its pages when a device asks for them, renders
 //! like the scene.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -61,7 +61,7 @@ fn every_adapter_and_cut_has_the_same_sums() {
         ] {
             let taken = of(&scene, &camera, &options, &other);
             assert!(taken == whole, "{name}, {options:?}");
-            // Sums move from one device to another.
+            // The sums of one device resolve on another.
             let there = resolve(&whole, &scene, &camera, &options, &other, &Sources::default()).unwrap();
             let here = resolve(&taken, &scene, &camera, &options, &gpu, &Sources::default()).unwrap();
             assert!(bits(&there) == bits(&here), "{name}, {options:?}");

@@ -60,7 +60,8 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, Settings)> {
     all
 }
 
-/// Asserts that the scenes called `names` give the same frames with each of `thresholds`.
+/// Asserts that the scenes called `names` give the same frame by scatter and by tiles, for each of
+/// `thresholds`.
 fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
     let backend = |pixels| {
         let mut gpu = common::gpu()?;
@@ -131,8 +132,8 @@ fn bands_and_pages_of_tiles_do_not_show() {
 fn a_wrong_tile_is_noticed() {
     let (name, scene, camera, mut options) = drawn().swap_remove(1);
     options.organisation = Organisation::Tile;
-    // Changes to tiles that gather all splats, large and small, and (below) to tiles that add large
-    // splats to stored sums of several pages.
+    // These changes break tiles that gather all splats, large and small. Those in `stored` break
+    // tiles that add large splats to stored sums, in several pages.
     let gathered = [
         ("bin.wgsl", "atomicStore(&lists[at], slot)", "atomicStore(&lists[at], 0u)"),
         ("bin.wgsl", "tile_size(), 0u, 1u, true)", "tile_size(), 1u, 1u, true)"),
@@ -150,7 +151,7 @@ fn a_wrong_tile_is_noticed() {
         ("covered.wgsl", "place < visible[covered_start()]", "place + 1u < visible[covered_start()]"),
         ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
     ];
-    // A change of one unit of 2^-32 would be invisible; 2^-4 is not.
+    // An error of one unit (2^-32) in a sum would be invisible; one of 2^28 units (2^-4) is not.
     let stored = [
         ("tile.wgsl", "deposit(column.pixel + k * held.width)", "deposit(column.pixel)"),
         ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
@@ -193,7 +194,7 @@ fn a_view_that_needs_more_room_gets_it() {
         let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
         renderer.frame(&far, &()).unwrap();
         let small = renderer.device_bytes().pixels;
-        // Then back to the far view: larger buffers do not change a bit either.
+        // The last render is the far view again: larger buffers do not change a bit either.
         for view in [&near, &far] {
             let (kept, _) = renderer.frame(view, &()).unwrap();
             let grew = renderer.device_bytes().pixels > small;
@@ -205,8 +206,8 @@ fn a_view_that_needs_more_room_gets_it() {
     }
 }
 
-/// Each band has its own splats and may need far longer lists than the next, so lengths are
-/// recorded per band.
+/// Each band has its own splats and may need far longer lists than the next band, so the lengths of
+/// lists are recorded per band.
 #[test]
 fn bands_that_need_different_room_get_it() {
     let Some(gpu) = common::gpu() else { return };
@@ -214,7 +215,8 @@ fn bands_that_need_different_room_get_it() {
     let scene = sphere(900, 2.5);
     let far = common::scenes::sphere_camera_with(160, epsplat::low_level::scene::Lens::Fov(170.0));
     let near = common::scenes::sphere_camera(160, Projection::Pinhole);
-    // The sphere is in the first band, in the last, and with only a sliver of it in view.
+    // Three views: the sphere is in the first band, in the last band, and all but a sliver is out
+    // of view.
     let [up, down, sliver] = [-60.0, 60.0, 140.0].map(|moved| Camera { cy: near.cy + moved, ..near.clone() });
     for organisation in [Organisation::Auto, Organisation::Tile] {
         let options = Settings { organisation, ..Settings::default() };
@@ -228,7 +230,8 @@ fn bands_that_need_different_room_get_it() {
     }
 }
 
-/// The longest lists that tiles draw, of large and small splats over both halves of a tile.
+/// Draws the longest lists that tiles accept, of large and of small splats, in both halves of a
+/// tile.
 #[test]
 fn the_longest_lists_are_drawn_to_their_end() {
     const LONGEST: usize = 8_000;
@@ -237,7 +240,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
         gpu.adapter.subgroups &= subgroups;
         let backend = on(gpu, large_from(100));
         let disk = |radius: f32| Surfel::disk(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, radius);
-        // Radius of 4 pixels, and one that covers the whole image.
+        // A radius of 4 pixels, and one that covers the whole image.
         let surfels = [4.0, 20.0].iter().flat_map(|&radius| vec![disk(radius); LONGEST]).collect();
         let colors = Colors::Constant([1.0; 4]);
         let scene =

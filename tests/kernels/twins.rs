@@ -55,7 +55,7 @@ fn record_at(splat: &layout::Splat, projection: Projection, x: u32, y: u32, worl
 struct Findings {
     looked: usize,
     wrong: Vec<String>,
-    /// The largest used fraction of a bound.
+    /// The largest difference as a fraction of its bound.
     used: f64,
 }
 
@@ -184,10 +184,10 @@ fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     findings
 }
 
-/// Checks that the twins lie in the enclosures, and that these are tight.
+/// Checks that the twins' values lie in the enclosures, and that the enclosures are tight.
 ///
-/// Nearly all pixels must be decided, and the intervals of depth and weight only a few digits wider
-/// than f32 precision.
+/// Nearly all pixels must be decided. The intervals of depth and weight may be only a few digits
+/// wider than f32 precision.
 fn check_enclosure(case: &Case, options: &Settings, twins: &[Splat], enclosure: &[Pixel]) {
     let height = case.camera.height;
     let nearest = visibility::reference(twins.iter(), &case.camera, LowPass::None, 0, height);
@@ -223,8 +223,8 @@ fn check_enclosure(case: &Case, options: &Settings, twins: &[Splat], enclosure: 
 
 #[test]
 fn scenes_hold_what_they_claim() {
-    // The widest range of cosines and the edge-on disks hit some pixels; otherwise the bounds would
-    // not be exercised.
+    // Disks at all angles, down to edge-on ones, hit some pixels; otherwise the bounds would not be
+    // exercised.
     let case = &cases()[0];
     let twins = reference_all(&case.scene, &case.camera, &Settings::default());
     let mut hit_below = [0usize; 6];
@@ -361,8 +361,8 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 let bound = Accumulator::Fixed.row().error_bound;
                 let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
-                // The error of a highlight's cosine is four times that of the normal, and its power
-                // multiplies that by the exponent.
+                // The cosine of a highlight has four times the normal's error, and raising it to a
+                // power multiplies that by the exponent.
                 let highlight = if shading == Shading::Phong { 1.0 + 4.0 * options.shininess } else { 0.0 };
                 let of_color = limit * (1.0 + HIGHLIGHT as f32 * highlight);
                 assert!(

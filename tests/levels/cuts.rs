@@ -22,8 +22,8 @@ use epsplat::low_level::scene::{
 };
 use glam::{DVec3, Vec3};
 
-/// An adapter whose buffers hold 1,900 surfels and nodes, so that a tree is split into several
-/// branches.
+/// An adapter with buffers of 70,000 bytes (about 1,900 surfels), so that a tree is split into
+/// several branches.
 fn small() -> Gpu {
     common::gpu().unwrap().with_buffer_limit(70_000)
 }
@@ -89,7 +89,7 @@ fn a_device_makes_the_cut_of_its_twin() {
                 },
             ),
         ];
-        // The first scene is drawn in all ways, the others only in the first.
+        // The first scene is drawn with all options, the others only with the first.
         let (ways, adapters) = if name == "plain" { (4, 4) } else { (1, 2) };
         let options = options.into_iter().take(ways);
         let fading = options.clone().map(|(projection, options)| (projection, fading(&options)));
@@ -99,8 +99,8 @@ fn a_device_makes_the_cut_of_its_twin() {
             let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
             assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
             assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
-            // The first adapter draws all of them and the others a third each, as compiling kernels
-            // takes seconds.
+            // As compiling kernels takes seconds, only the first adapter draws the first scene with
+            // all options; the others draw a third each.
             let draws = |on: usize| name != "plain" || on == 0 || (on + step).is_multiple_of(3);
             for (_, (on, backend)) in backends.iter().take(adapters).enumerate().filter(|(on, _)| draws(*on)) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
@@ -148,8 +148,8 @@ fn a_device_leaves_out_what_its_twin_does() {
     assert!(left_out >= 5, "{left_out}");
 }
 
-/// Cuts with transparency and with the rasteriser; ties in fragment lists follow the order of the
-/// cut.
+/// Cuts are composited in all modes and drawn by the rasteriser. Ties in fragment lists follow the
+/// order of the cut.
 #[test]
 fn cuts_are_composited_and_rasterised() {
     let Some(gpu) = common::gpu() else { return };
@@ -161,13 +161,14 @@ fn cuts_are_composited_and_rasterised() {
         let expected = bits(&frame(&scene, &camera, &options, &own));
         assert!(expected == bits(&frame(&scene, &camera, &options, &small)), "{composite:?}");
         let (twins, flat) = cut(&scene, &camera, &options);
-        // As a scene of its own, the cut has another order of ties and another least depth.
+        // A scene that consists of the cut has another order of ties and another least depth, so
+        // only the frame of `layers` equals it bit by bit.
         let alike = || expected == bits(&frame(&twins, &camera, &flat, &own));
         assert!(!matches!(composite, Composite::Layers(_)) || alike(), "{composite:?}");
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
         let wrong = differ(&frame(&scene, &camera, &options, &own), &reference);
-        // Fragments at almost equal depths may be sorted differently, as in a scene that consists
-        // of the cut.
+        // Device and reference may sort fragments of almost equal depth differently. `alone` counts
+        // such pixels for a scene that consists of the cut.
         let alone = differ(&frame(&twins, &camera, &flat, &own), &frame(&twins, &camera, &flat, &Backend::Reference));
         assert!(wrong < 5 + alone && alone < 10, "{composite:?}: {wrong} {alone}");
     }
@@ -176,8 +177,8 @@ fn cuts_are_composited_and_rasterised() {
     let disks = Settings { raster: None, detail_caps: false, ..raster.clone() };
     let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
-    // With its own depths, offset by each surfel's radius, it draws the cut like a scene that
-    // consists of it.
+    // With depths offset by each surfel's radius, the rasteriser draws the cut like a scene that
+    // consists of the cut.
     let moved = Raster { depth: RasterDepth::Offset, ..Raster::default() };
     let moved = Settings { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
     let (twins, flat) = cut(&scene, &camera, &moved);
@@ -194,8 +195,8 @@ fn differ(shown: &Frame, truth: &Frame) -> usize {
     shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
 }
 
-/// The same bits for any order of the surfels, any number of threads, and any sequence of views,
-/// whether or not buffers must grow.
+/// A cut gives the same bits for any order of the surfels, any number of threads, and any sequence
+/// of views, whether or not buffers must grow.
 #[test]
 fn a_cut_depends_on_tree_and_camera_alone() {
     let Some(gpu) = common::gpu() else { return };
@@ -224,7 +225,7 @@ fn a_cut_depends_on_tree_and_camera_alone() {
     }
 }
 
-/// A leaf with more surfels than one invocation copies or one buffer holds.
+/// Draws a leaf that has more surfels than one invocation copies or one buffer holds.
 #[test]
 fn crowded_leaves_are_drawn_whole() {
     let Some(gpu) = common::gpu() else { return };
@@ -262,13 +263,13 @@ fn crowded_leaves_are_drawn_whole() {
     }
 }
 
-/// Several such leaves at different depths of the tree: a loop in one invocation would exceed
-/// llvmpipe's iteration limit.
+/// Draws several leaves of 33,000 coincident surfels each, at different depths of the tree. A loop
+/// over them in one invocation would exceed llvmpipe's iteration limit.
 #[test]
 fn crowds_at_several_depths_are_drawn_whole() {
     const COPIES: usize = 33_000;
     let Some(gpu) = common::gpu() else { return };
-    // Splitting at means separates the farthest crowd first.
+    // The tree splits nodes at the mean position, so the farthest crowd is separated first.
     let crowd = |k: i32| vec![Surfel::disk(Vec3::X * 2f32.powi(-2 * k), Vec3::Z, 0.05); COPIES];
     let surfels: Vec<Surfel> = (0..4).flat_map(crowd).collect();
     let colors = Colors::Srgb8((0..surfels.len()).map(|k| [(k / COPIES * 60) as u8, 90, 20, 255]).collect());
@@ -283,8 +284,8 @@ fn crowds_at_several_depths_are_drawn_whole() {
     assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
 }
 
-/// Unusual views have the cut of the twin: the camera plane crosses the scene, several samples, far
-/// from the origin, a fixed number of splats.
+/// Unusual views have the cut of the twin: the camera plane crosses the scene, pixels have several
+/// samples, the camera is far from the origin, or the number of splats is fixed.
 #[test]
 fn odd_views_have_the_cut_of_the_twin() {
     let Some(gpu) = common::gpu() else { return };
@@ -336,7 +337,7 @@ fn broken_kernels_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let scene = levels(sphere(6000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
-    // The second of these has several branches and pages.
+    // The second case runs on the small adapter and has several branches and pages.
     let ways = [Settings { cull: Cull::None, ..at(60.0) }, Settings { cull: Cull::Back, ..at(1e-6) }];
     let whole = [Backend::gpu(gpu), Backend::gpu(small())];
     let right = [0, 1].map(|way| {
@@ -373,8 +374,8 @@ fn broken_kernels_are_noticed() {
     }
 }
 
-/// Levels with so many nodes that an invocation sums several counts, besides the first levels,
-/// which one workgroup handles.
+/// Tests levels of so many nodes that each invocation sums several counts. One workgroup handles
+/// the first, small levels.
 #[test]
 fn large_levels_are_summed() {
     let Some(gpu) = common::gpu() else { return };
@@ -413,9 +414,9 @@ fn large_levels_are_summed() {
     }
 }
 
-/// Children that are drawn without a test of their own are exactly those that would pass it,
-/// wherever nodes lie in the image and relative to the camera; each condition for this is
-/// necessary.
+/// A node's children may be drawn together, without a test of each: these are exactly the children
+/// that would pass the test, wherever nodes lie in the image and relative to the camera. Each
+/// condition of this shortcut is necessary.
 #[test]
 fn children_are_drawn_together_where_each_would_be() {
     const TOGETHER: &str = "MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball)";
@@ -453,7 +454,8 @@ fn children_are_drawn_together_where_each_would_be() {
     assert_eq!(noticed, [true; 2]);
 }
 
-/// Runs `drawn_at` of a text of select.wgsl for each (runs, stride, place, first).
+/// Runs the function `drawn_at` of `text`, a version of select.wgsl, for each (runs, stride, place,
+/// first).
 fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
     const KERNEL: &str = "
         const RUN: u32 = 512u;

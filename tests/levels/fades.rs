@@ -27,14 +27,14 @@ fn fading(pixels: f64) -> Settings {
     Settings { detail: Detail::Pixels(pixels), detail_fades: true, cull: Cull::None, ..Settings::default() }
 }
 
-/// A pixel is covered exactly where the cut of its number covers it. The 64 cuts have node sizes
-/// from half the largest size upward.
+/// Each pixel shows one of the 64 cuts, by the cut's number, and is covered exactly if that cut
+/// covers it. The cuts' node sizes increase from half the requested size.
 #[test]
 fn a_sample_shows_the_cut_of_its_number() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
-    // Flat nodes, as the outlines of caps hardly depend on their size.
+    // Nodes are flat here, as the outlines of caps hardly depend on the node size.
     let options = Settings { detail_caps: false, ..fading(400.0) };
     let [device, reference] =
         [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
@@ -49,7 +49,7 @@ fn a_sample_shows_the_cut_of_its_number() {
             let of_cut = Fade::threshold(index as u32 % 96, index as u32 / 96) == number;
             let shows = [&device, &reference].map(|color| color[index][3] == 1.0);
             assert!(!of_cut || shows == [*expected; 2], "{number}: {index}");
-            // Cuts of other numbers often differ.
+            // The pixel often differs from cuts of other numbers.
             others += usize::from(!of_cut && shows[0] != *expected);
             some += usize::from(of_cut);
         }
@@ -64,8 +64,8 @@ fn differ(shown: &Frame, truth: &Frame) -> usize {
     shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
 }
 
-/// The same fades by tiles and one by one, with a low-pass, with several samples, with every
-/// accumulator and in any order.
+/// The device's fades equal the twin's by tiles and by scatter, with a low-pass, with several
+/// samples, with every accumulator and in any order of the surfels.
 #[test]
 fn fades_are_those_of_the_twin_in_every_organisation() {
     let Some(gpu) = common::gpu() else { return };
@@ -101,7 +101,8 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
         sums += 1;
         let counts = counted(&shown).iter().zip(&counted(&reference)).filter(|(a, b)| a != b).count();
         assert!(counts < 4, "{}: {counts}", row.name);
-        // With 24 fraction bits, the rim of 1/64 of a disk has only 9 significant bits.
+        // A splat in one of the 64 cuts has 1/64 of its weight. In sums of 24 fraction bits, its
+        // rim then has only 9 significant bits.
         let colors = shown.color.as_flattened().iter().zip(reference.color.as_flattened());
         let off = colors.filter(|(a, b)| (*a - *b).abs() > 2e-3).count();
         assert!(off < 4, "{}: {off}", row.name);
@@ -156,9 +157,9 @@ fn changes(shown: &[Frame], full: &[Frame]) -> [f32; 2] {
     most
 }
 
-/// Along a dolly of 120 views no pixel changes more than 1.5 times as much as any of the full cloud
-/// does. The difference from the full cloud's change of the same pixel is less than half of that
-/// without fades.
+/// Along a dolly of 120 views, no pixel changes by more than 1.5 times the largest change of the
+/// full cloud. Fades more than halve the largest difference from the full cloud's change of the
+/// same pixel.
 #[test]
 fn nothing_pops_along_a_dolly() {
     let Some(gpu) = common::gpu() else { return };

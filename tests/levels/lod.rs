@@ -51,7 +51,8 @@ fn lod(points: Points) -> Scene {
     hierarchy::build(build(vec![points], &()).unwrap().0, &()).unwrap().0
 }
 
-/// A file keeps its tree; if points are missing or files are joined, it is read as a cloud.
+/// A file keeps its tree. Files with dropped points, and several files together, are read as
+/// clouds.
 #[test]
 fn a_file_keeps_levels_of_detail() {
     let folder = tempfile::tempdir().unwrap();
@@ -172,7 +173,7 @@ fn a_cut_is_drawn() {
     };
     let flat = draw(&surfels, "flat.png", &[]).0;
     assert!(flat == draw(&levels, "all.png", &[]).0 && flat == draw(&levels, "zero.png", &["--lod", "0"]).0);
-    // Everything is in view and no node is that small, so the cut has all surfels.
+    // Everything is in view and every node is larger than this size, so the cut has all surfels.
     assert!(flat == draw(&levels, "finest.png", &["--lod", "0.000001px"]).0);
     let (coarse, told) = draw(&levels, "coarse.png", &["--lod", "80px"]);
     let drawn = |told: &str| -> u64 {
@@ -204,7 +205,7 @@ fn a_cut_is_drawn() {
     }
 }
 
-/// From inside a closed surface, its inside is visible in cuts too. From outside, culling back
+/// Seen from inside, cuts show the inside of a closed surface too. Seen from outside, culling back
 /// faces leaves no holes at outlines.
 #[test]
 fn cuts_of_closed_scenes_are_whole() {
@@ -284,7 +285,7 @@ fn trees_are_made_within_memory() {
     let [surfels, levels] = spheres(&folder, "200000");
     let bounded = path("bounded.ply");
     assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
-    // The memory that the threads need, and enough for less than half of the points.
+    // Memory for the threads, and for less than half of the points.
     let threads = std::thread::available_parallelism().unwrap().get();
     let memory = format!("{}MiB", 96 + 48 * threads + 15);
     let (code, text, told) = epsplat(&["lod", &surfels, "-o", &bounded, "--memory", &memory, "--json", "-"]);
@@ -293,7 +294,7 @@ fn trees_are_made_within_memory() {
     assert!(report["surfels"] == 200_000 && report["subtrees"].as_u64().unwrap() >= 8, "{report}");
     let same = || std::fs::read(&levels).unwrap() == std::fs::read(&bounded).unwrap();
     assert!(same());
-    // Two tiles and a file that is not one.
+    // Writes two tiles, and a file that is no tile, to one folder.
     let tiles = folder.path().join("tiles");
     std::fs::create_dir(&tiles).unwrap();
     let whole = io::read(Path::new(&surfels), &()).unwrap();

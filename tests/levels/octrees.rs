@@ -53,7 +53,7 @@ fn a_picture_reads_what_it_takes() {
         let some = read(&coarse, &["--splats", &most.to_string()]);
         assert!((most / 2..=most).contains(&some["points"][0].as_u64().unwrap()), "{some}");
     }
-    // Together with another file it is read whole, and levels are built.
+    // Together with another file, the COPC file is read whole, and levels are built.
     let bunny = Path::new(DATA).join("bunny.obj");
     let run = ["render", &file(), text(&bunny), "--lod", "30px", "--size", "32x32", "--json", "-", "-o", text(&coarse)];
     let report: serde_json::Value = serde_json::from_slice(&succeeds(&run).stdout).unwrap();
@@ -114,7 +114,7 @@ fn a_view_of_nothing_is_told() {
     fails(&["render", text(&damaged), "--lod", "4px", "-o", text(&output)], 1, &["a.copc.laz: a page of its octree"]);
 }
 
-/// With fewer points disks are larger, but they still end near the border of all points.
+/// With fewer points, disks are larger, but they still end near the border of the whole cloud.
 #[test]
 fn a_part_ends_where_the_cloud_does() {
     let folder = Folder::new();

@@ -116,8 +116,8 @@ fn ways() -> Vec<Settings> {
         Settings { detail_measure: DetailMeasure::Area, samples: Samples { across: 2, down: 1 }, ..at(20.0) },
         Settings { cull: Cull::Back, detail_caps: false, ..at(300.0) },
         Settings { detail: Detail::Splats(300), maps: Maps::NONE, ..at(0.0) },
-        // In these two, back faces are visible in the colours but not in the maps or vice versa,
-        // and samples differ.
+        // These two show back faces in the colours but not in the maps, or vice versa, and differ
+        // in samples.
         Settings {
             composite: Composite::Layers(4),
             opacity: 0.5,
@@ -140,7 +140,7 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
         let path = written(scene, folder.path());
         let whole = whole(&path);
         let (nodes, count) = (whole.hierarchy.as_ref().unwrap().nodes.len() as u64, whole.surfels.len() as u64);
-        // The first scene is drawn in all ways, the others in one each.
+        // The first scene is drawn with all options, the others with one of the first two.
         let ways = if number == 0 { ways() } else { ways().into_iter().skip(number % 2).take(1).collect() };
         for (way, options) in ways.into_iter().enumerate() {
             let mut last: Option<Scene> = None;
@@ -148,7 +148,8 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
                 let (part, taken) = part(&path, &camera, &options).unwrap();
                 let held = (part.hierarchy.as_ref().unwrap().nodes.len() as u64, part.surfels.len() as u64);
                 assert_eq!((taken.nodes, taken.surfels), held);
-                // The first combination runs on all backends.
+                // The first scene is drawn with the first options on all backends, other
+                // combinations on one.
                 let turn = (number + way) % 2;
                 let on = match options.composite {
                     Composite::Opaque if number + way == 0 => 0..3,
@@ -175,7 +176,8 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
     assert!(less > 30 && apart > 15, "{less} {apart}");
 }
 
-/// The part for several pictures together suffices for each of them; that for one alone does not.
+/// The part for several pictures together suffices for each of them. The part for the first picture
+/// alone does not.
 #[test]
 fn a_part_of_several_pictures_is_enough_for_each() {
     let Some(gpu) = common::gpu() else { return };
@@ -219,7 +221,7 @@ fn what_is_missing_leaves_no_holes() {
         for backend in &backends {
             let (shown, report) = render(&part, &camera, &fine, backend, &()).unwrap();
             let (all, of_all) = render(&whole, &camera, &fine, backend, &()).unwrap();
-            // Pixels that the coarse cut covers too, as its outline differs.
+            // Only pixels that both cuts cover count, as the coarse cut has another outline.
             let (outline, _) = render(&whole, &camera, &coarse, backend, &()).unwrap();
             let covers = |frame: &Frame, pixel: usize| frame.color[pixel][3] > 0.0;
             let both = |pixel: &usize| covers(&all, *pixel) && covers(&outline, *pixel);
@@ -329,7 +331,7 @@ fn damaged_files_are_told() {
     assert!(Levels::open(Input::open(&other, None).unwrap()).unwrap().is_none());
 }
 
-/// Files without the element `scene` (of other versions), or with other content, are not read in
+/// Files without the element `scene` (of other versions) or with additional content are not read in
 /// parts.
 #[test]
 fn other_files_are_read_whole() {
@@ -354,7 +356,7 @@ fn other_files_are_read_whole() {
     assert!(Levels::open(Input::open(&obj, None).unwrap()).unwrap().is_none());
 }
 
-/// A view of nothing needs no surfel; a scene of one surfel is read as itself.
+/// A view that shows nothing reads no surfel. A scene of one surfel is read as one node.
 #[test]
 fn the_smallest_parts() {
     let folder = tempfile::tempdir().unwrap();

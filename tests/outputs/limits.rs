@@ -7,7 +7,7 @@ use epsplat::low_level::scene::Map;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A 1-bit PNG with a header for this size, and without its pixels.
+/// A 1-bit PNG whose header states this size, without the pixels.
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
     let mut chunk = |name: &[u8], data: &[u8]| {
@@ -29,7 +29,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
 }
 
-/// An EXR with a header for this size.
+/// An EXR whose header states this size.
 fn exr(folder: &Folder, name: &str, width: u32, height: u32) -> PathBuf {
     let path = folder.path(name);
     let frame = Frame::of_colors(3, 2, vec![[0.5; 4]; 6]);
@@ -80,7 +80,7 @@ fn images_beyond_the_limit_are_refused_by_their_headers() {
 #[test]
 fn what_the_system_has_no_room_for_is_said() {
     let folder = Folder::new();
-    // Within the limit, but 3.7 GB as a frame.
+    // The images are within the size limit, but take 3.7 GB as a frame.
     let large = folder.file("large.png", png(12_000, 12_000));
     let exr = exr(&folder, "large.exr", 12_000, 12_000);
     let cloud = folder.file("c.ply", ply("x y z u v", 3, "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n"));
@@ -144,7 +144,7 @@ fn counts_that_memory_has_no_room_for_are_said() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// A file size limit does not kill the run: it removes the partial file and reports the error.
+/// A file size limit does not kill the run: the run removes the partial file and reports the error.
 #[cfg(unix)]
 #[test]
 fn at_a_limit_of_the_size_of_files_nothing_is_left() {
@@ -161,7 +161,7 @@ fn at_a_limit_of_the_size_of_files_nothing_is_left() {
         &["simplify", text(&cloud), "-o", &out, "--tolerance", "abs:1e-9"],
         &["render", &bunny, "-o", text(&folder.path("o.exr")), "--backend", "reference", "--size", "300x300"],
     ] {
-        // The unit is 512 bytes or a kilobyte, depending on the shell.
+        // The unit of `ulimit -f` is 512 bytes or a kilobyte, depending on the shell.
         let script = "ulimit -f 40 && exec \"$0\" \"$@\"";
         let mut command = Command::new("sh");
         let output = command.args(["-c", script, env!("CARGO_BIN_EXE_epsplat")]).args(arguments).output().unwrap();

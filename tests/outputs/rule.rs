@@ -115,7 +115,7 @@ fn no_output_overwrites_an_input_by_any_name() {
             refuses(command, &alias);
             std::fs::remove_file(&alias).unwrap();
         }
-        // Control: with another name it runs, and changes no input.
+        // Control: with another output name the command runs, and changes no input.
         let line = line(command, &folder, &others.path(&format!("new.{extension}")));
         let output = run(&line);
         assert!(output.status.success(), "{line:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -153,7 +153,7 @@ fn two_outputs_are_two_files() {
         let line = simplify(text(json));
         fails(&line.each_ref().map(String::as_str), 2, &["the same file", "overwrite"]);
     };
-    // First while the output does not exist yet, then when it does.
+    // The first round has no output file yet, the second has one.
     std::os::unix::fs::symlink("made.ply", &linked).unwrap();
     for _ in 0..2 {
         [&made, &folder.path("colmap/../made.ply"), &linked].into_iter().for_each(|json| refused(json));
@@ -182,7 +182,7 @@ fn two_outputs_are_two_files() {
     assert!(null.is_symlink() && std::fs::metadata("/dev/null").unwrap().len() == 0);
 }
 
-/// Redirected standard output is a file that others also write to, before and after.
+/// Redirected standard output may be a file that other programs write to, before and after the run.
 #[cfg(unix)]
 #[test]
 fn stdout_by_name_is_written_to_and_not_replaced() {

@@ -68,7 +68,7 @@ fn what_is_read_at_second_hand_is_not_overwritten() {
         "$E sample p.mesh.ply --count 9 -o p.mesh.ply".into(),
         "$E hybrid cube.dat --input-format obj -o q.ply --json cube.mtl".into(),
         "$E coverage s.ply --mesh p.mesh.ply --views 1 --side 8 --json p.mesh-1.png".into(),
-        // Through standard input from a file or a pipe, and through a named pipe.
+        // The input comes through standard input from a file or a pipe, or through a named pipe.
         format!("$E render - -o cube.png {others} < s.ply"),
         format!("cat s.ply | $E render - -o x.png --json cube.obj {others}"),
         format!("cat p.ply | $E render - -o p.mesh-1.png {others}"),
@@ -81,14 +81,14 @@ fn what_is_read_at_second_hand_is_not_overwritten() {
             let _ = std::fs::remove_file(folder.path(made));
         }
     }
-    // Under another name.
+    // The output is a link to an input.
     for (link, target) in [("ln -s", "cube.png"), ("ln", "cube.png"), ("ln", "p.mesh-1.png")] {
         let input = if target == "cube.png" { "s.ply" } else { "p.ply" };
         assert!(shell(&folder, &format!("{link} {target} alias.png")).status.success());
         refused(&folder, &format!("$E render {input} -o alias.png {others}"));
         std::fs::remove_file(folder.path("alias.png")).unwrap();
     }
-    // An image that is named but does not exist yet.
+    // The output is an image that the input names, and that does not exist yet.
     folder.file("cube.mtl", "newmtl x\nmap_kd sub/../other.png\n");
     std::fs::create_dir(folder.path("sub")).unwrap();
     let output = shell(&folder, &format!("$E render s.ply -o other.png {others}"));
@@ -124,12 +124,12 @@ fn the_file_that_standard_input_is_is_an_input() {
         "$E render - -o b.png --json a.ply --backend reference < a.ply",
         "ln a.ply c.ply; $E lod - -o c.ply < a.ply; code=$?; rm c.ply; exit $code",
         "ln -s a.ply c.ply; $E lod - -o c.ply < a.ply; code=$?; rm c.ply; exit $code",
-        // Standard output is a stream, but must not append to an input.
+        // Streams may be outputs, but a run must not append its standard output to an input.
         "$E info a.ply --json /dev/stdout >> a.ply",
     ] {
         refused(&folder, line);
     }
-    // Control: from the start of a file and from its middle.
+    // Control: standard input may be a file, read from its start or from its middle.
     assert!(shell(&folder, "$E lod - -o b.ply < a.ply").status.success());
     let output = shell(&folder, "(echo junk; cat a.ply) > d; (read junk; $E info - --json e.json) < d");
     assert!(output.status.success(), "{output:?}");
@@ -184,7 +184,7 @@ fn hybrid_replaces_only_what_it_wrote_itself() {
         assert!(!folder.path("elsewhere.ply").exists());
         std::fs::remove_file(folder.path("p.mesh.ply")).unwrap();
     }
-    // A mesh that epsplat wrote but that names other images leaves these images alone.
+    // A mesh that epsplat wrote may name images that it did not write; these are not deleted.
     folder.file("kept.png", std::fs::read(folder.path("cube.png")).unwrap());
     let own = "ply\nformat ascii 1.0\ncomment epsplat 1\ncomment hybrid\ncomment TextureFile kept.png\n\
                element vertex 0\nproperty float x\nend_header\n";

@@ -30,8 +30,8 @@ fn signal(child: &Child, name: &str) {
     Command::new("sh").args(["-c", &kill]).status().unwrap();
 }
 
-/// The exit code as a shell reports it, as the handler is not yet installed in the first
-/// milliseconds.
+/// Returns the exit code as a shell reports it: in its first milliseconds a run has no signal
+/// handler yet, so the signal itself may end the run.
 fn code(status: ExitStatus) -> i32 {
     status.code().or_else(|| Some(128 + status.signal()?)).unwrap()
 }
@@ -77,7 +77,7 @@ fn a_signal_while_writing_takes_the_unfinished_file_away() {
     }
 }
 
-/// As under `nohup`.
+/// A run that ignores SIGHUP, as under `nohup`, is not ended by it.
 #[test]
 fn a_signal_that_is_ignored_stays_ignored() {
     let folder = Folder::new();
@@ -112,12 +112,13 @@ fn commands(inputs: &Folder, out: &Path) -> Vec<Vec<String>> {
     ]
 }
 
-/// The contents of a folder, without the times, which differ between runs.
+/// The contents of a folder. Files that contain times, which differ between runs, count only by
+/// their last byte.
 fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let of_times = |path: &Path| path.extension().is_some_and(|e| ["json", "html", "csv"].iter().any(|x| e == *x));
     let read = |path: PathBuf| {
         let bytes = std::fs::read(&path).unwrap();
-        // For these files, the final line feed shows that they are complete.
+        // In files with times, the final line feed shows that they are complete.
         let bytes = if of_times(&path) { bytes.last().map(|last| vec![*last]).unwrap_or_default() } else { bytes };
         (path, bytes)
     };

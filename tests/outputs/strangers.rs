@@ -5,7 +5,7 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-/// Surfels that name the triangles `name` to be drawn with.
+/// A file of surfels that names the mesh file `name`, whose triangles are drawn with them.
 fn naming(name: &str) -> String {
     let rows: String = (0..36).map(|i| format!("{} {} 9 0 0 1 1\n", i % 6, i / 6)).collect();
     ply("x y z nx ny nz radius", 36, &rows)
@@ -66,15 +66,15 @@ fn triangles_are_a_file_of_the_same_folder() {
         }
         assert!(!folder.path("o.ply").exists() && !folder.path("o.png").exists(), "{name}");
     }
-    // Control: a name in the same folder is allowed, also through a link within it, and so is one
-    // of a missing file, which only a picture needs.
+    // Controls: the name of a file in the same folder is allowed, also through a link within the
+    // folder. So is the name of a missing file, which only a render opens.
     symlink("m.obj", folder.path("within.obj")).unwrap();
     for name in ["m.obj", "within.obj"] {
         let input = folder.file("s.ply", naming(name));
         for command in commands(&folder, &input) {
             succeeds(&command.iter().map(String::as_str).collect::<Vec<_>>());
         }
-        // Files derived from them in the same folder also name the mesh, relative to that folder.
+        // Files that are derived from these surfels in the same folder name the mesh too.
         let header = String::from_utf8_lossy(&std::fs::read(folder.path("o.ply")).unwrap()).into_owned();
         assert!(header.contains(&format!("\ncomment triangles {name}\n")), "{name}");
     }
@@ -85,7 +85,8 @@ fn triangles_are_a_file_of_the_same_folder() {
     fails(&render, 1, &["none.obj", "No such file"]);
 }
 
-/// In another folder the name would mean another file, so it is dropped with a note.
+/// A derived file in another folder does not name the mesh: there the name would mean another file.
+/// A note reports that.
 #[test]
 fn derived_files_of_other_folders_name_no_triangles() {
     let (folder, other) = (Folder::new(), Folder::new());
@@ -160,7 +161,7 @@ fn devices_and_streams_without_an_end_are_refused() {
         "yes v | $E render s.ply --camera /dev/stdin --backend reference -o o.png",
         &["longer than 256 MiB"],
     );
-    // A library that is a device, or a pipe without a writer, is left out.
+    // A material library that is a device, or a pipe without a writer, is left out.
     let told = epsplat(&["sample", text(&folder.path("m.obj")), "-o", text(&folder.path("o.ply")), "--count", "9"]);
     let told = (told.status.success(), String::from_utf8(told.stderr).unwrap());
     assert!(told.0 && told.1.contains("the materials in z.json are left out: it is a device"), "{told:?}");

@@ -1,5 +1,5 @@
-//! Output folders are tested before anything is read: folders where no file can be created, as root
-//! or not.
+//! Output folders are tested before anything is read. A folder in which no file can be created is
+//! refused, for root and for other users.
 
 use super::common::command::{Folder, fails, ply, text};
 use std::os::unix::fs::{PermissionsExt, chown};
@@ -35,8 +35,8 @@ fn a_folder_in_which_nothing_can_be_made_is_told_before_anything_is_read() {
     fails(&["render", missing, "--cameras", cameras, "-o", "/proc/views"], 1, &["cannot write /proc/views"]);
 }
 
-/// The program as a user to whom file modes apply: the current one, or, for root, user 65534
-/// running a copy.
+/// Runs the program as a user to whom file modes apply: the current user, or, instead of root, user
+/// 65534 with a copy of the program.
 fn as_user(folder: &Folder) -> Command {
     let binary = Path::new(env!("CARGO_BIN_EXE_epsplat"));
     if !is_root() {
@@ -76,7 +76,7 @@ fn a_user_without_rights_is_told_before_anything_is_read() {
     assert!(code == Some(1) && said.contains("closed/x.ply: Permission denied") && said.lines().count() == 1, "{said}");
     let (code, said) = run(&cloud, "open/x.ply");
     assert_eq!(code, Some(0), "{said}");
-    // A read-only file in a folder in which it could be replaced.
+    // A file is read-only, but its folder allows replacing it.
     mode("open/x.ply", 0o444);
     let before = std::fs::read(folder.path("open/x.ply")).unwrap();
     let (code, said) = run(&cloud, "open/x.ply");

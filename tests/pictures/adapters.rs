@@ -1,4 +1,4 @@
-//! Other adapters than the one that the tests run on: a second driver, OpenGL, and graphics cards.
+//! Tests on other adapters than the default one: a second driver, OpenGL, and graphics cards.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -21,21 +21,21 @@ use std::process::{Command, Output};
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib/chromium-browser/vk_swiftshader_icd.json"];
 
-/// Draws three scenes with `render`, and compares them with the reference.
+/// Draws three scenes on the adapter, and compares them with the reference.
 ///
-/// `render` gets the program's arguments and whether they ask for an adapter. The adapter's name
-/// must contain `name`.
+/// `render` runs the program with the given arguments; its flag says whether the run uses the
+/// adapter. The adapter's name must contain `name`.
 fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) {
     let folder = Folder::new();
     let [many, few, theirs, ours] = ["many.ply", "few.ply", "theirs.exr", "ours.exr"].map(|name| folder.path(name));
     succeeds(&["generate", "sphere", "--count", "20000", "-o", text(&many)]);
     succeeds(&["generate", "sphere", "--count", "300", "-o", text(&few)]);
     let bunny = format!("{DATA}/bunny.obj");
-    // Culled and scattered splats; large splats; disks of a mesh with a low-pass.
+    // In order: many splats, of which some are culled; few large splats; filtered disks of a mesh.
     let scenes: [&[&str]; 3] = [&[text(&many), "--shading", "unlit"], &[text(&few)], &[&bunny, "--lowpass", "ewa"]];
     for scene in scenes {
         let render = |out: &Path, backend: &str, maps: &str| {
-            // For maps with several samples SwiftShader compiles for a minute, and may crash.
+            // SwiftShader takes a minute to compile maps with several samples, and may crash.
             let rest = [
                 "--samples",
                 "1",
@@ -61,8 +61,9 @@ fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) 
         render(&ours, "reference", "depth,weight,count,decision");
         let output = succeeds(&["compare", text(&theirs), text(&ours), "--json", "-"]);
         let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        // The studies' own limit, over pixels where no fragment is within rounding of a decision:
-        // one lost fragment in one of them is a thousand times as much.
+        // This is also the limit of the studies. It is over decided pixels, where no fragment is
+        // within rounding of a decision: one lost fragment in such a pixel gives a thousand times
+        // this error.
         assert!(comparison["rmse_decided"].as_f64().unwrap() < 1e-6, "{scene:?}: {comparison}");
         assert!(comparison["excused"].as_f64().unwrap() < 0.01, "{scene:?}: {comparison}");
     }
@@ -80,8 +81,8 @@ fn another_driver_draws_the_same_picture() {
     });
 }
 
-/// Without `--adapter`, OpenGL is the last choice; with `--adapter gl` it draws, whatever other
-/// adapters there are.
+/// Without `--adapter`, OpenGL is the last choice. With `--adapter gl` it draws even if other
+/// adapters exist.
 #[test]
 fn opengl_draws_the_same_picture() {
     if common::opengl().is_none() {
@@ -122,8 +123,8 @@ fn an_adapter_is_chosen_by_its_api_or_by_a_part_of_its_name() {
     check("no such adapter", None);
 }
 
-/// A graphics card is timed by its own clock, uses no subgroups, and draws only large splats by
-/// tiles; the bits are the same.
+/// A graphics card is timed by its own timestamps, uses no subgroups, and draws only large splats
+/// by tiles. The bits are the same as on a software adapter.
 #[test]
 fn a_card_is_timed_by_its_own_clock_and_draws_the_same() {
     let (Some(software), Some(mut card)) = (common::gpu(), common::gpu()) else { return };

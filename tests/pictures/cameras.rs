@@ -1,5 +1,5 @@
-//! Files of many cameras: pictures equal single renders in every format, and bad files end in a
-//! sentence.
+//! Files of many cameras: pictures equal single renders in every format, and bad files give a
+//! one-sentence error.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -40,7 +40,7 @@ fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The bunny at its own place and at map coordinates, where f32 has steps of half a unit.
+/// The bunny at its original position and at map coordinates, where f32 has steps of half a unit.
 fn scenes(folder: &Folder) -> [(PathBuf, DVec3); 2] {
     let bunny = Path::new(DATA).join("bunny.obj");
     let far = DVec3::new(445_000.0, 5_411_000.0, 300.0);
@@ -118,8 +118,8 @@ fn one_pose_is_the_same_in_both_formats() {
         assert_eq!((&a.name, a.camera.size, a.camera.lens), (&b.name, b.camera.size, b.camera.lens));
         let (Pose::Rigid(a, eye_a), Pose::Rigid(b, eye_b)) = (&a.camera.pose, &b.camera.pose) else { panic!() };
         let apart = (*a - *b).to_cols_array().into_iter().fold(0.0, |most: f64, e| most.max(e.abs()));
-        // An entry is 2 (ab + cd) of a unit quaternion: 16 roundings in all, of numbers up to 1.
-        // The eye's roundings are of 5e6.
+        // A matrix entry is 2 (ab + cd) of the components of a unit quaternion: 16 roundings in
+        // all, of numbers up to 1. The eye is rounded at 5e6, its largest coordinate.
         assert!(apart < 8.0 * f64::EPSILON && eye_a.distance(*eye_b) < 1e-8, "{apart:e} {:e}", eye_a.distance(*eye_b));
     }
 }
@@ -268,7 +268,8 @@ fn links_in_the_folder_lead_nowhere_out_of_it() {
         assert_eq!(bytes(&outside.join("b.png")), b"precious");
         std::fs::remove_file(output.join(link)).unwrap();
     }
-    // Control: a link that stays inside is followed, and so is one to the folder itself.
+    // Controls: a link to a folder inside the output folder is followed, and so is a link to the
+    // output folder itself.
     std::fs::create_dir(output.join("other")).unwrap();
     symlink("other", output.join("train")).unwrap();
     let linked = folder.path("linked");

@@ -1,4 +1,4 @@
-//! Equal surfels are drawn once: the image, counts included, is the same to the bit as when each is
+//! Equal surfels are drawn once: the image, counts included, has the same bits as when each copy is
 //! drawn.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -41,8 +41,9 @@ fn options(low_pass: LowPass, cull: Cull) -> Settings {
     Settings { low_pass, maps: Maps::ON_DEVICE, cull, ..Settings::default() }
 }
 
-/// The number of pixels that differ from the `reference` without excuse, and of excused pixels,
-/// where the decision margin is under 1e-4.
+/// Counts the pixels that differ from the `reference`, and the excused pixels.
+///
+/// A pixel is excused, and not compared, if its decision margin is below 1e-4.
 fn compared(frame: &Frame, reference: &Frame) -> (usize, usize) {
     let decision = reference.map(Map::Decision).unwrap();
     let excused = decision.iter().filter(|decision| **decision < 1e-4).count();

@@ -41,13 +41,14 @@ fn options(shape: PointShape) -> Settings {
     }
 }
 
-/// With no epsilon and a constant kernel the nearest point wins, or the mean of equally near ones.
+/// With a zero epsilon and a constant kernel, a pixel shows the nearest point, or the mean of
+/// equally near points.
 fn nearest(shape: PointShape) -> Settings {
     Settings { epsilon: Epsilon::Absolute(0.0), kernel: Kernel::Constant, ..options(shape) }
 }
 
 /// The number of decided pixels where a colour or map differs by more than `tolerance` times the
-/// larger of its value and 0.5.
+/// larger of the reference's value and 0.5.
 fn differing(frame: &Frame, reference: &Frame, tolerance: f32) -> usize {
     let decision = reference.map(Map::Decision).unwrap();
     let maps = [Map::Weight, Map::Depth, Map::Count].map(|map| (frame.map(map).unwrap(), reference.map(map).unwrap()));
@@ -102,8 +103,8 @@ fn broken_points_are_noticed() {
         (PointShape::Circle, "axes_facing.wgsl", "MOST_RADIUS * row", "1.1 * MOST_RADIUS * row"),
     ] {
         let Some(gpu) = common::gpu() else { return };
-        // Every point smaller than a pixel covers that pixel, so a wrong least radius would not
-        // show.
+        // A point smaller than a pixel covers its pixel anyway, so a wrong least radius would not
+        // show below one pixel.
         let least = if from.starts_with("LEAST") { 3.0 } else { 1.0 };
         let facing = Some(Facing { shape, pixels: [least, 12.0] });
         let options = Settings { facing, ..options(shape) };
@@ -137,9 +138,10 @@ fn frontal(size: u32) -> Camera {
 
 /// Counts wrong pixels and decided pixels.
 ///
-/// A pixel is decided if it is inside a footprint, off all rims by 1e-5, and its second site costs
-/// 1e-5 more than the first. It is wrong if its colour is not that of the site of least `cost`, a
-/// function of squared distance in the image and of height z.
+/// A site is a surfel whose footprint covers the pixel; its cost is `cost` of squared distance in
+/// the image and of height z. A pixel is decided if it has a site and is off the rims of all its
+/// sites by 1e-5. The second least cost must also exceed the least by 1e-5. A decided pixel is
+/// wrong if its colour is not that of the site of least cost.
 fn wrong_sites(frame: &Frame, scene: &Scene, size: u32, cost: impl Fn(f64, f64) -> f64) -> (usize, usize) {
     let Colors::Linear(colors) = &scene.colors else { panic!("colours") };
     let (mut wrong, mut decided) = (0, 0);
@@ -179,7 +181,7 @@ fn paraboloids_give_the_power_diagram_and_points_of_a_plane_the_voronoi_diagram(
         let (frame, _) = render(&scene, &frontal(size), &wide(nearest(PointShape::Paraboloid)), backend, &()).unwrap();
         let (wrong, decided) = wrong_sites(&frame, &scene, size, |squared, z| -z + squared / r);
         assert!(wrong == 0 && decided > 30_000, "{wrong} of {decided}");
-        // Control: the power diagram is not that of the nearest axis.
+        // Control: the Voronoi diagram of the axes differs from the power diagram.
         assert!(wrong_sites(&frame, &scene, size, |squared, _| squared).0 > 5000);
         let plane = sites(300, radius, |_| 0.125);
         for shape in [PointShape::Sphere, PointShape::Cone, PointShape::Paraboloid] {
@@ -281,15 +283,14 @@ fn what_is_left_out_of_points_changes_no_bit() {
         [Projection::Pinhole, Projection::Orthographic].into_iter().flat_map(|p| POINT_SHAPES.map(|shape| (p, shape)))
     {
         let camera = sphere_camera(96, projection);
-        // Points of a fifth of a pixel, and of twenty pixels.
+        // Points of about two pixels, and points enlarged to twenty pixels.
         for pixels in [[1.0, 50.0], [20.0, 50.0]] {
             let options = Settings { facing: Some(Facing { shape, pixels }), ..options(shape) };
             let plain = Settings { without: vec![Optimisation::Culling, Optimisation::Hiding], ..options.clone() };
             let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
             let (whole, _) = render(&scene, &camera, &plain, &backend, &()).unwrap();
             assert!(common::bits(&frame) == common::bits(&whole), "{name} {pixels:?}");
-            // Points enlarged to twenty pixels reach in front of the nearer half, so culling may
-            // find none.
+            // Enlarged points reach in front of the sphere's nearer half, so culling may find none.
             let some = report.splats_drawn < 27_500 || pixels[0] > 1.0;
             assert!(report.needs.contains(&"cull") && some, "{} {name} {pixels:?}", report.splats_drawn);
         }

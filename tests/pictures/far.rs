@@ -1,4 +1,4 @@
-//! Triangles far from the scene's origin, and needles: pictures equal those of triangles near it.
+//! Needles, and triangles far from the origin, which must look like the same triangles near it.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -34,7 +34,8 @@ fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) 
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// A closed surface with bumps, whose coordinates are multiples of 2^-16: f64 is exact 2^36 away.
+/// A closed surface with bumps. Its coordinates are multiples of 2^-16, so f64 holds them exactly
+/// even after a move by 2^36.
 fn rough() -> Mesh {
     let mut mesh = meshes::sphere(4, false);
     let mut random = Random(7);
@@ -96,8 +97,9 @@ fn single(triangles: &Triangles) -> Triangles {
 /// Places from 1e6 to 9e9 away, along axes and askew.
 const FAR: [[f64; 3]; 5] = [[1e6, 0.0, 0.0], [-3e6, 2e6, 1e6], [0.0, 1e7, -1e7], [1e9, 0.0, 0.0], [-4e9, 5e9, 6e9]];
 
-/// Two meshes far from each other look alike, each seen from near: with kernels, with the
-/// reference, and beside surfels. Without the low parts of the coordinates they do not.
+/// Two copies of a mesh far from each other look alike, each seen from near: with kernels, with the
+/// reference, and beside surfels. Without the low parts of coordinates (the rest that f32 rounds
+/// away) they do not.
 #[test]
 fn a_mesh_far_away_looks_as_it_does_near() {
     let Some(backend) = gpu() else { return };
@@ -131,7 +133,7 @@ fn a_mesh_far_away_looks_as_it_does_near() {
     }
 }
 
-/// The rasteriser draws the same corners: its pictures from near each mesh are alike.
+/// The rasteriser draws the same corners: seen from near, both copies of the mesh look alike.
 #[test]
 fn a_mesh_far_away_is_rasterised_as_it_is_near() {
     let Some(backend) = gpu() else { return };
@@ -150,17 +152,17 @@ fn a_mesh_far_away_is_rasterised_as_it_is_near() {
     assert!(off * 5 > covered, "{off} of {covered}");
 }
 
-/// Only scenes that need low parts of corners have them.
+/// Only scenes that need the low parts of corners store them.
 #[test]
 fn scenes_that_f32_serve_have_no_trailing_parts() {
     let mesh = rough();
     let doubled = |meshes: &[Mesh]| Facts::of(&with_triangles(None, meshes).unwrap().0).mesh.doubled;
     assert!(!doubled(std::slice::from_ref(&mesh)));
-    // Map coordinates get an origin near them.
+    // The scene's origin lies near the map coordinates, so f32 suffices.
     assert!(!doubled(&[at(&mesh, DVec3::new(484_700.0, 6_632_550.0, 200.0))]));
     assert!(!doubled(&[mesh.clone(), at(&mesh, DVec3::new(1000.0, 0.0, 0.0))]));
     assert!(doubled(&[mesh.clone(), at(&mesh, DVec3::new(1e6, 0.0, 0.0))]));
-    // Decimal coordinates, which f32 rounds.
+    // Decimal coordinates, which f32 rounds, need no low parts either.
     let tenths = |scale: f64| Mesh {
         positions: mesh.positions.iter().map(|p| p.map(|x| (x * 1e4).round() / 1e4 * scale)).collect(),
         ..mesh.clone()
@@ -186,7 +188,7 @@ fn needles_are_triangles() {
         let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() };
         let (scene, preparation) = with_triangles(None, &[mesh]).unwrap();
         assert_eq!((preparation.triangles, preparation.dropped_degenerate), (1, 0), "{long} {direction}");
-        // An eye has no more digits than corners have, so it cannot come near the thinnest needle.
+        // Like corners, the eye is rounded to f64, so it cannot come near the thinnest needle.
         if wide < 1e-12 * long {
             continue;
         }

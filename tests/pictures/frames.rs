@@ -1,9 +1,9 @@
-//! Hashes of frames, to the bit: renders of every kind against the hashes of earlier runs.
+//! Hashes of all bits of frames: renders of every kind must give the hashes of earlier runs.
 //!
-//! The hashes of the f64 reference are in `tests/golden/frames.txt` and must not change. An
-//! adapter's hashes differ from driver to driver, so the file that `EPSPLAT_FRAMES` names receives
-//! them: write one before a change and one after it, and compare. `EPSPLAT_TEST_ADAPTER` chooses
-//! the adapter.
+//! The hashes of the f64 reference are in `tests/golden/frames.txt` and must not change. Hashes of
+//! an adapter differ from driver to driver, so they are written to the file that `EPSPLAT_FRAMES`
+//! names. Write one file before a change and one after it, and compare them. `EPSPLAT_TEST_ADAPTER`
+//! chooses the adapter.
 //!
 //! ```text
 //! EPSPLAT_FRAMES=before.txt cargo test --release --test pictures frames::
@@ -198,7 +198,8 @@ fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
     first
 }
 
-/// False if the f64 reference ignores an option that the row sets: another row covers it then.
+/// Returns whether the f64 reference uses all options of the row. If not, another row covers its
+/// frame.
 fn differs_in_f64(row: &Row<'_>) -> bool {
     let options = &row.options;
     let own =
@@ -224,15 +225,16 @@ fn frames_of_the_reference_are_what_they_were() {
     assert!(rendered(&row(&moved), &Backend::Reference) != rendered(&row(&scenes.sphere), &Backend::Reference));
 }
 
-/// Each frame repeats, and a core WebGPU device, as in a browser or on a phone, renders the same bits:
-/// no optional feature, eight storage buffers, bindings of 128 MiB.
+/// A second render of each frame has the same bits, and so has a render by a core WebGPU device.
+/// That device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB, and
+/// no optional feature.
 #[test]
 fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
     let (Some(gpu), Some(core)) = (common::gpu(), common::core_gpu()) else { return };
     let scenes = scenes();
     let all = list(&scenes);
     assert!(all.len() >= 90, "{}", all.len());
-    // Lines are written one by one, because some drivers crash before the end.
+    // Each line is written at once, because some drivers crash before the end.
     let file = std::env::var("EPSPLAT_FRAMES").ok().map(|path| std::fs::File::create(path).unwrap());
     let write =
         |line: &str| file.iter().for_each(|mut file| std::io::Write::write_all(&mut file, line.as_bytes()).unwrap());
@@ -270,7 +272,7 @@ fn a_renderer_can_own_its_scene() {
     assert_eq!(hash(&frame), hash(&expected));
 }
 
-/// The feature that an adapter lacks for a row, or `None` if it can render it.
+/// The feature that the adapter lacks for a row, or `None` if it can render the row.
 fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
     let (wants_u64, raster) = (row.options.accumulator.row().features == Features::AtomicsU64, row.options.raster);
     let lacks = [
@@ -284,8 +286,8 @@ fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
     lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, why)| why)
 }
 
-/// Pixels without a splat have each map's value for nothing. One small sphere is alone in the upper
-/// left of the image: blocks of pixels without a splat may be left as they were cleared.
+/// Pixels without a splat have the value that each map defines for nothing. Kernels may skip blocks
+/// of pixels without a splat, which then keep their cleared values.
 #[test]
 fn maps_are_right_where_nothing_is() {
     let Some(gpu) = common::gpu() else { return };
@@ -313,7 +315,7 @@ fn maps_are_right_where_nothing_is() {
                 0 => 0,
                 n => row.nothing[k % n].to_bits(),
             };
-            // All pixels but those in the first two blocks of rows and columns.
+            // The pixels outside the upper left 16 x 16, two blocks each way.
             let width = row.map.width();
             let empty = (0..device.len()).filter(|k| k / width % 80 >= 16 || k / width / 80 >= 16);
             for k in empty {

@@ -214,8 +214,8 @@ fn device_and_twin_agree_in_every_degree_and_composite() {
     }
 }
 
-/// The file's order, the fragments in a buffer, the surfels in a page and optional device features
-/// change no bit.
+/// The order in the file, the number of fragments per buffer and of surfels per page, and optional
+/// device features change no bit.
 #[test]
 fn order_and_memory_do_not_show() {
     let Some(backend) = gpu() else { return };
@@ -240,8 +240,8 @@ fn order_and_memory_do_not_show() {
 
 /// A pixel of a far cloud has thousands of fragments, more than a device sorts.
 ///
-/// Lists that end where nothing more shows give the bits of whole lists; lists that end earlier do
-/// not.
+/// Lists that end where further fragments are invisible give the bits of complete lists; lists that
+/// end earlier do not.
 #[test]
 fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
     let Some(backend) = gpu() else { return };
@@ -296,8 +296,8 @@ fn the_oracles_harmonics_are_the_programs() {
     }
 }
 
-/// Flat ellipsoids are surfels across their shortest axis; thicker ones are refused without
-/// `--flatten`.
+/// Flat ellipsoids become surfels perpendicular to their shortest axis; thicker ellipsoids are
+/// refused without `--flatten`.
 #[test]
 fn flat_ellipsoids_are_surfels_and_others_are_told() {
     let flat = torus(500, 1, 3);
@@ -330,8 +330,8 @@ fn flat_ellipsoids_are_surfels_and_others_are_told() {
     assert_eq!(io::read_with(&path, options, &()).unwrap().flattened.unwrap().thick, 500);
 }
 
-/// A Gaussian that cannot be drawn is left out and counted; a file that lacks properties ends in a
-/// sentence.
+/// A Gaussian that cannot be drawn is left out and counted; a file that lacks properties is refused
+/// in one sentence.
 #[test]
 fn odd_files_end_in_a_sentence_or_are_counted() {
     let mut odd = torus(40, 3, 11);

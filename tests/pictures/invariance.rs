@@ -133,7 +133,7 @@ fn sums_past_32_bits_are_exact() {
     let Some(gpu) = common::gpu() else { return };
     // Each weight of 5033.7 units is rounded to 5034.
     let (scene, camera) = stack(1001, (5033.7 * UNIT) as f32);
-    // With the kernels that every adapter supports.
+    // Without 64-bit pairs, so these are the kernels that every adapter supports.
     let without = vec![Optimisation::Pairs];
     let options = Settings { kernel: Kernel::Ellipse { a: 0.0, n: 3.0, smooth: false }, without, ..options() };
     let sums = |sources: &Sources| {
@@ -204,8 +204,8 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         worst
     };
     let limits = [40.0 * E, 16.0 * E, 8.0 * E, 4.0 * E];
-    // The cosine of a mirrored light errs by four times the normal's error plus its own rounding;
-    // its power multiplies that by the exponent; and there are two lights.
+    // The cosine of a mirrored light errs by four times the normal's error plus its own rounding.
+    // The highlight's power multiplies this error by the exponent, and there are two lights.
     let of_cosine = 4.0 * limits[1] + 8.0 * E;
     let of_highlights = 2.0 * HIGHLIGHT * f64::from(Settings::default().shininess) * of_cosine;
     let phong = [limits[0] + of_highlights, limits[1], limits[2], limits[3]];
@@ -235,7 +235,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
     }
 }
 
-/// Converts the device's sums into those of the twin.
+/// Converts the device's fixed-point sums into the sums of the f64 twin.
 fn unmapped(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Vec<PixelSums> {
     let device = stages(scene, camera, options, gpu, &Sources::default()).unwrap();
     let (low, high) = scene.color_range();
@@ -256,8 +256,8 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Ve
         PixelSums {
             weight,
             color: [0, 1, 2, 3].map(color),
-            // The last bit of the nearest depth, stored as its complement to +inf, whose own bit is
-            // 0.
+            // The last bit of the nearest depth is 1 for a back face. The buffer stores the bits of
+            // +inf minus those of the depth, and the last bit of +inf is 0, so the last bit stays.
             back: scene.oriented && device.sums.nearest[pixel] % 2 == 1,
             normal: [0, 1, 2].map(normal),
             place: [0.0; 5],

@@ -127,8 +127,8 @@ fn a_black_colour_with_an_image_is_black_and_told() {
     }
 }
 
-/// Seams, several images, colours without images, triangles without a material, and images as BMP
-/// and TGA.
+/// Surfels look like triangles at seams, with several images (also BMP and TGA), with colours
+/// without images, and where triangles have no material.
 #[test]
 fn surfels_look_as_triangles_do() {
     let folder = Folder::new();
@@ -159,11 +159,11 @@ fn surfels_look_as_triangles_do() {
         format!("mtllib m.mtl\n{corners}{places}usemtl a\n{}", (0..6).map(|k| face(k, true)).collect::<String>());
     let colours_alone =
         format!("mtllib m.mtl\n{corners}{}usemtl red\n{}", face(1, false), face(5, false) + &face(3, false));
-    // A flat square of four triangles; each has its own texture coordinates at the middle: a seam
-    // on every side.
+    // A flat square of four triangles. Each has its own texture coordinates at their common middle,
+    // so every inner edge is a seam.
     let seams = "mtllib m.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .2 .9\nvt .5 .5\n\
                  usemtl a\nf 1/1 2/2 5/3\nf 2/2 3/3 5/4\nf 3/4 4/1 5/5\nf 4/6 1/2 5/6\n";
-    // The same with a normal at each corner, for smooth shading.
+    // The same square with a normal at each corner, for smooth shading.
     let smooth =
         seams.replace("usemtl a\n", "vn -.3 -.3 1\nvn .3 -.3 1\nvn .3 .3 1\nvn -.3 .3 1\nvn 0 0 1\nusemtl a\n");
     let smooth = (1..=5).fold(smooth, |text, vertex| {
@@ -199,8 +199,8 @@ fn surfels_look_as_triangles_do() {
     }
 }
 
-/// Where an image cannot be painted, surfels have its mean colour, and a note says so. A given
-/// texture replaces all images.
+/// Where an image cannot be painted, surfels have its mean colour, and a note says so. A texture
+/// given by the caller replaces all images of the file.
 #[test]
 fn means_stand_for_images_and_given_ones_take_their_place() {
     let folder = Folder::new();
@@ -287,7 +287,7 @@ fn face_colours_of_a_ply_file_show() {
         shown.dedup();
         assert_eq!(shown.len(), 6, "{name}");
     }
-    // Vertex colours hide face colours if they vary, and a note says so.
+    // Vertex colours that vary hide face colours, and a note says so.
     let mut text = file("uchar", 255.0, one, " 9 9 9");
     text = text.replacen(" 9 9 9", " 99 9 9", 1);
     let points = io::read(&folder.file("cube.ply", text), &()).unwrap();

@@ -1,5 +1,5 @@
-//! The nearest fragment alone, as with a depth test: one pass and two give the same bits, which the
-//! f64 twin confirms.
+//! The nearest fragment alone, as with a depth test: kernels of one pass and of two passes give the
+//! same bits, and the f64 twin agrees.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -74,7 +74,8 @@ fn one_pass_two_passes_and_the_twin_show_the_same_fragments() {
             assert!(report.needs.contains(&"nearest") && report.passes.contains_key("accumulate_ms") != once);
             let (decided, wrong) = wrong(&frame, &reference(&scene, projection, &options));
             assert!(wrong == 0 && decided > 20_000, "{wrong} of {decided}, {kind:?}");
-            // Two passes, as without 64-bit atomics: switched off, or absent from the adapter.
+            // Two passes are used without 64-bit atomics, which are switched off or absent from the
+            // adapter.
             let second = Settings { without: vec![Optimisation::Pairs], ..options.clone() };
             for (options, backend) in [(&second, &backend), (&options, &core)] {
                 let (frame_of_two, report) = render(&scene, &camera, options, backend, &()).unwrap();

@@ -32,7 +32,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) 
 /// Planes over the whole image at the given depths, with the given straight colours and alphas.
 fn planes(of: &[(f32, [f32; 4])]) -> (Scene, Camera) {
     let (mut scene, camera) = stack(of.len(), 0.0);
-    // `stack` adds surfels that stretch the range of colours: they move out of sight.
+    // `stack` adds surfels that extend the range of colours; they are moved out of sight.
     scene.surfels.iter_mut().skip(of.len()).for_each(|surfel| surfel.center[0] = 1000.0);
     let Colors::Linear(colors) = &mut scene.colors else { unreachable!() };
     for ((surfel, color), (depth, of)) in scene.surfels.iter_mut().zip(colors).zip(of) {
@@ -41,8 +41,8 @@ fn planes(of: &[(f32, [f32; 4])]) -> (Scene, Camera) {
     (scene, camera)
 }
 
-/// Two planes match the closed form, and the transmittances of many multiply, however their colours
-/// are weighted.
+/// Two planes match the closed form, and the transmittances of many planes multiply, whatever the
+/// weights of their colours.
 #[test]
 fn planes_are_what_the_formulas_say() {
     let Some(backend) = gpu() else { return };
@@ -66,8 +66,8 @@ fn planes_are_what_the_formulas_say() {
     };
     for (composite, weights, margin) in [
         (Composite::Weighted, weights, 1e-6),
-        // With few surfaces the moments reconstruct the transmittance between them, and a quarter
-        // of a surface's own absorbance counts as in front of it.
+        // With few surfaces, moments reconstruct the transmittance between the surfaces, and a
+        // quarter of a surface's own absorbance counts as in front of it.
         (Composite::Moments, [0.4f64.powf(0.25), 0.4 * 0.5f64.powf(0.25)], 5e-3),
     ] {
         let shown = frame(&scene, &camera, &plain(composite), &backend);
@@ -174,7 +174,8 @@ fn the_order_shows_in_sums_of_floats_alone() {
     assert_eq!(shows, 3 * 2 * 2 * 2);
 }
 
-/// An opaque stack is opaque and shows its front, however dense it is and wherever strays lie.
+/// An opaque stack is opaque and shows its front, however dense it is, and even if the scene has a
+/// stray surfel far away.
 #[test]
 fn what_is_dense_and_what_strays_leave_no_holes() {
     let Some(backend) = gpu() else { return };
@@ -187,7 +188,7 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
             ..options(composite)
         };
         // Two stacks of forty opaque planes, red in front of blue. Each plane has its own depth,
-        // because few distinct places have no strays.
+        // because the search for strays needs many distinct positions.
         let of = |k: usize| {
             let (depth, color) = if k < 40 { (8.0, [1.0, 0.0, 0.0, 1.0]) } else { (30.0, [0.0, 0.0, 1.0, 1.0]) };
             (depth + 0.01 * (k % 40) as f32, color)
@@ -201,7 +202,7 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
             for backend in [&backend, &Backend::Reference] {
                 let shown = frame(&scene, &camera, &own, backend);
                 assert!(shown.map(Map::Transmittance).unwrap().iter().all(|left| *left < 1e-6), "{composite:?}");
-                // A weight by depth alone gives red only the share that nearer planes weigh.
+                // Weights by depth hide nothing: red has only its share of all weights.
                 let least = if composite == Composite::Moments { 0.99 } else { 0.6 };
                 let red = |color: &[f32; 4]| color[3] > 1.0 - 1e-6 && color[0] > least;
                 assert!(shown.color.iter().all(red), "{composite:?} {stray}: {:?}", shown.color[0]);
@@ -211,7 +212,7 @@ fn what_is_dense_and_what_strays_leave_no_holes() {
 }
 
 /// Errors against sorted compositing: moments have less than half the error of weights by depth,
-/// and those less than two thirds of the error of equal weights.
+/// and weights by depth less than two thirds of the error of equal weights.
 #[test]
 fn moments_are_nearer_to_what_is_sorted() {
     let Some(backend) = gpu() else { return };

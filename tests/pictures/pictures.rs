@@ -33,7 +33,7 @@ fn an_empty_picture_says_why() {
     let small = at("0,0,100000", "0.01,0.01,0");
     assert!(small.contains("between the centres of its pixels"), "{small}");
     assert!(!at("0,0,5", "0,0,0").contains("nothing shows"));
-    // Many pictures get one line for all empty ones.
+    // For many pictures, one warning covers all empty ones.
     let away = "[[1,0,0,0],[0,1,0,0],[0,0,1,-5],[0,0,0,1]]";
     let seen = "[[1,0,0,0],[0,1,0,0],[0,0,1,5],[0,0,0,1]]";
     let frame = |name: &str, pose: &str| format!(r#"{{"file_path": "{name}", "transform_matrix": {pose}}}"#);

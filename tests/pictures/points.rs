@@ -40,7 +40,7 @@ fn surfels(points: Points, options: &FromPoints) -> Surfels {
 fn angles(surfels: &Surfels, truth: &[[f32; 3]]) -> Vec<f64> {
     let vector = |n: &[f32; 3]| DVec3::from_array(n.map(f64::from)).normalize();
     let normals = surfels.points.normals.as_ref().unwrap();
-    // From both products, because the cosine alone loses small angles.
+    // From the cross and the dot product, because the cosine alone loses small angles.
     let angle = |(a, b): (DVec3, DVec3)| a.cross(b).length().atan2(a.dot(b));
     truth.iter().map(vector).zip(normals.iter().map(vector)).map(angle).collect()
 }
@@ -71,8 +71,7 @@ fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
     for (shape, curvature) in [(Shape::Sphere, 1.0), (Shape::Torus, 2.5)] {
         let count = 20_000;
         let (positions, truth) = samples(shape, count);
-        // 17 points fill the disk of radius h; where the lattice is uneven they reach half as far
-        // again.
+        // 17 points fill the disk of radius h; where the lattice is uneven they reach up to 1.5 h.
         let reach = 1.5 * (17.0 * shape.area() / count as f64 / std::f64::consts::PI).sqrt();
         let bound = curvature * reach / 2.0;
         let found = angles(&surfels(cloud(positions.clone()), &FromPoints::default()), &truth);
@@ -115,7 +114,7 @@ fn noise_tilts_normals_as_least_squares_says() {
         let surfels = surfels(cloud(positions.collect()), &FromPoints::default());
         let mut found = angles(&surfels, &vec![[0.0, 0.0, 1.0]; (side * side) as usize]);
         assert_eq!(flipped(&found), 0, "a sheet that lies faces up");
-        // Only surrounded points: at the edge of the plane neighbours spread less.
+        // Points away from the plane's edge, at which neighbours spread less.
         let inside = |i: usize| (3..side as usize - 3).contains(&(i % 250)) && (3..247).contains(&(i / 250));
         let mut index = 0..;
         found.retain(|_| index.next().is_some_and(inside));
@@ -140,9 +139,9 @@ fn coarse_models_with_thin_parts_face_outward() {
         "bunny: mean {mean:.2} degrees, 99th percentile {percentile_99:.1}, worst {:.1}",
         sorted[1838].to_degrees()
     );
-    // The ears' tips are thinner than points are apart, so planes through all neighbours there
-    // stand across the ears: 3 normals past 90 degrees, with a mean of 7.1 and a 99th percentile of
-    // 47 degrees.
+    // At the ears' tips, opposite sides are closer to each other than points are on one side.
+    // Planes fitted to all neighbours would stand across the ears: 3 normals would err by more than
+    // 90 degrees, with a mean error of 7.1 and a 99th percentile of 47 degrees.
     assert_eq!(flipped(&found), 0);
     assert!(mean < 6.5 && percentile_99 < 35.0, "{mean} {percentile_99}");
     assert!(flipped(&angles(&surfels(points, &up()), &truth)) > 500);
@@ -181,8 +180,8 @@ fn normals_turn_toward_the_nearest_scanner() {
         ]),
         0
     );
-    // A scanner on one side only: the far side faces it too, and so inward. The horizon is at x =
-    // 1/20.
+    // With one scanner only, normals on the far side face it too, and so inward. The horizon is at
+    // x = 1/20.
     let one = flips(&[[20.0, 0.0, 0.0]]);
     assert!((one as f64 - 5000.0 * (1.0 + 0.05) / 2.0).abs() < 50.0, "{one}");
 }
@@ -236,8 +235,8 @@ fn normals_whose_sides_are_random_have_none() {
         assert!(!oriented && (1800..2200).contains(&opposed), "{opposed}");
         assert!(of(samples(shape, 4000), 0.05).0);
     }
-    // Two sheets closer to each other than their points are apart: opposed, but neighbours in a
-    // sheet agree.
+    // Two sheets closer to each other than their points are apart: their normals are opposed, but
+    // neighbours in one sheet agree.
     let (mut positions, mut normals) = samples(Shape::Plane, 2000);
     positions.extend(positions.clone().iter().map(|[x, y, z]| [*x, *y, z - 0.01]));
     normals.extend(normals.clone().iter().map(|n| n.map(|c| -c)));
@@ -355,7 +354,7 @@ fn a_scene_of_points_has_the_same_limits() {
     assert!(counted.contains(&limited.1.limited_by_neighbours), "{counted:?}");
     assert!(limited.1.notes().iter().any(|note| note.contains("neighbours allow")), "{:?}", limited.1.notes());
     assert!(radii(&limited).iter().zip(radii(&free)).all(|(limited, free)| *limited <= free));
-    // A distant point has no disk much larger than a typical one.
+    // The disk of the distant point is limited to about three times a typical radius.
     let typical = radii(&limited)[count / 2];
     assert!(radii(&limited)[count + 40] <= 3.1 * typical, "{} {typical}", radii(&limited)[count + 40]);
     // Given radii are not limited, however large; missing ones are.
@@ -366,7 +365,8 @@ fn a_scene_of_points_has_the_same_limits() {
     // The order of points does not matter.
     let reversed = scene(cloud(positions.iter().rev().copied().collect()), Limits::default());
     assert_eq!(radii(&reversed).into_iter().rev().collect::<Vec<_>>(), radii(&limited));
-    // The same outliers as for `surfels`, and the other surfels keep the numbers of their points.
+    // The scene drops the same outliers as `surfels`, and its surfels keep the numbers of their
+    // points.
     let limits = Limits { outliers: Some(5.0), ..Limits::default() };
     positions.insert(7, [0.0, 0.3, -0.9]);
     let (dropped, preparation) = scene(cloud(positions.clone()), limits);
@@ -384,8 +384,8 @@ fn no_disk_flies_past_its_neighbours() {
         let (mut positions, _) = samples(Shape::Plane, 10_000);
         let usual = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, f64::INFINITY) });
         let typical = usual.points.radii.unwrap()[5000];
-        // Farther than any neighbour, but nearer than the limit by the median of all points
-        // catches.
+        // This point is farther from the sheet than neighbours in it are apart, but too near for
+        // the limit by the median of all points.
         positions.push([0.0, 0.0, 0.12]);
         let last = |largest_ratio: f64| {
             let made = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, largest_ratio) });
@@ -395,8 +395,8 @@ fn no_disk_flies_past_its_neighbours() {
         if let Size::Bsp(_) = size {
             assert!(free > 2.5 * typical && some > 0 && none == 0, "{size:?} {free} {typical} {some} {none}");
         }
-        // A mean distance has its own limit, and an ellipse in the plane ignores the point's height
-        // above it.
+        // Other sizes may need no limit: a mean distance has its own, and an ellipse in the sheet's
+        // plane ignores the point's height above the sheet.
         assert!(limited <= free);
         assert!(limited < 2.5 * typical && limited > 0.2 * typical, "{size:?} {limited} {typical}");
     }
@@ -485,7 +485,7 @@ fn georeferenced_coordinates_stay_to_the_last_digit() {
     io::ply::write_points(&path, &made.points, &()).unwrap();
     let read = io::read(&path, &()).unwrap();
     assert_eq!(read, made.points);
-    // There f32 has steps of half a unit.
+    // At such coordinates f32 has steps of half a unit.
     assert!((f64::from(6_123_456.789f32) - 6_123_456.789).abs() > 0.01);
 }
 
@@ -512,7 +512,8 @@ fn surfels_of_given_normals_end_at_sharp_edges() {
         assert!(rims(&scene).mean < 0.2 * rims(&whole).mean, "{:?} {:?}", rims(&scene), rims(&whole));
         let holes = |scene: &Scene| coverage(&tree, scene, 64, 128, &()).unwrap().seen.holes;
         assert!(holes(&scene) <= holes(&whole) + 5, "{} {}", holes(&scene), holes(&whole));
-        // Neither estimated normals, which turn over several points, nor a smooth cloud have edges.
+        // Estimated normals turn over several points, so they give no edges; nor does a smooth
+        // cloud.
         assert!(of(None).clips.is_none());
         let (positions, normals) = samples(Shape::Sphere, 3000);
         let smooth = surfels(Points { normals: Some(normals), ..cloud(positions) }, &options);

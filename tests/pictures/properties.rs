@@ -90,8 +90,8 @@ fn options() -> impl Strategy<Value = Settings> {
     })
 }
 
-/// Depth, weight and count exist exactly where a fragment was accepted, a normal nowhere else, and
-/// nothing is NaN.
+/// Depth, weight and count exist exactly where a fragment was accepted, normals exist only there,
+/// and nothing is NaN.
 fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
     let (depth, weight) = (frame.map(Map::Depth).unwrap(), frame.map(Map::Weight).unwrap());
     let (count, normal) = (frame.map(Map::Count).unwrap(), frame.normals().unwrap());
@@ -109,7 +109,7 @@ fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// The same scene with its surfels in another order: reversed, then every third, three times.
+/// The same scene in another order of surfels: reversed, then dealt like cards to three hands.
 fn dealt(scene: &Scene) -> Scene {
     let count = scene.surfels.len();
     let order: Vec<usize> = (0..3).flat_map(|hand| (0..count).rev().filter(move |i| i % 3 == hand)).collect();
@@ -122,10 +122,11 @@ fn dealt(scene: &Scene) -> Scene {
     Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), low, colors, ..scene.clone() }
 }
 
-/// The Lambert colour of a pixel of an unlit frame in f64, and the error bound of f32.
+/// The Lambert colour of a pixel in f64, and the error bound of f32, from an unlit frame with
+/// normals.
 ///
-/// The ray is normalised with nine products and sums, the cosine has three more, and each light
-/// one.
+/// Roundings: normalising the ray takes nine products and sums, the cosine three more, and each
+/// light one.
 fn lit(unlit: &Frame, camera: &Camera, lights: &[Light], pixel: usize) -> ([f64; 3], [f64; 3]) {
     let (x, y) = (pixel % unlit.width as usize, pixel / unlit.width as usize);
     let normal = Vec3::from_array(unlit.normals().unwrap()[pixel]).as_dvec3();

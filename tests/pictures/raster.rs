@@ -38,7 +38,7 @@ fn frame(case: &HardCase, options: &Settings, backend: &Backend) -> (Frame, Repo
     render(&case.scene, &case.camera, options, backend, &()).unwrap()
 }
 
-/// A row with the given error bound of a floating-point format, as in src/passes/raster.rs.
+/// The row of a floating-point blend format with this error bound (src/passes/raster.rs).
 fn floating(error_bound: fn(f64, f64, u32) -> f64) -> AccumulatorRow {
     AccumulatorRow {
         of: Accumulator::Float,
@@ -83,7 +83,7 @@ fn exact_depths_lose_no_more_than_the_formats_bound() {
     }
 }
 
-/// Refuses a format or depth test that the adapter lacks, and the error names an alternative.
+/// A format or depth test that the adapter lacks is refused, and the error names an alternative.
 #[test]
 fn what_an_adapter_cannot_draw_is_refused() {
     let (case, _) = all_cases().into_iter().find(|(case, _)| case.name == "intersecting sheets").unwrap();
@@ -165,8 +165,9 @@ fn eight_bits_lose_what_they_must_and_refuse_to_count() {
 /// Lit pictures match those of compute within the blending error.
 ///
 /// A mean of n fragments in a format of 11 bits errs by `2 n 2^-11` of the attribute's range
-/// (src/passes/raster.rs), in the colour and in each component of the normal. The mean normal's
-/// length is at least a half where planes intersect, so the cosine errs by four times as much.
+/// (src/passes/raster.rs). This holds for the colour and for each component of the normal. The mean
+/// normal's length is at least a half where planes intersect, so the cosine errs by four times as
+/// much.
 #[test]
 fn lit_pictures_are_computes() {
     let Some(gpu) = common::gpu() else { return };
@@ -192,8 +193,8 @@ fn lit_pictures_are_computes() {
     }
 }
 
-/// Triangles and parallelograms around the disks lose no fragment that boxes around them have;
-/// shapes that are too small do.
+/// Tight triangles and parallelograms around disks lose no fragment that bounding boxes have;
+/// shapes that are too small lose some.
 #[test]
 fn tight_shapes_leave_out_nothing() {
     let tight = Sources::default();
@@ -208,7 +209,7 @@ fn tight_shapes_leave_out_nothing() {
     };
     let mut noticed = [0; 2];
     for (case, _) in all_cases() {
-        // Image sizes at which the splats are quads, and triangles.
+        // Image sizes at which each splat is drawn as a triangle, and as a quad.
         let most = 10 * case.scene.surfels.len() as u32;
         let few = (f64::from(most).sqrt() as u32 - 1).min(case.camera.width);
         for (shape, size) in [(0, few), (1, (f64::from(most).sqrt() as u32 + 1).max(case.camera.width))] {

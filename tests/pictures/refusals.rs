@@ -46,7 +46,7 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
     );
     (gaussians.encoded, gaussians.oriented) = (true, false);
     let camera = sphere_camera(64, Projection::Pinhole);
-    // To the left of the Gaussians, and in front of them.
+    // The ball of triangles lies beside the Gaussians and in front of them.
     let both = with_triangles(Some(gaussians.clone()), &[ball([0.0, 0.9, 0.9], 0.5)]).unwrap().0;
     let alone = Scene { triangles: both.triangles.clone(), ..Scene::default() };
     let options = Settings {
@@ -119,7 +119,8 @@ fn tiles_are_taken_wherever_nobody_says_how_splats_are_drawn() {
             bits(&frame(&scene, &camera, &tiled, &gpu)) == bits(&frame(&scene, &camera, &options, &gpu)),
             "{options:?}"
         );
-        // Studies still refuse tiles: they would not measure what they name.
+        // Studies still refuse tiles here, because another organisation is not what the study
+        // names.
         assert!(check::by_tiles(&tiled).is_err() && check::by_tiles(&options).is_ok());
     }
 }

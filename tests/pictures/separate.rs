@@ -21,7 +21,7 @@ use epsplat::low_level::scene::{
 use epsplat::low_level::surfels::{build, with_triangles};
 use glam::DVec3;
 
-/// A sphere of `count` disks around `center`, each slightly off it, in shades of `color`.
+/// A sphere of `count` disks around `center`, at radii that vary by 0.2 %, in shades of `color`.
 fn ball(center: DVec3, radius: f64, count: usize, color: [u8; 3]) -> Points {
     let mut random = Random(count as u64);
     let mut points = Points { normals: Some(Vec::new()), radii: Some(Vec::new()), ..Points::default() };
@@ -245,7 +245,7 @@ fn of_equal_depths_the_order_of_inputs_does_not_show() {
     assert!(shown.len() > 500 && shown.iter().all(|color| color[0] > color[1]));
 }
 
-/// Triangles join the nearest of all inputs.
+/// Triangles are joined to the surface of the nearest input.
 #[test]
 fn triangles_are_joined_to_the_nearest_input() {
     let Some(backend) = gpu() else { return };

@@ -94,7 +94,7 @@ fn shells_let_through_what_their_alphas_say() {
     }
 }
 
-/// The same for planes of one surfel each, composited fragment by fragment.
+/// Planes of one surfel each let through (1 - a)^k too, composited fragment by fragment.
 #[test]
 fn sorted_planes_let_through_what_their_alphas_say() {
     let Some(backend) = gpu() else { return };
@@ -103,7 +103,7 @@ fn sorted_planes_let_through_what_their_alphas_say() {
         for (number, surfel) in scene.surfels.iter_mut().take(crossings).enumerate() {
             surfel.center[2] += 0.25 * number as f32;
         }
-        // The surfels that stretch the range of colours move out of sight.
+        // The surfels that extend the range of colours are moved out of sight.
         scene.surfels.iter_mut().skip(crossings).for_each(|surfel| surfel.center[0] = 1000.0);
         let of = Settings { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.1) };
         let shown = frame(&scene, &camera, &of, &backend);
@@ -182,7 +182,7 @@ fn lists_do_not_show_how_they_came_to_be() {
     // bands.
     let (narrow, wide) = (small(1_200_000), small(6_000_000));
     let core = common::core_gpu().map(Backend::gpu).unwrap();
-    // Many surfels at one place, whose order their content decides.
+    // Many surfels at one place; their content decides their order.
     let (mut dense, camera) = stack(40, 0.5);
     if let Colors::Linear(colors) = &mut dense.colors {
         for (number, color) in colors.iter_mut().enumerate() {
@@ -212,8 +212,8 @@ fn lists_do_not_show_how_they_came_to_be() {
     }
 }
 
-/// Opaque surfaces cost nothing in layers and keep the bits of the opaque picture. Beside a
-/// translucent surfel, so does a nearest layer of alpha 1.
+/// Opaque surfaces cost nothing in layers and keep the bits of the opaque picture. If one surfel is
+/// translucent, pixels whose nearest layer has alpha 1 keep these bits too.
 #[test]
 fn opaque_layers_have_the_bits_of_the_opaque_picture() {
     let Some(backend) = gpu() else { return };
@@ -263,7 +263,7 @@ fn the_density_of_a_cloud_does_not_show_in_layers() {
     assert!(sorted[2] - sorted[0] > 0.05, "{sorted:?}");
 }
 
-/// A tail makes one more layer of all remaining fragments; without one they are dropped.
+/// A tail makes one more layer of all remaining fragments; without a tail they are dropped.
 #[test]
 fn a_tail_is_one_more_layer() {
     let Some(backend) = gpu() else { return };
@@ -287,8 +287,8 @@ fn a_tail_is_one_more_layer() {
     close(shown(Composite::Layers(1), Tail::Sum), 0.25 * 0.5, 0.75, 2.0);
 }
 
-/// Buffers that stay on the device from frame to frame do not show: lists that grow and shrink, and
-/// the bands of an earlier view.
+/// A renderer that keeps its buffers from frame to frame draws what a new one does. Its lists grow
+/// and shrink, and its buffers hold the bands of an earlier view.
 #[test]
 fn a_kept_renderer_draws_what_a_fresh_one_does() {
     let Some(all) = gpu() else { return };
@@ -326,8 +326,8 @@ fn copies_are_fragments_each() {
     }
 }
 
-/// Depth, normal and similar maps equal those of the opaque picture, beside maps of all surfaces
-/// and with any samples.
+/// Depth, normal and similar maps equal those of the opaque picture. They do so beside maps of all
+/// surfaces, and with any number of samples.
 #[test]
 fn maps_of_the_nearest_surface_stay() {
     let Some(backend) = gpu() else { return };
@@ -397,8 +397,8 @@ fn layers_of_surfels_of_many_sizes_are_peeled_as_their_twin_has_them() {
     }
 }
 
-/// Depth peeling by the rasteriser shows the layers of the lists, except where a run of fragments
-/// is longer than a window. A rasteriser that peels nothing, or too much, differs.
+/// Depth peeling by the rasteriser shows the layers of the lists, except where fragments without a
+/// gap reach farther than one epsilon. A rasteriser that peels nothing, or too much, differs.
 #[test]
 fn the_rasteriser_peels_what_lists_part() {
     let Some(gpu) = common::gpu() else { return };

@@ -134,8 +134,7 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
     // The plane includes its left and upper edges, but not its right and lower ones.
     let covered = shown.color.iter().filter(|color| color[3] > 0.0).count();
     assert_eq!(covered, 28 * 28);
-    // A triangle covers its area in pixels, but either half may own the diagonal of their square of
-    // 16.
+    // A triangle is half of a square of 16 pixels, and either half may own the diagonal.
     for triangle in &all {
         let of = shown.color.iter().filter(|color| color[3] > 0.0 && color[0] == triangle.colors[0][0]).count();
         assert!((6..=10).contains(&of), "{of}");
@@ -461,7 +460,7 @@ fn kernels_and_twins_paint_alike() {
     }
 }
 
-/// The default view includes triangles whose few corners lie far outside many surfels.
+/// The default view includes triangles whose few corners lie far outside a dense sphere of surfels.
 #[test]
 fn a_floor_of_four_corners_is_framed() {
     let corner = |x: f64, z: f64| [x, -1.0, z];

@@ -74,7 +74,7 @@ fn cartesian(count: i64) -> Scan {
     }
 }
 
-/// A point two metres ahead on the axis at azimuth 90 degrees, with a distant pose.
+/// Two points two metres away at azimuth 90 degrees, at elevations 0 and 0.25, with a distant pose.
 fn spherical() -> Scan {
     let intensity = RecordDataType::Single { min: None, max: None };
     Scan {

@@ -119,7 +119,7 @@ fn rows_of_zeros_are_left_out_before_anything_is_judged() {
     let nothing = folder.read("a.ply", &of("ascii", &floats(&NAMES), &zeros(4))).unwrap();
     assert_eq!(nothing.flattened, None);
     assert!(build(vec![nothing], &()).unwrap_err().to_string().contains("none of the 4 Gaussians"));
-    // Thick Gaussians are counted among the others only.
+    // Thick Gaussians are counted among those that are not zeros.
     let rows = [zeros(100), good, vec![flat(0.0, [0.1, 0.1, 0.1])]].concat();
     let said = folder.refusal("a.ply", &of("ascii", &floats(&NAMES), &rows));
     assert!(said.contains("1 of its 31 Gaussians"), "{said}");
@@ -254,7 +254,7 @@ fn packed_gaussians_are_read() {
             let [s, t] = axes[k].map(length);
             assert!((s / (EXTENT * (part - 4.0).exp()) - 1.0).abs() < 6e-4, "{k}: {s}");
             near(t, EXTENT * (-3f64).exp());
-            // The directions to which the quaternion turns x and y.
+            // The direction to which the quaternion turns x.
             let [w, i, j, l] = turns[k % 4].map(|c| c / turns[k % 4].iter().map(|c| c * c).sum::<f64>().sqrt());
             let along = [1.0 - 2.0 * (j * j + l * l), 2.0 * (i * j + l * w), 2.0 * (i * l - j * w)];
             for (c, axis) in along.into_iter().zip(axes[k][0]) {

@@ -5,7 +5,7 @@ use super::las_forms::{pointwise, with_another_record};
 use super::{Folder, Random, data, sentence};
 use epsplat::io::{self, ReadOptions};
 
-/// Offsets of the legacy point count and of that of LAS 1.4 in the header.
+/// Offsets in the header of the legacy point count and of the point count of LAS 1.4.
 const COUNT: usize = 107;
 const LARGE_COUNT: usize = 247;
 
@@ -149,7 +149,7 @@ fn lengths_in_damaged_files_are_not_allocated() {
 /// Eighteen bytes of GPS times make the decoder recurse some hundred thousand times (found by
 /// fuzzing).
 ///
-/// It once overflowed the stack, which no error handling survives.
+/// The recursion once overflowed the stack, which no error handling survives.
 #[test]
 fn a_deep_recursion_of_the_decoder_is_survived() {
     let message = Folder::new().refusal("deep.laz", include_bytes!("deep_gps_time.laz"));
@@ -164,18 +164,18 @@ fn layers_outside_chunks_of_layers_are_refused() {
     assert_eq!(message, "its LASzip record does not describe its points");
 }
 
-/// The LASzip record that is checked must be the one that the decoder uses. It once used another
-/// one without items, and panicked.
+/// The LASzip record that is checked must be the one that the decoder uses. The decoder once used
+/// another record, without items, and panicked.
 #[test]
 fn a_record_after_one_of_nearly_its_name_is_checked() {
     let message = Folder::new().refusal("a.laz", &with_another_record(&sample((2, 3, true))));
     assert_eq!(message, "its LASzip record does not describe its points");
 }
 
-/// In a file of three chunks of at most 50,000 points compressed one by one, damage to a chunk
-/// loses at most that chunk.
+/// Damage to a chunk loses at most that chunk. The file has three chunks of at most 50,000 points,
+/// in which points are compressed one by one.
 ///
-/// Such chunks have no checksum, so a damaged one may also be decoded to other points.
+/// Such chunks have no checksum, so a damaged chunk may also be decoded to other points.
 #[test]
 fn a_chunk_that_cannot_be_decoded_is_left_out_and_told() {
     let folder = Folder::new();

@@ -120,8 +120,8 @@ fn materials_textures_and_what_of_them_is_missing() {
         mesh.notes
     );
 
-    // A face without texture coordinates does not affect those of the others. The number of points
-    // is unchanged.
+    // A face without texture coordinates changes neither the coordinates of other faces nor the
+    // number of points.
     let partly = read(&folder, "a.obj", format!("{text}f 1 2/1 3/2\n").as_bytes());
     assert_eq!(partly.texture.as_ref().unwrap()[..7], mesh.texture.as_ref().unwrap()[..]);
     assert!(partly.texture.as_ref().unwrap()[7].as_flattened().iter().all(|turns| turns.is_nan()));
@@ -257,7 +257,7 @@ fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
             mesh.check().unwrap();
             assert!(mesh.materials[0].texture.is_some() && mesh.materials[1].texture.is_none());
             assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("none.png"), "{:?}", mesh.notes);
-            // Read as points, texture coordinates of faces are ignored.
+            // If the file is read as points, texture coordinates of faces are ignored.
             assert_eq!(io::read(&folder.path("a.ply"), &()).unwrap().texture, None);
 
             // If one face has no texture coordinates, the mesh has none.
@@ -325,12 +325,12 @@ fn images_of_a_mesh_have_a_limit() {
     let error = mesh(5..7).unwrap_err();
     let said = sentence(&error, &folder.path("6.png"));
     assert!(said.contains("images of one mesh have 268451840 pixels, more than the limit of 268435456"), "{said}");
-    // Read as points, the file does not need the image.
+    // If the file is read as points, the images are left out with a note.
     let points = io::read(&folder.path("a.obj"), &()).unwrap();
     assert!(points.notes[0].contains("images of its materials are left out") && points.faces.unwrap().paint.is_some());
 }
 
-/// Files may name devices and pipes without an end.
+/// Devices, which may never end, are not read as libraries or images.
 #[cfg(unix)]
 #[test]
 fn libraries_and_images_are_files() {

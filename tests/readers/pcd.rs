@@ -130,7 +130,7 @@ fn many_points_come_back_from_every_encoding() {
     let rows: Vec<[f64; 6]> = (0..30_000)
         .map(|i| [f64::from(i % 100), f64::from(i) / 8.0, f64::from(i % 77), 0.0, 0.25, f64::from(i % 2)])
         .collect();
-    // The test's encoder tries every distance, so compressed files are short.
+    // The test's encoder tries every distance, which is slow, so compressed files are kept short.
     for (data, count) in [("ascii", 30_000), ("binary", 30_000), ("binary_compressed", 600)] {
         let rows: Vec<&[f64]> = rows.iter().take(count).map(<[f64; 6]>::as_slice).collect();
         let points = folder.read("a.pcd", &file(&fields, &rows, data)).unwrap();
@@ -299,7 +299,7 @@ fn headers_are_read_in_either_case() {
             assert_eq!(folder.read("a", &changed).unwrap(), expected, "{data}");
         }
     }
-    // If two names differ only in case, the usual one is used.
+    // If two names differ only in case, the one in lower case is used.
     let fields = [("X", 4, 'F', 1), XYZ[0], XYZ[1], XYZ[2]];
     let points = folder.read("a.pcd", &file(&fields, &[&[9.0, 1.0, 2.0, 3.0]], "ascii")).unwrap();
     assert_eq!(points.positions, [[1.0, 2.0, 3.0]]);

@@ -33,8 +33,8 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
     let expected = 64.0 * PI / whole.ray_spacing.powi(2);
     assert!((whole.seen.rays as f64 / expected - 1.0).abs() < 0.01, "{whole:?}");
     assert!(whole.seen.uncovered == 0 && (whole.views_with_holes, whole.worst_view) == (0, None), "{whole:?}");
-    // Seen from all around, a convex surface gets rays in proportion to its area. The disks around
-    // the missing cap reach into it by their radius, 0.075.
+    // All views together distribute the rays on a convex surface in proportion to its area. The
+    // disks around the missing cap reach into it by their radius, 0.075.
     let cap = |angle: f64| 0.5 * (1.0 - angle.cos());
     for angle in [0.3, 0.8, 0.5 * PI] {
         let holed = seen(&mesh, &generated(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
@@ -68,11 +68,11 @@ fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
     let mesh = sphere(5, false);
     assert!(seen(&mesh, &scene(1.0)).is_hole_free());
     let gaping = seen(&mesh, &scene(0.4));
-    // Disks with a radius of 0.6 spacings cover at most 0.36 pi = 1.13 of the surface even if they
-    // do not overlap, so there are gaps.
+    // Disks with a radius of 0.6 spacings have 0.36 pi = 1.13 times the surface's area. Circles
+    // that cover a plane need 2 pi / sqrt(27) = 1.21 (Kershner 1939), so there are gaps.
     assert!(gaping.hole_share.unwrap() > 0.005 && gaping.views_with_holes == 64, "{gaping:?}");
     let touching = seen(&mesh, &scene(0.2));
-    // A radius of 0.3 spacings: the disks do not overlap and cover 0.09 pi.
+    // With a radius of 0.3 spacings the disks do not overlap, and cover 0.09 pi of the surface.
     assert!((touching.uncovered_share.unwrap() - (1.0 - 0.09 * PI)).abs() < 0.02, "{touching:?}");
 }
 

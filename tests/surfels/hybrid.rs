@@ -79,10 +79,11 @@ fn parts_of_a_mesh_are_the_mesh() {
     assert!(hybrid(&Mesh { material: Some(vec![0]), ..mesh }, pixel, &()).is_err());
 }
 
-/// A hall of a few large triangles around a bunny of many small ones: surfels and triangles are
-/// chosen by size.
+/// A hall of a few large triangles around a bunny of many small ones: the size of a triangle
+/// decides whether surfels replace it.
 ///
-/// The picture equals that of the triangles, and one command draws it, also after `simplify`.
+/// One command draws surfels and triangles, also after `simplify`. This picture and that of the
+/// whole mesh cover the same pixels, except for less than 1 %.
 #[test]
 fn one_command_draws_surfels_and_triangles() {
     let folder = Folder::new();
@@ -124,7 +125,7 @@ fn one_command_draws_surfels_and_triangles() {
     let info = String::from_utf8(succeeds(&["info", text(&output)]).stdout).unwrap();
     assert!(info.contains("out.mesh.ply are drawn beside them"), "{info}");
 
-    // The mesh file is not overwritten, and without it nothing is drawn.
+    // A render must not overwrite the mesh file, and fails if that file is missing.
     let named = folder.path("out.mesh.ply");
     fails(&["render", text(&output), "-o", text(&named)], 2, &["out.mesh.ply"]);
     std::fs::remove_file(&named).unwrap();
@@ -153,8 +154,8 @@ fn large_triangles_all_stay() {
     assert!(String::from_utf8(succeeds(&["info", text(&output)]).stdout).unwrap().contains("cube.mesh.ply"));
 }
 
-/// With normals that contradict the winding, the surface is not taken for closed; the factor of an
-/// image is preserved.
+/// With normals that contradict the winding, the surface does not count as closed. The diffuse
+/// factor of a textured material is preserved.
 #[test]
 fn normals_and_materials_stay_what_they_are() {
     let mut ball = sphere(5, true);

@@ -159,7 +159,7 @@ fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
     let (left_out, kept) = (of(&[]), of(&["--keep-withheld"]));
     assert_eq!((&left_out["points"], &left_out["preparation"]["withheld"]), (&200.into(), &100.into()));
     assert_eq!((&kept["points"], &kept["preparation"]["withheld"]), (&300.into(), &0.into()));
-    // The command that `info` recommends gives the same.
+    // The command that `info` recommends has the same options.
     let table =
         String::from_utf8(succeeds(&["info", cloud, "--keep-withheld", "--input-format", "las"]).stdout).unwrap();
     assert!(table.contains(&format!("epsplat surfels {cloud} --input-format las --keep-withheld -o")), "{table}");
@@ -216,8 +216,8 @@ fn damaged_files_are_one_sentence() {
     assert_eq!(info(piped(&["info", "-", "--json", "-"], &without_chunks))["points"], 200);
 }
 
-/// Unreadable files of a folder are left out and reported if others can be read; a file that is
-/// named itself must be readable. Files whose name begins with a dot are ignored in a folder.
+/// If a folder has readable files, its unreadable ones are left out and reported. A file that is
+/// itself an argument must be readable. Files whose name begins with a dot are ignored in a folder.
 #[test]
 fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     let folder = Folder::new();
@@ -234,7 +234,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     let (tiles, output) = (folder.path("tiles"), folder.path("o.ply"));
     let surfels = |more: &[&str]| epsplat(&[&["surfels", text(&tiles), "-o", text(&output)], more].concat());
     let told = |output: &Output| String::from_utf8(output.stderr.clone()).unwrap();
-    // Control: with only readable files there is no report, in strict mode neither.
+    // Control: if all files are readable, there is no report, in strict mode or not.
     for strict in [&[][..], &["--strict"]] {
         let whole = surfels(strict);
         assert!(whole.status.success() && told(&whole).contains("o.ply: 120 surfels"), "{}", told(&whole));
@@ -261,7 +261,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
         assert!(told(&succeeds(&picture)).contains("1 of 3 files of folders left out: "), "{name}");
         let strict = surfels(&["--strict"]);
         assert!(strict.status.code() == Some(1) && told(&strict).contains(name), "{name}: {}", told(&strict));
-        // Named itself, alone or beside the folder, the file must be readable.
+        // As an argument, alone or beside the folder, the file must be readable.
         let alone = tiles.join(name);
         fails(&["surfels", text(&alone), "-o", text(&output)], 1, &[name]);
         fails(&["info", text(&alone)], 1, &[name]);
@@ -272,7 +272,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     // If no file of a folder can be read, the error is that of the first.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::write(tiles.join(name), "bad").unwrap());
     assert!(only_line(&surfels(&[]), 1).contains("a.ply"));
-    // A file whose name begins with a dot is ignored in a folder, but can be named itself.
+    // A file whose name begins with a dot is ignored in a folder, but can be an argument.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::remove_file(tiles.join(name)).unwrap());
     fails(&["surfels", text(&tiles), "-o", text(&output)], 2, &["has no"]);
     let dotted = folder.file(".a.ply", &good);

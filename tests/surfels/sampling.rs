@@ -41,7 +41,7 @@ fn spacings(points: &Points) -> Vec<f64> {
     all.iter().enumerate().map(nearest).collect()
 }
 
-/// The square [0, 2] x [0, 1] of two quads; the right one is divided into `cuts` x `cuts`.
+/// The rectangle [0, 2] x [0, 1] of two quads; the right one is divided into `cuts` x `cuts`.
 fn strip(cuts: u32) -> Mesh {
     let mut mesh = Mesh::default();
     let mut quad = |low: [f64; 2], size: f64| {
@@ -76,24 +76,24 @@ fn the_bunny_is_sampled_better_than_by_independent_points() {
     };
     let (ours, seen) = measured(by(&mesh, 5000, Priority::default()));
     let (theirs, seen_theirs) = measured(uniform(&mesh, 5000));
-    // Both lie on the triangles up to the rounding of f32 coordinates.
+    // Both sets of samples lie on the triangles up to the rounding of f32 coordinates.
     for distances in [&ours, &theirs] {
         assert!(distances.centers_to_mesh.unwrap().max < 1e-6 * tree.radius());
     }
-    // From the mesh to the nearest centre: independent points have a mean distance of 0.5 /
-    // sqrt(density), a hexagonal lattice, which is optimal, 0.377 / sqrt(density).
+    // Distances from the mesh to the nearest centre. Independent points have a mean of 0.5 /
+    // sqrt(density), a hexagonal lattice, which is optimal, has 0.377 / sqrt(density).
     let (near, far) = (ours.mesh_to_centers.unwrap(), theirs.mesh_to_centers.unwrap());
     assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
-    // From the mesh to the nearest disk, and from the disks to the mesh.
+    // Distances from the mesh to the nearest disk, then from the disks' rims to the mesh.
     let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
-    // The mean is only slightly better: the baseline's disks lie in one triangle each, and of
-    // several large overlapping disks the nearest counts. But ours are all near. A test below shows
-    // that each is as near to its own cell as a plane can be.
+    // The mean is only slightly better: each disk of the baseline lies in one triangle, and where
+    // its large disks overlap, only the nearest counts. But none of our disks is far. A test below
+    // shows that each is as near to its own cell as a plane can be.
     assert!(near.mean < far.mean && near.rms < 0.6 * far.rms, "{near:?} {far:?}");
     assert!(near.percentile_99 < 0.5 * far.percentile_99 && near.max < 0.6 * far.max, "{near:?} {far:?}");
     let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
     assert!(near.mean < 0.9 * far.mean && near.percentile_99 < far.percentile_99, "{near:?} {far:?}");
-    // Smaller disks, and yet fewer holes.
+    // Our disks are smaller, and yet leave fewer holes.
     assert!(seen.hole_share.unwrap() < 1e-4, "{seen:?}");
     assert!(seen_theirs.seen.holes > 5 * seen.seen.holes, "{seen:?} {seen_theirs:?}");
 }
@@ -105,8 +105,8 @@ fn a_sphere_is_covered_evenly() {
     let points = by(&mesh, count, Priority::Area);
     let spacing = (4.0 * PI / count as f64).sqrt();
     // Distances to the nearest other sample, in spacings. Independent points have a mean of 1/2,
-    // and the smallest of 2,000 is about 1/50; in a hexagonal lattice, which is the most even one,
-    // all are 1.07.
+    // and the smallest distance of 2,000 points is about 1/50. In a hexagonal lattice, the most
+    // even one, all are 1.07.
     let nearest = |points: &Points| {
         let all: Vec<f64> = spacings(points).iter().map(|distance| distance / spacing).collect();
         (all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(f64::INFINITY, f64::min))
@@ -147,15 +147,16 @@ const OVERLAP: f32 = 1.28;
 
 #[test]
 fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells() {
-    // A flat cell lies in its disk, which is larger than the cell. Without that factor the disk
-    // still hides each point of the cell from every direction, at outlines too. That holds only if
-    // cells end at edges: a disk seen edge-on, from where its cell is visible, covers nothing.
+    // A flat cell lies in its disk, which is larger than the cell by `OVERLAP`. Without that factor
+    // the disk still hides each point of the cell from every direction, at outlines too. That holds
+    // only if cells end at edges: beyond an edge, a part of the cell could be visible from a
+    // direction in which the disk is edge-on and covers nothing.
     let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
     for mesh in [cube, bar(3), bar(6)] {
         let tree = TriangleTree::new(&mesh).unwrap();
         let (scene, _) = build(vec![by(&mesh, 1500, Priority::Area)], &()).unwrap();
         let uncovered = |scene: &Scene| coverage(&tree, scene, 64, 96, &()).unwrap().seen.uncovered;
-        // The centres and half-axes are rounded to f32.
+        // The factor 1.00001 allows for the rounding of centres and half-axes to f32.
         let mut least = longer(&scene, 1.000_01 / OVERLAP);
         assert_eq!(uncovered(&least), 0);
         // Controls: disks smaller by 10 %, and one in ten left out.
@@ -168,8 +169,8 @@ fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells()
 
 /// Compares each sample's plane with eight planes that are tilted by `angle`.
 ///
-/// Returns for how many samples a tilted plane has a smaller mean squared distance to the mesh
-/// points of their cell.
+/// Returns the number of samples for which a tilted plane has no larger mean squared distance to
+/// the mesh points of the sample's cell.
 fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
     let centers: Vec<DVec3> = samples.positions.iter().map(|p| DVec3::from(*p)).collect();
     let normals = samples.normals.as_ref().unwrap();
@@ -211,8 +212,9 @@ fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
         Points { normals: Some(normals), ..samples.clone() }
     };
     // The mean square is a parabola in the tilt, so a plane within `angle` / 2 of the best one
-    // beats all that are tilted by `angle`. With 500 points in a cell, of height h = 0.015 and
-    // extent p = 0.06, the best plane has a random error of h / p / sqrt(500), a hundredth.
+    // beats all planes that are tilted by `angle`. A cell has 500 points, a height of h = 0.015 and
+    // an extent of p = 0.06. So the best plane has a random error of h / p / sqrt(500), a
+    // hundredth.
     let angle = 0.1;
     assert_eq!(off_the_nearest_plane(&mesh, &samples, angle), 0);
     // Controls: planes that are off by more than half of `angle`, and planes of the facets, which
@@ -294,7 +296,8 @@ fn projected_samples_cover_the_surface_less_evenly() {
     assert!(coverage(&tree, &scene, 64, 96, &()).unwrap().is_hole_free());
     let nearest = |points: &Points| spacings(points).into_iter().fold(f64::INFINITY, f64::min);
     assert!(nearest(&points) < 0.3 * nearest(&by(&mesh, 3000, Priority::Area)));
-    // A single sample in a voxel is at its centre; on a flat square, at that of its box.
+    // The only sample of a voxel lies at the projected centre of the voxel. On this flat mesh, that
+    // is the centre of the voxel's box.
     let method = Method::Projected { priority: &|_, voxels| vec![1.0; voxels.len()], depth: Some(4) };
     let mut square = sample(&strip(1), 16, &method, 0, &()).unwrap().0.positions;
     square.sort_by(|a, b| a.partial_cmp(b).unwrap());
@@ -315,11 +318,11 @@ fn a_triangle_counts_wholly_in_each_voxel_that_it_reaches() {
     };
     sample(&surface_mesh, 64, &Method::Stratified { priority: &both, depth: Some(3) }, 0, &()).unwrap();
     let [(touched, shared)] = seen.into_inner().unwrap()[..] else { panic!("asked twice") };
-    // Four triangles, each of which spans several of the eight squares.
+    // Each of the four triangles spans several of the eight voxels.
     assert!((shared - 4.0).abs() < 1e-9 && touched > 8.0 && touched.fract() == 0.0, "{touched} {shared}");
 }
 
-/// The square with a texture: the left half has one colour, the right half stripes.
+/// The rectangle of [`strip`] with a texture: the left half has one colour, the right half stripes.
 fn striped() -> Mesh {
     let mut mesh = strip(1);
     let uv = |vertex: u32| mesh.positions[vertex as usize];
@@ -334,8 +337,8 @@ fn textures_give_colours_coordinates_and_priority() {
     let mesh = striped();
     let points = by(&mesh, 1000, Priority::Texture);
     let striped = right_of(&points, 1.0);
-    // A quarter of the samples is distributed by area, half of these on the left. The colour also
-    // changes at the two borders of the left half, where the image repeats.
+    // A quarter of the samples is distributed by area, so an eighth lies on the left by area alone.
+    // The colour also changes at the two borders of the left half, where the image repeats.
     assert!((750..875).contains(&striped), "{striped}");
     assert!((490..=510).contains(&right_of(&by(&mesh, 1000, Priority::Area), 1.0)));
     let (texture, Some(Colors::Linear(colors))) = (points.texture.as_ref().unwrap(), &points.colors) else {
@@ -391,7 +394,7 @@ fn what_cannot_be_sampled_is_counted_or_said() {
     let good = mesh.triangles.len() as u64;
     let first = mesh.positions.len() as u32;
     mesh.positions.extend([[f64::NAN, 0.0, 0.0], [1e300, 0.0, 0.0], [0.0; 3], [0.0; 3]]);
-    // Two triangles that are not finite and three without an area; then two duplicates, one of them
+    // Two triangles are not finite and three have no area. Then follow two duplicates, one of them
     // reversed.
     let bad = [[first, 0, 1], [first + 1, 0, 1], [0, 0, 1], [first + 2, first + 3, 1], [0, first + 2, 0]];
     mesh.triangles.extend(bad);
@@ -411,8 +414,8 @@ fn what_cannot_be_sampled_is_counted_or_said() {
     }
 }
 
-/// By which part of the largest radius disks may exceed an edge, with a margin for those whose
-/// cells do.
+/// How far disks may extend past an edge, as a fraction of the largest radius. Includes a margin
+/// for disks whose cells extend past it.
 const PAST: f64 = 0.03;
 
 #[test]
@@ -467,7 +470,8 @@ fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
         *normal = normal.map(|c| -c);
     }
     let (inward, _) = build(vec![by(&mesh, 3000, Priority::Area)], &()).unwrap();
-    // At the ends of the bar the normals lie in the planes, so they do not tell a side.
+    // At the ends of the bar the shading normals lie in the disks' planes, so they do not select a
+    // side.
     let mut pairs = scene.surfels.iter().zip(&inward.surfels).filter(|(a, _)| a.normal().normalize().z.abs() < 0.5);
     assert!(pairs.all(|(a, b)| a.normal().dot(b.normal()) < 0.0));
     assert!(inward.clips.iter().filter(|clip| !clip.is_none()).count() > 300);

@@ -68,15 +68,15 @@ fn a_top_view_that_is_turned_is_told() {
         let output = succeeds(&[&["render", text(&flat), "-o", text(&image)], &view[..], up].concat());
         String::from_utf8(output.stderr).unwrap()
     };
-    // The target is a few tenths of a degree off, toward (sin 40, cos 40).
+    // The view direction is 0.5 degrees off the vertical, toward (sin 40, cos 40).
     let turned = told("10.257,10.306,0", &["--up", "z"]);
     assert!(
         turned.contains("warning: the view is only 0.5 degrees off") && turned.contains("north (+y) is 40 degrees"),
         "{turned}"
     );
     assert!(turned.contains("view: --eye 10,10,50 --target 10.257,10.306,0 --up z (as asked for)"), "{turned}");
-    // The scene's own up gives the same. There is no warning for a view straight down, from the
-    // side or with north up.
+    // The scene's own up direction gives the same warning. There is none for a view straight down,
+    // from the side or with north up.
     assert!(told("10.257,10.306,0", &[]).contains("is 40 degrees from its top"));
     for (target, up) in [("10,10,0", &[][..]), ("30,10,0", &["--up", "z"]), ("10.257,10.306,0", &["--up", "y"])] {
         let told = told(target, up);
@@ -90,11 +90,11 @@ fn up_stays_what_it_was_in_what_is_written() {
     let made = folder.path("made.ply");
     let drawn = |input: &str| {
         let image = folder.path("view.png");
-        // Large enough that no disk is clipped, which would move the camera away.
+        // The image is large enough that no disk is clipped, which would move the camera away.
         view(&succeeds(&["render", input, "-o", text(&image), "--size", "640x640", "--backend", "reference"]))
     };
     let up = || epsplat::io::read(&made, &()).unwrap().up.unwrap().name();
-    // As tall as wide, so that without the comment y would be guessed.
+    // The cloud is as tall as wide, so the guess would be y without the PLY comment `up z`.
     let rows: String = (0..1000).map(|i| format!("{} {} {}\n", i % 10, i / 10 % 10, i / 100)).collect();
     let tall = folder.file("tall.ply", ply("x y z", 1000, &rows).replace("end_header", "comment up z\nend_header"));
     for command in [&["surfels"][..], &["surfels", "--size", "ellipse"], &["simplify", "--tolerance", "rel:0.1"]] {

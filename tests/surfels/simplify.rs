@@ -51,7 +51,7 @@ fn run(scene: &Scene, options: Options) -> (Vec<Surfel>, Report) {
     (simplified.surfels, report)
 }
 
-/// The surfel at the size to which it grew; it is written larger.
+/// Shrinks a surfel of the result to the size to which it grew; `simplify` writes surfels larger.
 fn as_grown(surfel: &Surfel, tolerance: f64) -> Surfel {
     let shrunk = |axis: [f32; 3]| {
         let length = Vec3::from_array(axis).as_dvec3().length();
@@ -109,8 +109,9 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
     let (surfels, report) = run(&sphere, within(tolerance));
     assert_eq!(report.beyond_tolerance, 0);
     assert!(report.max_deviation <= tolerance * (1.0 + 1e-6), "{}", report.max_deviation);
-    // A disk halfway between the heights 1 and 1 - 2 E of a cap has the radius sqrt(1 - (1 - 2
-    // E)²). The first point beyond its reach is at most one spacing farther out.
+    // With the tolerance E, a disk halfway between the heights 1 and 1 - 2 E of a cap has the
+    // radius sqrt(1 - (1 - 2 E)²). The first point beyond the disk is at most one spacing farther
+    // out.
     let sagitta = (1.0 - (1.0 - 2.0 * tolerance).powi(2)).sqrt();
     let spacing = (Shape::Sphere.area() / count as f64).sqrt();
     let grown = |surfel: &Surfel| f64::from(as_grown(surfel, tolerance).radius());
@@ -126,15 +127,15 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
         let normal = surfel.normal().as_dvec3().normalize();
         assert!(normal.dot(center(surfel) / distance) > 1.0 - 1e-6);
     }
-    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r^2)), which is a lower bound
-    // of the number. Circles that cover a plane overlap by at least 2 pi / sqrt(27) (Kershner
-    // 1939); greedy selection needs less than twice that.
+    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r^2)). The sphere's area
+    // divided by that is a lower bound of the number of disks. Circles that cover a plane overlap
+    // by at least 2 pi / sqrt(27) (Kershner 1939); greedy selection needs less than twice that.
     let cap = |radius: f64| 2.0 * PI * (1.0 - (1.0 - radius * radius).sqrt());
     let (fewest, kershner) = (Shape::Sphere.area() / cap(largest), 2.0 * PI / 27f64.sqrt());
     let number = surfels.len() as f64;
     assert!(number >= fewest && number <= 2.0 * kershner * fewest, "{number} of {fewest}");
-    // A disk's area is proportional to the tolerance, so a quarter of it needs four times as many
-    // disks.
+    // A disk's area is proportional to the tolerance, so a quarter of the tolerance needs four
+    // times as many disks.
     let finer = run(&sphere, within(tolerance / 4.0)).0.len() as f64;
     assert!((3.2..5.0).contains(&(finer / number)), "{number}, {finer}");
 }
@@ -147,11 +148,11 @@ fn no_hole_is_left_between_the_points_either() {
             let options = Options { shape: splats, relaxations, ..within(tolerance) };
             let (surfels, _) = run(&sampled, options);
             let surfels: Vec<Surfel> = surfels.iter().map(|surfel| as_grown(surfel, tolerance)).collect();
-            // Neighbouring cells are cut in different planes, with an error of the squared ratio of
-            // their size to the surface's.
+            // Neighbouring cells are cut in different planes. The factor `grown` allows for
+            // the error: the squared ratio of the cells' size to the surface's.
             let grown = 1.005;
             assert_eq!(uncovered(surface, &surfels, grown, 3.0 * tolerance), 0, "{surface:?} {splats:?} {relaxations}");
-            // Controls: smaller disks leave holes, and so do three in four of them.
+            // Controls: smaller disks leave holes, and so does leaving out every fourth disk.
             assert!(uncovered(surface, &surfels, 0.85, 3.0 * tolerance) > 0);
             let fewer: Vec<Surfel> = surfels.chunks(4).flat_map(|four| &four[1..]).copied().collect();
             assert!(uncovered(surface, &fewer, grown, 3.0 * tolerance) > 0);
@@ -250,8 +251,8 @@ fn a_surface_with_edges_is_neither_shortened_nor_drawn_out() {
     assert!(report.max_deviation == 0.0 && surfels.len() < 1_000, "{}", surfels.len());
     let surfels: Vec<Surfel> = surfels.iter().map(|s| as_grown(s, 0.0)).collect();
     assert_eq!(uncovered(Shape::Plane, &surfels, 1.0 + 1e-6, 1e-9), 0);
-    // The surface extends past the last point by the radius of an input disk, 1.5 spacings, and
-    // from any place on the edge it is at most one spacing to one of the last points.
+    // The surface extends past the last points by the radius of an input disk, 1.5 spacings. Along
+    // the edge, the nearest of these points is at most one spacing away.
     let spacing = (Shape::Plane.area() / 10_000.0).sqrt();
     for surfel in &surfels {
         let grown = f64::from(surfel.radius());
@@ -305,8 +306,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
         let seen = |scene: &Scene, side: u32| coverage(&tree, scene, 64, side, &()).unwrap();
         let whole = seen(&simplified, 256);
         assert!(whole.is_hole_free(), "{options:?}: {whole:?}");
-        // The unclipped disks at the size to which they grew, on which the selection relies, leave
-        // no hole either. Some are written at twice that size, that of the samples.
+        // Without clip lines and at the size to which they grew, which the selection relies on, the
+        // disks leave no hole either. Some are written at twice that size: the size of the samples.
         let uncut = |surfels: Vec<Surfel>| Scene { surfels, clips: Vec::new(), ..simplified.clone() };
         let fewer: Vec<Surfel> = surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         let least = seen(&uncut(surfels), 128);
@@ -332,8 +333,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
     }
 }
 
-/// A closed cylinder along z from -1 to 1 of circumference 2, with points in a plane's lattice; its
-/// edges are right angles.
+/// A closed cylinder along z from -1 to 1 of circumference 2. Its points form the lattice of a
+/// plane, its edges are right angles.
 fn cylinder(count: u64) -> (Scene, f64) {
     let radius = 1.0 / PI;
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
@@ -357,7 +358,8 @@ fn cylinder(count: u64) -> (Scene, f64) {
 fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     let (sampled, spacing) = cylinder(20_000);
     let tolerance = 0.002;
-    // How far a disk extends past the end of the cylinder; `whole` below ignores the clip lines.
+    // Returns how far a disk extends past the end of the cylinder; `whole` below ignores the clip
+    // lines.
     let past = |(surfel, clip): (&Surfel, Clip)| {
         let [s, t] = [surfel.s[2], surfel.t[2]].map(f64::from);
         let rim = (0..256).map(|k| (f64::from(k) / 128.0 * PI).sin_cos());
@@ -368,13 +370,14 @@ fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     for shape in [SplatShape::Disk, SplatShape::Ellipse] {
         let (simplified, _) = simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
         let Scene { surfels, clips, .. } = simplified;
-        // The limit is that of a cell, plus eight tolerances, plus a fifth of a surfel's radius, by
-        // which clipped disks may exceed it.
+        // A cell may extend 2.5 spacings past the end. The limit adds eight tolerances, and a fifth
+        // of a surfel's radius, by which clipped disks may exceed their cells.
         let radius = f64::from(sampled.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
         let limit = 2.5 * spacing + 8.0 * tolerance + 0.2 * radius;
         let farthest = surfels.iter().zip(clips).map(past).fold(0.0, f64::max);
         assert!(farthest <= limit, "{shape:?}: {farthest} of {limit}");
-        // Some ellipses on the side end there, and they are long.
+        // Some ellipses on the cylinder's side extend past its end unless they are clipped, and
+        // these are long.
         let ratio = |s: &Surfel| f64::from(Vec3::from_array(s.s).length() / Vec3::from_array(s.t).length()).ln().abs();
         let ending = surfels.iter().filter(|surfel| whole(surfel) > 0.0 && surfel.normal().z.abs() < 0.5);
         let long = ending.clone().filter(|surfel| ratio(surfel) > 3f64.ln()).count();
@@ -402,7 +405,7 @@ fn no_surfel_is_smaller_than_the_one_it_stands_in_for() {
         surfels.iter().filter(is_smaller).count()
     };
     assert_eq!(smaller(&surfels), 0);
-    // Control: at the size to which they grew, some are smaller.
+    // Control: at the size to which they grew, some surfels are smaller than the input's.
     assert!(smaller(&surfels.iter().map(|surfel| as_grown(surfel, tolerance)).collect::<Vec<_>>()) > 0);
 }
 
@@ -456,8 +459,8 @@ fn inputs_with_nothing_to_grow_on_keep_their_points() {
         let (surfels, _) = run(&scene(few, None), within(0.0));
         assert!((1..=count as usize).contains(&surfels.len()));
     }
-    // Distant points with different normals: no disk of the sphere can hold one, and none grows
-    // toward it.
+    // Distant points with different normals: no disk of the sphere can hold such a point, and none
+    // grows toward one.
     let mut positions: Vec<[f64; 3]> = generate(Shape::Sphere, 2_000).map(|sample| sample.position).collect();
     let lone = [[50.0, 0.0, 0.0], [0.0, -70.0, 1.0], [20.0, 20.0, 90.0]];
     positions.extend(lone);
@@ -495,7 +498,7 @@ fn colours_are_means_over_what_is_covered() {
     let mut mixed = 0;
     for (index, surfel) in simplified.surfels.iter().enumerate() {
         let [r, g, b, a] = simplified.colors.linear(index).map(f64::from);
-        // The fractions of red and blue.
+        // The shares of red and blue in the colour.
         let (red, blue) = (r / 4.0, b / 2.0);
         assert!((red + blue - 1.0).abs() < 1e-5 && g == 0.0 && (a - 1.0).abs() < 1e-6);
         let (x, radius) = (f64::from(surfel.center[0]), f64::from(as_grown(surfel, 0.01).radius()));
@@ -513,8 +516,8 @@ fn colours_are_means_over_what_is_covered() {
     assert!(mixed > 0);
 }
 
-/// The selection of Tien 2008: every point lies within `ratio` times a disk's radius, and its
-/// height within the tolerance.
+/// The selection of Tien 2008: for every point there is a disk whose centre is at most `ratio`
+/// radii away, and whose plane is at most the tolerance away.
 ///
 /// It needs more disks than `simplify`, and fewer with a greater ratio. The order of points does
 /// not matter.
@@ -582,7 +585,7 @@ fn larger_surfels_end_where_those_did_that_they_stand_for() {
         let (ours, theirs) = (rims(&simplified), rims(&Scene { clips: Vec::new(), ..control }));
         assert!(ours.mean < 0.7 * theirs.mean && ours.percentile_99 < 0.8 * spacing, "{ours:?} {theirs:?} {spacing}");
         assert!(coverage(&tree, &simplified, 64, 128, &()).unwrap().is_hole_free());
-        // The control: without its clip lines it extends past the edges.
+        // The control: without clip lines, the simplified surfels extend past the edges.
         assert!(rims(&Scene { clips: Vec::new(), ..simplified }).mean > 3.0 * ours.mean);
     }
 }

@@ -1,7 +1,7 @@
 //! Map coordinates do not jitter.
 //!
 //! With strays, distant clusters, offsets of 1e12 or cameras far away, the picture equals that of
-//! the scene alone near zero.
+//! the undisturbed scene near zero.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -56,7 +56,7 @@ fn camera(target: DVec3, away: f64) -> Camera {
     Camera::look_at((128, 112), Lens::Fov(fov), eye, target, Some(DVec3::Y), Up::Y, 1.0).unwrap()
 }
 
-/// Compares the kernels' picture of `scene` with the f64 reference of the sphere alone at zero,
+/// Compares the device's picture of `scene` with the f64 reference of a single sphere at zero,
 /// where no precision is lost.
 fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &Settings) -> Option<Comparison> {
     let gpu = common::gpu()?;
@@ -74,7 +74,7 @@ fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &Settings) ->
 fn is_the_same(name: &str, scene: &Scene, center: DVec3, away: f64) {
     for low_pass in [LowPass::None, LowPass::Ewa] {
         // From far away, an epsilon of one radius would be below the precision of depths, and the
-        // sphere's back within 1e-6 of its front.
+        // sphere's back is within a relative 1e-6 of its front.
         let (epsilon, cull) = (Epsilon::Relative(0.01), if away > 1e5 { Cull::Back } else { Cull::Auto });
         let options = Settings { low_pass, epsilon, cull, ..Settings::default() };
         let Some(comparison) = against_alone(scene, center, away, &options) else { return };

@@ -17,7 +17,8 @@ use epsplat::low_level::surfels::analytic::Shape;
 use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::DVec3;
 
-/// Looks at the origin from `eye`. With an odd `side`, the axis goes through the centre of a pixel.
+/// Returns a camera that looks at the origin from `eye`. With an odd `side`, its axis goes through
+/// the centre of a pixel.
 fn camera(side: u32, lens: Lens, eye: DVec3) -> Camera {
     Camera::look_at((side, side), lens, eye, DVec3::ZERO, Some(DVec3::Y), Up::Y, 1e-3).unwrap()
 }
@@ -64,7 +65,7 @@ fn a_sphere_has_the_outline_and_depths_of_its_formula() {
     // tan(15 degrees).
     let (pinhole, seen) = truth(Lens::Fov(30.0));
     let radius = pinhole.fx / 24f64.sqrt();
-    // The error of 16 samples per pixel along the outline; 2.7e-5 was measured.
+    // The error is that of 16 samples per pixel along the outline; 2.7e-5 was measured.
     assert!((area(&seen) / (PI * radius * radius) - 1.0).abs() < 1e-4, "{}", area(&seen));
     let (orthographic, flat) = truth(Lens::OrthographicHeight(2.5));
     let scale = orthographic.fx;
@@ -97,8 +98,8 @@ fn a_torus_has_its_hole() {
     let truth = cast(&Surface::Analytic(Shape::Torus), &camera);
     let center = 100 * 201 + 100;
     assert_eq!((depth(&truth, center), truth.coverage[center]), (f64::INFINITY, 0.0));
-    // pi (1.4^2 - 0.6^2) times the squared scale. Two outlines at half the radius: 4.2e-4 was
-    // measured.
+    // The image's area is pi (1.4^2 - 0.6^2) times the squared scale. The two outlines have smaller
+    // radii than that of the sphere above, so the error is larger: 4.2e-4 was measured.
     let expected = 1.6 * PI * camera.fx * camera.fx;
     assert!((area(&truth) / expected - 1.0).abs() < 1e-3, "{}", area(&truth) / expected);
     // The crest of the tube, and its bottom.

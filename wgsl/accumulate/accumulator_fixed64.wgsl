@@ -1,5 +1,6 @@
 // Sums of the terms of terms_wide.wgsl in fixed point, one u64 each. A sum can hold 2^24 full
-// weights, or one of every surfel. Needs 64-bit atomics. Error bound: src/passes/accumulate.rs.
+// weights, or one full weight of every surfel. Needs 64-bit atomics.
+// Error bound: src/passes/accumulate.rs.
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}

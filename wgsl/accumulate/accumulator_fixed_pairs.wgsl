@@ -1,7 +1,7 @@
 // The sums of accumulator_fixed.wgsl, bit for bit, for adapters with 64-bit atomics. Two
 // neighbouring sums are the halves of one u64, so that a fragment takes half as many additions. A
-// low half that wraps carries into the high half. The carries of both halves are counted in a
-// second u64, which follows, so that the carry into the high half can be subtracted again.
+// low half that wraps carries into the high half. The next u64 counts the carries of both halves.
+// Readers subtract the carries of the low half from the high half again.
 // Error bound: src/passes/accumulate.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0x8d89caff991eca3f
 // #import *::{Term}
@@ -13,9 +13,9 @@ override CHANNELS: u32;
 // For each pair of a pixel's channels: a u64 of sums and a u64 of carries.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
-// The carries of the current fragment, three bits per pair: one for the low half, and two that
-// count those of the high half. The high half may wrap twice if the halves are added one by one,
-// the first time by a carry from the low half.
+// The carries of the current fragment, three bits per pair: one bit for the carry of the low half,
+// and two that count the carries of the high half. The high half may wrap twice if add() adds the
+// halves one after the other, the first time by a carry from the low half.
 var<private> carries: u32;
 
 fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {

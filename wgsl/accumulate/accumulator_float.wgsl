@@ -1,6 +1,6 @@
 // Sums in f32 by atomic add, like those of a hardware blender with float targets. The rounding
-// depends on the order, so two runs may differ. Needs f32 atomics. Error bound:
-// src/passes/accumulate.rs.
+// depends on the order, so two runs may differ. Needs f32 atomics.
+// Error bound: src/passes/accumulate.rs.
 // #import layout::{WEIGHT_CHANNEL}
 
 override CHANNELS: u32;

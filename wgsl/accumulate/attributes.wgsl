@@ -1,6 +1,6 @@
 // The attributes of surfels beside their shape. Each surfel has a record of as many words as the
-// render needs, laid out by the host (src/plan/surfel.rs), so that one more attribute takes words
-// but no further binding.
+// render needs, laid out by the host (src/plan/surfel.rs). So one more attribute takes words but no
+// further binding.
 
 override ATTRIBUTE_WORDS: u32;
 

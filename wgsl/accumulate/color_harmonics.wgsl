@@ -1,5 +1,6 @@
 // A surfel's colour from four f32 (straight alpha) and spherical harmonics in the direction from
-// the eye to its centre. After the four, each term has three words: red, green and blue.
+// the eye to its centre. After these four words, each term of the harmonics has three: red, green
+// and blue.
 // Twin: src/scene/harmonics.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x8f3393ef138ea48e
 // #import attributes::{attribute_vector, attribute_word}

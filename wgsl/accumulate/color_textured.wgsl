@@ -1,6 +1,6 @@
 // A surfel's colour where its texture is not looked up: the texture's mean over its disk, in four
-// f32 as in color_linear.wgsl. Three more vectors hold its texture coordinates (texture.wgsl). Each
-// has three numbers for these and one coordinate of the low part of the surfel's centre.
+// f32 as in color_linear.wgsl. Three more vectors follow (texture.wgsl). Each has three numbers for
+// the texture coordinates and one coordinate of the low part of the surfel's centre.
 // #import attributes::{attribute_vector}
 
 fn color_part(index: u32, part: u32) -> vec4<f32> {

@@ -1,6 +1,7 @@
 // Sums of depths. Accepted fragments lie between the nearest depth and the tolerance behind it, so
-// their position in that interval is summed: its error is 2^-24 of epsilon, not of the scene.
-// Fragments of other cuts, which may lie in front of it (fade.wgsl), count as nearest.
+// their position in that interval is summed: its error is 2^-24 of epsilon, not of the scene's
+// depth. Fragments of other cuts, which may lie in front of the interval (fade.wgsl), count as
+// nearest.
 // Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 // #import *::{Term, add, sum_at, term}
 // #import epsilon_*::{deepest_accepted}

@@ -1,5 +1,5 @@
-// Sums of normals. Each normal is turned toward the viewer and mapped from [-1, 1] to [0, 1] before
-// it is summed, because the normals of the front and the back of a thin part would cancel.
+// Sums of normals. Each normal is turned toward the viewer before it is summed, because the normals
+// of the front and the back of a thin part would cancel. It is also mapped from [-1, 1] to [0, 1].
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x5f4eb9a33ee59bf8
 // #import *::{Term, add, add_pair, sum_at, term}
@@ -8,8 +8,8 @@
 
 override NORMAL_CHANNEL: u32;
 // Whether normals are turned toward the viewer. False where a pixel blends both sides of a surface,
-// with normals as they are given (Sides::Both in src/plan/needs.rs): with the rasteriser's own
-// depth test (src/passes/raster.rs) and with order-independent transparency.
+// with normals as they are given (Sides::Both in src/plan/needs.rs). The rasteriser's own depth
+// test (src/passes/raster.rs) and order-independent transparency do so.
 override TURNS: bool;
 
 fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {

@@ -1,4 +1,4 @@
-// Surfels with normals of their own, which may differ from their disks': a disk lies in a
+// Surfels whose attributes store a normal, which may differ from that of the disk: a disk lies in a
 // triangle's plane, but is lit as the smooth surface that the triangles approximate. Same interface
 // as normal_plane.wgsl.
 // #import attributes::{attribute_word}

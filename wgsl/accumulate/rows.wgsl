@@ -1,7 +1,7 @@
 // The rows of a thin splat: one whose image is more than eight times as long as wide, because it is
-// seen nearly edge-on or has such a shape. Across its width u changes by 1 over a small fraction of
-// the length over which the terms of a . (dx, dy, 1) grow and cancel, and f32 keeps only 24 bits of
-// them.
+// seen nearly edge-on or has such a shape. Across the image's width, u changes by 1 within a short
+// distance. Along the image's much greater length, the terms of a . (dx, dy, 1) grow and cancel,
+// and f32 keeps only 24 bits of them.
 //
 // The unit disk is therefore rotated in itself until row a has all the change across the width and
 // row b has none. Row a is then split on a common grid of 12 bits: the leading parts times whole
@@ -20,14 +20,14 @@ struct Homography {
     // First and last image point that the disk can reach; empty if low > high.
     low: vec2<f32>,
     high: vec2<f32>,
-    // Left to project_rare.
+    // Whether the surfel is left to project_rare().
     rare: bool,
     // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which covers
     // nothing.
     away: f32,
-    // For the low-pass: whether the anchor is the pixel of the splat's centre. If so, the centre
-    // relative to that pixel's centre, the images of the half-axes there, pixels, and the range of
-    // depths on the disk.
+    // For the low-pass: whether the anchor is the pixel of the splat's centre. If so, the next
+    // fields are the splat's centre relative to that pixel's centre, the images of the half-axes
+    // (both in pixels), and the range of depths on the disk.
     centered: bool,
     offset: vec2<f32>,
     s_image: vec2<f32>,
@@ -68,8 +68,8 @@ fn minor(a: Double, b_: Double, a_: Double, b: Double) -> Double {
     return difference(product(a, b_), product(a_, b));
 }
 
-// The rows from their changes per pixel and the splat's centre, an offset in pixels from the
-// anchor's centre. Both rows are 0 at the splat's centre.
+// Returns rows a and b from their changes per pixel, and from the offset in pixels of the splat's
+// centre from the anchor's centre. Both rows are 0 at the splat's centre.
 fn thin_rows(a_x: Double, a_y: Double, b_x: Double, b_y: Double, offset_x: Double, offset_y: Double) -> Rows {
     let a_2 = a_x.high * a_x.high + a_y.high * a_y.high;
     let b_2 = b_x.high * b_x.high + b_y.high * b_y.high;

@@ -3,7 +3,7 @@
 // interface as terms.wgsl.
 // Error bound: src/passes/accumulate.rs.
 
-// A term in units of the sums, as f32: a product is rounded once, as in f32 sums, and not again.
+// A term in units of the sums, as f32: a product is rounded only once, like the terms of f32 sums.
 alias Term = f32;
 const COUNT_ONE: Term = 1.0;
 

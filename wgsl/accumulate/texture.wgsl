@@ -16,7 +16,9 @@ override PLACE_CHANNEL: u32;
 struct Place {
     // The coordinates of the surfel's centre, mapped to [0, 1].
     center: vec2<f32>,
-    // The squared reach, mapped to [0, 1] from its own range.
+    // The squared reach, mapped to [0, 1]. The reach is how much the coordinates of overlapping
+    // surfels may differ at a pixel if they belong to one piece of the texture
+    // (src/scene/texture.rs).
     reach_2: f32,
     // The position of the centre relative to the eye, device units.
     position: vec3<f32>,
@@ -30,7 +32,7 @@ fn place_of(index: u32) -> Place {
     let at = color_part(index, 1u);
     let u_slope = color_part(index, 2u);
     let v_slope = color_part(index, 3u);
-    // The parts of the centre that f32 leaves out are the last entries of the rows.
+    // The last entries of the three vectors are the part of the centre that f32 leaves out.
     let low = vec3<f32>(at.w, u_slope.w, v_slope.w);
     let position = (vec3<f32>(center[0], center[1], center[2]) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
     return Place(at.xy, at.z, position, u_slope.xyz, v_slope.xyz);

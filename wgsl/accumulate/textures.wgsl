@@ -3,9 +3,10 @@
 // #import srgb::{premultiplied_of}
 // #import vectors::{between}
 
-// Where the header of each texture starts, those of surfels before those of triangles; then headers
-// and texels. A header has the number of levels and, for each, its width, its height and where its
-// texels start: rows from the top, four bytes of sRGB and straight alpha per texel.
+// First, for each texture, the word at which its header starts (textures of surfels before those of
+// triangles); then headers and texels. A header has the number of levels and, for each, its width,
+// its height and where its texels start: rows from the top, four bytes of sRGB and straight alpha
+// per texel.
 @group(0) @binding(65) var<storage, read> textures: array<u32>;
 
 struct Level {
@@ -25,7 +26,7 @@ fn level_at(head: u32, level: u32) -> Level {
 }
 
 fn level_texel(level: Level, column: i32, row: i32) -> vec4<f32> {
-    // Both are at least -1 and at most the size.
+    // Column and row are at least -1 and at most the size.
     let given = vec2<i32>(column, row);
     let at = select((given + level.size) % level.size, clamp(given, vec2<i32>(0), level.size - 1), level.clamps);
     return premultiplied_of(textures[level.texels + u32(at.y * level.size.x + at.x)]);
@@ -47,7 +48,8 @@ fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
 }
 
 // The colour of texture `number` at `place`, for a pixel that covers a `part` of the whole texture:
-// interpolated between the two levels with the next smaller and larger texels.
+// interpolated between the two levels whose texels are the next smaller and the next larger than
+// the covered area.
 fn seen_texture(number: u32, place: vec2<f32>, part: f32) -> vec4<f32> {
     let head = textures[number];
     let whole = level_at(head, 0u);

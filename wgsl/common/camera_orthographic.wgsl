@@ -35,7 +35,7 @@ fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     return vec4<f32>(image - extent, image + extent);
 }
 
-// The changes per pixel of the rows of the inverse of [s t], in doubled precision.
+// The rows of a thin splat (rows.wgsl): those of the inverse of [s t], in doubled precision.
 fn precise_rows(s_world: vec3<f32>, t_world: vec3<f32>, offset_x: Double, offset_y: Double) -> Rows {
     let s = rotate(widen(s_world));
     let t = rotate(widen(t_world));
@@ -71,11 +71,11 @@ fn homography(
     let image = vec2<f32>(x.high, y.high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
     let focal = held.intrinsics.xy;
-    // Edge-on, the rows vanish, and u is set to 2, which is outside the disk.
+    // Edge-on, 1 / away is infinite. The rows are set to 0 instead and u to 2, outside the disk.
     let edge_on = h.away == 0.0;
     let scale = select(1.0 / (h.away * focal), vec2<f32>(0.0), edge_on);
-    // A centre farther outside than this would be no better an anchor for the pixels of the image,
-    // and up to here whole numbers are exact.
+    // Coordinates of the anchor are limited to 2^22, up to which whole numbers are exact. The pixel
+    // of a centre farther outside would be no better an anchor for the pixels of the image.
     let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194303.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
     h.anchor = vec2<i32>(pixel);

@@ -15,24 +15,24 @@ fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     return sum(product(focal, quotient(position, depth)), principal);
 }
 
-// The extent of a disk wholly in front of the camera along one image axis, relative to its centre's
-// X/Z. For the lines of constant X/Z tangent to the disk, k^2 D + 2 k B - E = 0 with E >= 0 and D >
-// 0 (the conic of the disk's boundary).
+// The extent along one image axis of a disk wholly in front of the camera, as X/Z relative to that
+// of its centre. The lines X/Z = k (also relative) that touch the disk's boundary satisfy its conic
+// k^2 D + 2 k B - E = 0, with E >= 0 and D > 0.
 fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32, slope: f32) -> vec2<f32> {
     let e = s * s + t * t;
     let b = s * s_z + t * t_z;
     let d = (p_z - slope) * (p_z + slope);
     let root = sqrt(b * b + d * e);
-    // Each root in the form that does not cancel. If both forms vanish, the extent is zero.
+    // Each root is computed in the form that does not cancel. If `far` is 0, so is the extent.
     let far = abs(b) + root;
     let near = select(0.0, e / far, far > 0.0);
     return select(vec2<f32>(-near, far / d), vec2<f32>(-far / d, near), b >= 0.0);
 }
 
-// The extent along one axis, as X/Z, of the part of a disk at depths of at least `near`, for a disk
-// that crosses that depth. It is bounded by the tangents that touch the disk in that part, and by
-// the ends of its chord at `near`. Vectors are (x or y, z); `end_0` and `end_1` are (u, v) of the
-// ends.
+// The extent along one image axis, as X/Z, of a disk that crosses the depth `near`. Only the part
+// of the disk from that depth on counts: the extent is bounded by the tangents that touch this
+// part, and by the ends of the disk's chord at `near`. Vectors are (x or y, z); `end_0` and `end_1`
+// are (u, v) of the chord's ends.
 fn clipped_extent(
     s: vec2<f32>,
     t: vec2<f32>,
@@ -67,15 +67,14 @@ fn clipped_extent(
     return extent;
 }
 
-// The image of a half-axis from a centre in camera space, pixels, as if it were short (first
-// order).
+// The image of a half-axis at a centre in camera space, pixels, to first order in its length.
 fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
     return (axis.xy - center.xy / center.z * axis.z) / center.z * held.intrinsics.xy;
 }
 
-// Whether a ball lies beside the image by more than a margin of pixels: on the far side of a plane
-// through the eye and an edge of the image. The test is also valid for a ball that reaches the
-// eye's plane.
+// Whether a ball lies more than `margin` pixels outside the image: wholly beyond a plane through
+// the eye and an edge of the image that is moved out by the margin. The test is also valid for a
+// ball that reaches the eye's plane.
 fn is_beside(center: vec3<f32>, radius: f32, margin: f32) -> bool {
     let before = held.intrinsics.zw + margin;
     let after = vec2<f32>(f32(held.width), f32(held.height)) + margin - held.intrinsics.zw;
@@ -92,9 +91,10 @@ fn ball_sine(radius: f32, distance: f32) -> f32 {
 }
 
 // The part of the image that a ball in front of the camera covers: least x and y, greatest x and y,
-// pixels. `nearest` is its least depth. In units of X/Z, the image of each of its points lies
-// within `turned` of the centre's. So does the image of a disk in it, as the low-pass linearises
-// it, up to the second order, for which the square is added.
+// pixels. `nearest` is the ball's least depth. In X/Z and Y/Z, the image of a point of the ball
+// differs from that of its centre by at most `turned`. The same holds for the linearised image that
+// the low-pass uses for a disk in the ball, except for an error of second order, for which the
+// square is added.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     let ratio = center.xy / center.z;
     let image = ratio * held.intrinsics.xy + held.intrinsics.zw;
@@ -103,7 +103,7 @@ fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     return vec4<f32>(image - extent, image + extent);
 }
 
-// The changes per pixel of the rows t x p and p x s, divided by p . (s x t), in doubled precision.
+// The rows of a thin splat (rows.wgsl): t x p and p x s over p . (s x t), in doubled precision.
 fn precise_rows(
     p: array<Double, 3>,
     s_world: vec3<f32>,
@@ -137,8 +137,9 @@ fn homography(
     t_world: vec3<f32>,
     every: bool,
 ) -> Homography {
-    // In units of the splat's own distance no product of its lengths under- or overflows, however
-    // small a part of the scene it is. The unit is a power of two, so scaling is exact.
+    // Lengths are scaled by about 1 / distance of the splat, so that none of their products under-
+    // or overflows, however small the splat is in the scene. The scale is a power of two, so
+    // scaling is exact.
     let largest = max(max(abs(center[0].high), abs(center[1].high)), abs(center[2].high));
     let scale = bitcast<f32>(0x7f000000u - (bitcast<u32>(max(largest, 1e-30)) & 0x7f800000u));
     var scaled: array<Double, 3>;
@@ -178,7 +179,7 @@ fn scaled_homography(
         return h;
     }
     let focal = held.intrinsics.xy;
-    // Edge-on, the rows vanish, and u is set to 2, which is outside the disk.
+    // Edge-on, 1 / away is infinite. The rows are set to 0 instead and u to 2, outside the disk.
     let edge_on = away == 0.0;
     let scale = select(vec3<f32>(1.0 / (away * focal), 1.0 / away), vec3<f32>(0.0), edge_on);
     let a = cross3(t, p) * scale;
@@ -188,13 +189,13 @@ fn scaled_homography(
         let x = image_of(center[0], center[2], 0u);
         let y = image_of(center[1], center[2], 1u);
         let image = vec2<f32>(x.high, y.high);
-        // Beyond this the anchor's arithmetic is no longer exact, and the splat is far outside the
+        // Beyond 2^22 the anchor's arithmetic is no longer exact, and the splat is far outside the
         // image.
         let reach = abs(image) < vec2<f32>(4194304.0);
         if (all(reach)) {
             let pixel = floor(image);
-            // The splat's centre relative to the centre of its pixel keeps the digits that make the
-            // image stable.
+            // Relative to the centre of its pixel, the splat's centre keeps the digits that make
+            // the image stable.
             let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
             h.anchor = vec2<i32>(pixel);
             h.a = vec3<f32>(a.xy, select(-dot2(a.xy, offset), 2.0 / p.z, edge_on));
@@ -234,8 +235,8 @@ fn scaled_homography(
         return h;
     }
     // The disk reaches the near depth, or its centre lies far outside the image. There is no useful
-    // centre pixel, so the homography is anchored at the middle of the image, and the bounds are
-    // those of the part of the disk beyond the near depth.
+    // centre pixel, so the homography is anchored at the middle of the image. The bounds are those
+    // of the part of the disk beyond the near depth.
     h.anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
     let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - held.intrinsics.zw) / focal, 1.0);
     let unscaled = vec3<f32>(focal, 1.0);
@@ -319,9 +320,9 @@ fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
-// The part of a measure on a plane that a pixel covers. The plane passes through `point`, relative
-// to the eye, and the length of `normal` is the measure per unit of its area. Device units; 0 at
-// depth 0, where nothing is.
+// How much of a quantity that is spread over a plane lies in one pixel. The plane passes through
+// `point` (relative to the eye) with the normal `normal`, whose length is the quantity per unit of
+// area. Device units. The result is 0 at depth 0, which stands for an empty pixel.
 fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
     let facing = max(abs(dot3(normal, point / max(depth, held.near))), 1e-30);
     return dot3(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
@@ -337,8 +338,8 @@ fn depth_of(c: f32) -> f32 {
     return 1.0 / max(c, 1.0 / held.farthest);
 }
 
-// For the same test: a measure of depth that is linear over the image of a plane, in [0, 1], and
-// largest in front.
+// For the rasteriser's depth test: a measure of depth that is linear over the image of a plane, in
+// [0, 1], and largest in front.
 fn depth_order(z: f32) -> f32 {
     return min(held.near / z, 1.0);
 }
@@ -375,7 +376,7 @@ fn shear(p: vec3<f32>) -> vec2<f32> {
     return select(vec2<f32>(0.0), p.xy / p.z, p.z > held.near);
 }
 
-// The image, pixels, of steps across the axis at the given depths.
+// The image, pixels, of displacements `x` perpendicular to the camera's axis, at the given depths.
 fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
     return x / depths * held.intrinsics.xy;
 }

@@ -1,5 +1,5 @@
-// A surfel's centre as a camera sees it, in scenes where an f32 holds it. Same interface as
-// center_doubled.wgsl.
+// A surfel's centre relative to the eye, in scenes where f32 holds all visible digits of centres.
+// Same interface as center_doubled.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0xc26f8c1eed595583
 // #import double::{Double, quick_two_sum, two_sum}
 // #import layout::{Surfel, held}

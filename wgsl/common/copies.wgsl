@@ -1,4 +1,4 @@
-// A surfel stands for all that are equal to it, and has their number. Same interface as
+// Equal surfels are drawn once, as one surfel that stores their number. Same interface as
 // copies_absent.wgsl.
 // Host side and twin: src/scene/copies.rs.
 // #import attributes::{attribute_word}
@@ -23,7 +23,7 @@ fn product_words(a: u32, b: u32) -> vec2<u32> {
     let a_high = a >> 16u;
     let b_low = b & 0xffffu;
     let b_high = b >> 16u;
-    // Each of these is at most (2^16 - 1)^2 + 2^16 - 1, which fits a word.
+    // Each of the next three values is at most (2^16 - 1)^2 + 2^16 - 1, which fits a word.
     let lowest = a_low * b_low;
     let one = a_high * b_low + (lowest >> 16u);
     let other = a_low * b_high + (one & 0xffffu);

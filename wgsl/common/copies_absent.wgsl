@@ -1,4 +1,4 @@
-// Every surfel is drawn by itself. Same interface as copies.wgsl.
+// Every surfel is drawn and counts once. Same interface as copies.wgsl.
 
 fn copies_of(index: u32) -> u32 {
     return 1u;

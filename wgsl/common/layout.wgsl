@@ -12,7 +12,7 @@ struct View {
     // trailing parts (double.wgsl).
     rotation: array<vec4<f32>, 3>,
     rotation_low: array<vec4<f32>, 3>,
-    // xyz: the eye relative to the scene's origin.
+    // xyz: the eye relative to the scene's origin, device units.
     eye: vec4<f32>,
     eye_low: vec4<f32>,
     // fx, fy, cx, cy: pinhole in pixels; orthographic fx and fy in pixels per unit.
@@ -37,23 +37,25 @@ struct View {
     epsilon_absolute: f32,
     // 1 / unit: device lengths times this are world lengths.
     world: f32,
-    // Epsilon as a multiple of the surfel's radius, and that multiple of the largest radius, device
-    // units.
+    // epsilon_radius: epsilon as a multiple of the surfel's radius. epsilon_deepest: that multiple
+    // of the largest radius, device units.
     epsilon_radius: f32,
     epsilon_deepest: f32,
-    // No surfel lies deeper, and an unbounded epsilon accepts depths up to here; device units.
+    // An upper bound on the depths of all surfels, device units. An unbounded epsilon accepts
+    // depths up to this bound.
     farthest: f32,
-    // Depth of the middle of the scene's core, device units.
+    // Depth of the centre of the scene's core (the box of nearly all points), device units.
     middle: f32,
-    // The upper limit of an epsilon by the radius, as a fraction of the nearest depth.
+    // The upper limit of an epsilon given by the radius, as a fraction of the nearest depth.
     epsilon_most: f32,
-    // The depths at which the scene's body starts and ends, device units.
+    // The depths at which the scene's body (its box without distant outliers) starts and ends,
+    // device units.
     first: f32,
     last: f32,
     // The number of the surfels' textures.
     textures: u32,
-    // xy: the middle of the range of texture coordinates; z: its span; w: the largest squared
-    // reach, in units of the span.
+    // xy: the middle of the range of texture coordinates; z: the span of that range; w: the largest
+    // squared reach (texture.wgsl), in units of the squared span.
     place: vec4<f32>,
     // x: the size, in square pixels of the image, below which a node is drawn in place of what is
     // below it (src/scene/detail.rs). yz: the width and height of a sample, in pixels of the image.
@@ -103,13 +105,13 @@ struct Splat {
 
 // A page of surfels.
 struct Page {
-    // The number of surfels in the pages before it. In a cut: of chosen surfels, in the pages of
-    // the same branch.
+    // The number of surfels in the pages before it. In a cut (select.wgsl): the number of chosen
+    // surfels in the earlier pages of the same branch.
     first: u32,
-    // The number of surfels that it can hold.
+    // The number of surfels that the page can hold.
     surfels: u32,
-    // In a cut: the number of runs of surfels that are dealt out over the page, and the stride of
-    // the deal.
+    // In a cut: the number of runs of surfels that are shuffled over the page, and the stride of
+    // the shuffle (drawn_at() in select.wgsl).
     runs: u32,
     stride: u32,
     // In a cut: the word of the branch's attributes at which the list of chosen surfels starts.
@@ -119,37 +121,40 @@ struct Page {
     padding_2: u32,
 }
 
-// A node of a tree, or one that holds a part of a leaf's surfels.
+// A node of a tree, or a node that stands for a part of a large leaf.
 struct TreeNode {
     // The centre and radius of a sphere that holds everything below the node, world units. The
-    // centre is also that of the node's ellipse; it is repeated here so that the numbers by which
-    // most nodes are judged share a cache line.
+    // centre is also that of the node's ellipse, and is repeated here so that the values that judge
+    // most nodes share a cache line.
     center: array<f32, 3>,
     radius: f32,
-    // The first of its children in this branch, the first of its surfels, or the number of a root
-    // of another branch.
+    // By the kind of node: the index of its first child in this branch, of its first surfel, or of
+    // a root of another branch.
     first: u32,
-    // The number of these, and in the highest bits the kind of the node (select.wgsl).
+    // The number of its children or surfels, and in the highest two bits the kind of the node
+    // (judge.wgsl).
     below: u32,
-    // The largest radius of its children except leaves of one surfel, world units, if the sphere
-    // holds the centres of all children; -1 if the children must be judged one by one.
+    // The largest radius among its children, leaves of one surfel not counted; world units. -1 if
+    // the children must be judged one by one: if they are not all in this branch, or the sphere
+    // does not hold all their centres.
     children: f32,
-    // The smallest cosine of the angle between its normal and those below it; -1 if normals have no
-    // side.
+    // The smallest cosine of the angle between the node's normal and a normal below it; -1 if
+    // normals have no side.
     cone: f32,
 }
 
-// Neighbouring subtrees, whose surfels and nodes fit a buffer: the surfels first, then the nodes
-// level by level.
+// A branch consists of neighbouring subtrees of one tree. Its surfels and nodes fit a buffer: the
+// surfels first, then the nodes level by level.
 struct Branch {
     surfels: u32,
     // The number of roots, which are the first nodes.
     roots: u32,
-    // The number of the first of these roots, counted over all branches except the first.
+    // The index of the first of these roots among the roots of all branches except the first
+    // branch.
     first_root: u32,
-    // 1 if its root is the root of the tree.
+    // 1 if the branch has one root, the root of the tree.
     whole: u32,
-    // The word, behind its attributes, at which the list of chosen surfels starts.
+    // The word at which the list of chosen surfels starts, after the branch's attributes.
     chosen: u32,
     // The number of top levels that one workgroup can judge within its node and loop limits.
     small_levels: u32,
@@ -179,10 +184,9 @@ const FIXED_ONE: f32 = 4294966272.0;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(42) var<uniform> page: Page;
 
-// Copies of the uniforms, read once per invocation where all invocations take part. Some drivers
-// (Mesa's llvmpipe) read a uniform again wherever it is used, and separately for each invocation
-// where not all take part; that took a third of the projection. Every entry point that uses them
-// starts with hold().
+// Copies of the uniforms, read once per invocation in uniform control flow. Some drivers (Mesa's
+// llvmpipe) read a uniform again at each use, and in divergent control flow once per invocation;
+// that took a third of the projection's time. Every entry point that uses them starts with hold().
 var<private> held: View;
 var<private> held_band: Band;
 
@@ -198,7 +202,7 @@ fn hold_view() {
 
 const WORKGROUP: u32 = 64u;
 
-// Surfels that are culled together (cull.wgsl).
+// The number of surfels that are culled together (cull.wgsl).
 const BATCH: u32 = 64u;
 
 // The index of this invocation in a 2-D dispatch of 1-D workgroups.

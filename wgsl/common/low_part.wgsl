@@ -1,6 +1,6 @@
-// The part of the centre of a surfel or tree node beyond f32, world units. It is stored with its
-// attributes (center_doubled.wgsl), which lie in `chosen` in front of the list of chosen surfels: a
-// buffer that a kernel writes cannot be bound twice.
+// The part of the centre of a surfel or tree node that f32 leaves out, world units. The attributes
+// store it (center_doubled.wgsl). They are read through the binding `chosen`, where the list of
+// chosen surfels follows them, because a buffer that a kernel writes cannot be bound twice.
 // #import attributes::{ATTRIBUTE_WORDS}
 // #import center_doubled::{LOW_WORD}
 // #import select::{chosen}

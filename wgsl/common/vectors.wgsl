@@ -1,7 +1,7 @@
-// Products of vectors whose terms are added in the order that is written here. For the built-in
-// dot, cross, length, normalize and mix WGSL leaves the order, and so the rounding, to the driver;
-// that of NVIDIA chooses by the surrounding code (src/gpu/spirv.rs). A test checks that kernels use
-// none of them.
+// Products of vectors whose terms are added in the order that is written here. WGSL leaves the
+// order of the built-in dot, cross, length, normalize and mix to the driver, and so their rounding.
+// NVIDIA's driver chooses the order by the surrounding code (src/gpu/spirv.rs). A test checks that
+// kernels use none of these built-ins.
 
 fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
     return a.x * b.x + a.y * b.y;
@@ -31,7 +31,7 @@ fn unit3(a: vec3<f32>) -> vec3<f32> {
     return a / norm3(a);
 }
 
-// Exact at both ends.
+// Interpolates linearly; exact for a share of 0 and of 1.
 fn between(a: vec4<f32>, b: vec4<f32>, share: f32) -> vec4<f32> {
     return a * (1.0 - share) + b * share;
 }

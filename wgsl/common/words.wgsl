@@ -1,5 +1,5 @@
-// How kernels read and write records: four words at a time; and surfels, as structs of nine words.
-// Same interface as words_long.wgsl.
+// Kernels read and write records four 32-bit words at a time, and read surfels as structs of nine
+// words. Same interface as words_long.wgsl.
 // #import layout::{Surfel}
 
 alias Words = vec4<u32>;

@@ -21,7 +21,7 @@ fn each_word(four: Words) -> vec4<u32> {
     return vec4<u32>(low_word(four.x), high_word(four.x), low_word(four.y), high_word(four.y));
 }
 
-// Two 32-bit words of surfels in each; the host pads the last one.
+// Each u64 holds two 32-bit words of the surfels; the host pads the last u64.
 @group(0) @binding(2) var<storage, read> surfels: array<u64>;
 
 // Two consecutive f32 that start in the low half of `first`, or in its high half if `odd`.

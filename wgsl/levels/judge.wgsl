@@ -1,5 +1,6 @@
-// The fate of a node of the tree: how many of the cuts that reach it divide it, by its size in the
-// image, or that nothing below it is seen.
+// Decides the fate of a tree node: how many of the cuts that reach the node divide it, by its size
+// in the image, or that nothing below it is visible. A cut that divides a node draws what is below
+// the node in its place: its surfels, or its children, which may be divided in turn.
 // Twin: src/passes/select.rs.
 // #import axes_*::{growth}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
@@ -29,10 +30,10 @@ override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
 
-// Margins for rounding. BALL_ROUNDING: of a ball's position and radius, relative to its distance.
-// SINE_SLACK: of sines. BOUND_SLACK: of bounds on the balls of children. Such a ball is off by 2e-6
-// of its parent's distance, because it is less than twice as far away if both are past the near
-// depth; and its size errs by six roundings of 6e-8.
+// Margins for rounding. BALL_ROUNDING covers a ball's position and radius, relative to its
+// distance. SINE_SLACK covers sines. BOUND_SLACK covers bounds on the balls of children: if both
+// are past the near depth, a child's ball is less than twice as far away as its parent's, so it is
+// off by at most 2e-6 of the parent's distance. Its size errs by six roundings of 6e-8.
 const BALL_ROUNDING: f32 = 1e-6;
 const BOUND_SLACK: f32 = 1e-4;
 const SINE_SLACK: f32 = 1e-5;
@@ -41,9 +42,9 @@ fn kind_of(node: TreeNode) -> u32 {
     return node.below >> KIND_SHIFT;
 }
 
-// Whether the node is never divided. A leaf of one surfel is drawn as that surfel: the node has its
-// ellipse, clip lines and cap (`settle` in src/scene/hierarchy.rs; src/passes/source.rs). A leaf of
-// no surfels stands for a subtree that was not loaded, because no picture reaches it.
+// Whether the node is never divided. A leaf of one surfel is drawn as that surfel: the node has the
+// surfel's ellipse, clip lines and cap (`settle` in src/scene/hierarchy.rs; src/passes/source.rs).
+// A leaf of no surfels stands for a subtree that was not loaded, because no picture reaches it.
 fn is_whole(node: TreeNode) -> bool {
     return kind_of(node) == LEAF && (node.below & COUNT_MASK) <= 1u;
 }
@@ -57,7 +58,7 @@ fn vector(parts: array<f32, 3>) -> vec3<f32> {
 fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32) -> vec2<f32> {
     let normal = cross3(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
     let turned = dot3(ray_to(relative), normal * inverseSqrt(max(dot3(normal, normal), 1e-38)));
-    // The sine of the sum of the cone's angle and the ball's half-angle, if that is less than a
+    // The sine of the sum of the cone's angle and the ball's half-angle, if the sum is less than a
     // right angle; else 1, which is never exceeded.
     let ball = ball_sine(radius, norm3(relative));
     let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
@@ -91,15 +92,15 @@ fn draws_children(node: TreeNode, ball: Ball) -> bool {
     let radius = node.children * held.unit * (1.0 + BOUND_SLACK);
     let nearest = ball.nearest - BOUND_SLACK * norm3(ball.center);
     let past = nearest - radius - growth(ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
-    // A ball of negative radius is beside the image unless that of the positive radius lies wholly
-    // within it.
+    // With the negative radius, is_beside() is false exactly if the ball lies wholly within the
+    // image.
     let within = !is_beside(ball.center, -ball.radius, 0.0);
     return node.children >= 0.0 && past && within && cuts_that_divide(seen_disk(nearest, radius)) == 0u;
 }
 
 // The fate of a node. `low` is the part of its centre that f32 leaves out, world units.
 fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
-    // A root of another branch is judged there, and a part of a leaf was judged with the whole
+    // A root of another branch is judged with that branch, and a part of a leaf was judged with the
     // leaf.
     if (kind_of(node) == OTHER_BRANCH || kind_of(node) == PART_OF_LEAF) {
         return ALL_CUTS;
@@ -117,13 +118,14 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         if (away.x > away.y) {
             return UNSEEN;
         }
-        // A plane that faces away would be culled, whatever is below it, so such a node is divided.
+        // A node whose plane faces away would be culled although surfels below it may be visible,
+        // so it is divided.
         faces = away.x <= 0.0;
     }
     let divided = reaches_near(ball) || !faces;
     let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, is_whole(node));
-    // Neither the image area of a child's ellipse nor its side follows from the node's own position
-    // and size.
+    // Otherwise children must be judged: neither the image area of a child's ellipse nor the side
+    // that it shows follows from the node's own position and size.
     let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
     return cuts | select(0u, CHILDREN_DRAWN, unjudged);
 }
@@ -133,7 +135,7 @@ fn cuts_of(fate: u32) -> u32 {
     return fate & CUTS_MASK;
 }
 
-// Whether dividing the node draws what is below it, its surfels or its children.
+// Whether dividing the node draws its surfels or children at once, without judging children.
 fn is_last(node: TreeNode, fate: u32) -> bool {
     let kind = kind_of(node);
     return kind == LEAF || kind == PART_OF_LEAF || (kind == INNER && (fate & CHILDREN_DRAWN) != 0u);

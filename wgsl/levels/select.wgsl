@@ -1,11 +1,12 @@
 // Stage 0 of scenes with levels of detail: chooses the cut that is drawn in place of all surfels
 // (Pajarola 2003, section 5.1, step 1). The branches of the tree are processed one after the other,
 // and each branch level by level from its roots down. The nodes that are reached in a level are a
-// range of `frontier`. They are judged, each workgroup counts what its nodes leave, and prefix sums
-// of these counts say where each node writes what it leaves. So the order of the cut, too, depends
-// only on the tree and the camera. One workgroup does all of the first levels, which are small.
-// Pages then draw the chosen surfels and nodes from where they lie in the branch. Cuts that fade
-// into each other (select_fades.wgsl) are all chosen at once.
+// range of `frontier`. They are judged; each workgroup counts the surfels and nodes that are chosen
+// for its nodes, and the children to judge in the next level. Prefix sums of these counts give the
+// places where each node writes its results. So the order of the cut, too, depends only on the tree
+// and the camera. One workgroup processes all of the first levels, which are small. Pages then draw
+// the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
+// other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x1286befc94e21e37
 // #import attributes::{attribute_word, attributes}
@@ -23,18 +24,19 @@
 // half of `frontier` stores how many cuts reach each node (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
 @group(0) @binding(76) var<storage, read_write> fates: array<u32>;
-// For each invocation of a level: how many surfels to draw and how many children the invocations
-// before it in its workgroup leave.
+// For each invocation of a level: how many surfels and nodes to draw, and how many children, come
+// from the invocations before it in its workgroup.
 @group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
-// For each workgroup: how many of both its nodes leave; then where it starts to write them.
+// For each workgroup: the same two counts for all its nodes; after select_sum(), the two places
+// where the workgroup starts to write.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
 // The attributes of this branch; then, from branch.chosen on, the number of chosen surfels and
-// nodes, and their indices. They share a buffer so that the kernels that draw them need no further
-// one: core WebGPU grants eight.
+// nodes, and their indices. Attributes and list share a buffer, because core WebGPU grants a kernel
+// only eight storage buffers.
 @group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
 // For each root of a branch: how many cuts reach it.
 @group(0) @binding(79) var<storage, read_write> reached: array<u32>;
-// The state of the cut, by the words below; `selected` is the same buffer, read-only.
+// The state of the cut, whose words are named below; `selected` is the same buffer, read-only.
 @group(0) @binding(80) var<storage, read_write> selection: array<u32>;
 @group(0) @binding(81) var<storage, read> selected: array<u32>;
 
@@ -43,12 +45,12 @@ const LEVEL: u32 = 0u;
 const LEVEL_END: u32 = 1u;
 const NEXT: u32 = 2u;
 const NEXT_END: u32 = 3u;
-// Grids over the nodes of the level to judge and of the level to spread, with one invocation for
-// JUDGED nodes.
+// The grids of select_judge() and select_spread(), with one invocation for JUDGED nodes of the
+// level.
 const JUDGE_GRID: u32 = 4u;
 const SPREAD_GRID: u32 = 7u;
 
-// Surfels per run; a run is a number of whole batches.
+// Surfels per run. drawn_at() shuffles whole runs; a run is a whole number of batches (cull.wgsl).
 const RUN: u32 = 512u;
 
 // Nodes that one invocation judges in sequence. Barriers are expensive on a CPU adapter, and one
@@ -80,7 +82,7 @@ fn places_held() -> u32 {
     return page.surfels;
 }
 
-// The surfel or node at a place of the page; any index past the end of the cut.
+// The surfel or node at a place of the page; past the end of the cut, an arbitrary index.
 fn surfel_of(place: u32) -> u32 {
     return attributes[page.chosen + 1u + CHOSEN_WORDS * drawn_at(place)];
 }
@@ -112,7 +114,8 @@ fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
 }
 
 // The sum of the counts of all invocations before this one in the workgroup: within its group of
-// eight, plus the groups before. It takes two barriers, because each is expensive on a CPU adapter.
+// eight, plus the groups before. There are only two barriers, because each is expensive on a CPU
+// adapter.
 fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     counted[local] = counts;
     workgroupBarrier();
@@ -133,7 +136,7 @@ fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     return before;
 }
 
-// The number of invocations that judge so many nodes.
+// The number of invocations that judge this many nodes.
 fn judges_of(nodes: u32) -> u32 {
     return (nodes + JUDGED - 1u) / JUDGED;
 }
@@ -152,7 +155,7 @@ fn judged(node: TreeNode, index: u32, reached_in: u32) -> u32 {
     return select((fate & CHILDREN_DRAWN) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
 }
 
-// Judges the nodes of a range of the frontier, and returns how much they leave.
+// Judges the nodes of a range of the frontier, and returns the sum of their left_by().
 fn judge_run(first: u32, end: u32) -> vec2<u32> {
     var counts = vec2<u32>(0u);
     for (var place = first; place < end; place++) {
@@ -166,7 +169,8 @@ fn judge_run(first: u32, end: u32) -> vec2<u32> {
     return counts;
 }
 
-// Writes what a node leaves, from `start` on, and returns how much that is.
+// Writes the surfels and nodes that are chosen for a node into the list, from `start.x` on, and the
+// children to judge into the frontier, from `start.y` on. Returns left_by().
 fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
     let cuts = cuts_of(fate);
     let node = tree_nodes[index];
@@ -191,7 +195,7 @@ fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32>
     return counts;
 }
 
-// Writes what the nodes of a range leave, from `start` on.
+// Calls spread() for the nodes of a range of the frontier, one after the other, from `start` on.
 fn spread_run(first: u32, end: u32, start: vec2<u32>) {
     var at = start;
     for (var place = first; place < end; place++) {
@@ -216,7 +220,7 @@ fn reach_roots() -> u32 {
     return end;
 }
 
-// One workgroup: reaches the roots, and processes the small levels.
+// One workgroup: makes the reached roots the first level, and processes the small levels.
 @compute @workgroup_size(WORKGROUP)
 fn select_top(@builtin(local_invocation_index) local: u32) {
     hold_view();
@@ -236,7 +240,8 @@ fn select_top(@builtin(local_invocation_index) local: u32) {
         for (var k = 0u; k < WORKGROUP / 8u; k++) {
             start += eights[k];
         }
-        // All invocations now see what was spread, and all have read the sums.
+        // After the barriers all invocations see what spread_run() wrote, and all have read the
+        // sums.
         storageBarrier();
         workgroupBarrier();
     }
@@ -303,7 +308,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// Spreads the level that was judged. One invocation for JUDGED consecutive nodes.
+// Calls spread() for the level that was judged. One invocation for JUDGED consecutive nodes.
 @compute @workgroup_size(WORKGROUP)
 fn select_spread(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -8,13 +8,15 @@
 // The state of compositing a list.
 struct Compositing {
     shown: Shown,
-    // The depths up to which layers have consumed the fragments: fronts (x) and backs (y).
+    // The depths up to which layers have consumed the fragments that show a front (x) or a back
+    // (y).
     told: vec2<f32>,
     // The nearest remaining fragment, at which a surface starts; the end of the list if nothing
     // more shows.
     first: u32,
-    // If a surface is being summed: the next fragment that may belong to it, and the depth up to
-    // which it reaches so far. Otherwise `key` is not beyond `first`.
+    // While a surface is being summed, `key` is the next fragment that may belong to the surface,
+    // and `farthest` is the depth up to which the surface reaches so far. Otherwise `key` is not
+    // beyond `first`.
     key: u32,
     farthest: f32,
 }

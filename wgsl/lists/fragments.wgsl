@@ -1,6 +1,7 @@
 // Stage 3 where surfaces show through each other: makes a list of each pixel's fragments. The
-// visibility pass left their counts. A prefix sum over rows, and one over the pixels of each row,
-// turns the counts into starts of lists; then every fragment takes a place in its pixel's list.
+// visibility pass has counted the fragments of each pixel. A prefix sum over rows, and one over the
+// pixels of each row, turn the counts into starts of lists. Then every fragment takes a place in
+// its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
 // All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x099889a819ef66ae
 // #import accumulator_raster|front::{visible}
@@ -19,8 +20,9 @@
 // #import resolve::{OPACITY}
 // #import words|words_long::{Words, each_word, words}
 
-// The number of fragments, and the most at one pixel; then the start of each row's lists and the
-// end of the last; then the same per pixel. Numbers of fragments saturate at MOST_FRAGMENTS.
+// The number of all fragments, and the greatest number at one pixel; then the start of each row's
+// lists and the end of the last row's; then the start of each pixel's list and the end of the last.
+// Numbers of fragments saturate at MOST_FRAGMENTS. `starts` is the same buffer, read-only.
 @group(0) @binding(44) var<storage, read_write> list_starts: array<u32>;
 @group(0) @binding(45) var<storage, read> starts: array<u32>;
 
@@ -105,8 +107,8 @@ fn visible_count(pixel: u32) -> u32 {
 @group(0) @binding(46) var<storage, read_write> keys: array<vec2<u32>>;
 @group(0) @binding(47) var<storage, read_write> fragments: array<Words>;
 
-// A record has this many rows of four words. The weight comes first; the other constants are the
-// words of the other values (FragmentLayout in src/plan/fragment.rs).
+// A record has this many rows of four words. Its first word is the weight; the constants below are
+// the words of the other values (FragmentLayout in src/plan/fragment.rs).
 override FRAGMENT_ROWS: u32;
 override FRAGMENT_COLOR: u32;
 override FRAGMENT_COLORS: u32;
@@ -125,8 +127,8 @@ fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attrib
     if (!is_listed(pixel, fragment, weight * OPACITY * (held.color_low.a + held.color_span.a * attributes.color.a))) {
         return;
     }
-    // The places are taken from the last to the first. If two kernels decide differently at a rim,
-    // a fragment without a place is left out.
+    // The places are taken from the last to the first. If the counting kernel decided otherwise
+    // about a fragment at a rim, one fragment may find no place, and is left out.
     let left = atomicSub(&nearest[pixel], 1u);
     let at = starts[pixels_start() + pixel] + (left - 1u);
     if (left > starts[pixels_start() + pixel + 1u] - starts[pixels_start() + pixel] || left == 0u) {
@@ -218,8 +220,8 @@ fn list_fragments_large(
 // The start and the end of a pixel's list.
 fn list_of(pixel: u32) -> vec2<u32> {
     let list = vec2<u32>(starts[pixels_start() + pixel], starts[pixels_start() + pixel + 1u]);
-    // Places that no fragment took come before the others. If the count has wrapped below 0, a
-    // fragment found no place, and none is free.
+    // Free places, which no fragment took, come first, and `left` is their number. If `left` has
+    // wrapped below 0, a fragment found no place, and none is free.
     let left = visible[pixel];
     return vec2<u32>(list.x + select(left, 0u, left > list.y - list.x), list.y);
 }

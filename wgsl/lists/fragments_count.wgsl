@@ -1,4 +1,4 @@
-// Visibility pass that counts the fragments of each pixel, for lists of them. Same interface as
+// Visibility pass that counts the fragments of each pixel, for the pixels' lists. Same interface as
 // nearest_depth.wgsl. Host side: src/passes/fragments.rs.
 // #import accumulator_raster|visibility::{nearest}
 // #import camera_*::{Fragment}

@@ -1,6 +1,6 @@
-// Fragments of the same depth are in the order of their surfels as stored, or as in the tree. That
-// order depends on the surfels' values, not on their positions in files. Same interface as
-// fragments_untied.wgsl.
+// Fragments of the same depth are sorted by the ranks of their surfels: their order in the stored
+// scene, or in the tree. Ranks depend on the surfels' values, not on their positions in files. Same
+// interface as fragments_untied.wgsl.
 // #import camera_*::{Fragment}
 // #import fragments::{FRAGMENT_ROWS, Record, fragments}
 // #import fragments_*::{is_before_end}
@@ -14,7 +14,7 @@ const TIES: bool = true;
 // Rules::least_alpha in src/passes/sorted.rs.
 override LEAST_ALPHA: f32;
 
-// Whether a fragment is listed. `alpha` is the fragment's own.
+// Whether a fragment is listed. `alpha` is that of the fragment.
 fn is_listed(pixel: u32, fragment: Fragment, alpha: f32) -> bool {
     return alpha >= LEAST_ALPHA && is_before_end(pixel, fragment.depth);
 }

@@ -1,7 +1,7 @@
 // Sorts each pixel's list from front to back, in place; positive depths order as their bits. Up to
 // sixteen fragments are sorted by a network (fragments_network.wgsl), and then by insertion if
-// those of the same depth have an order. Longer lists are sorted by a heap (Williams 1964), for
-// which no initial order is slow.
+// fragments of the same depth have yet to be ordered. Longer lists are sorted by heap sort
+// (Williams 1964), which is slow for no initial order.
 // Host side: src/passes/fragments.rs.
 // All loops end, by 1, 5 of src/gpu/loops.rs: 0x52c7ff0d53d03c69
 // #import footprint::{band_pixels}

@@ -1,8 +1,8 @@
-// Visibility pass for lists whose fragments are composited one by one. For each pixel and step of
-// depth it sums the number of fragments and their optical depth, -ln(1 - alpha). A list ends with
-// the step behind which so little shows that nothing there is ever composited; the sums are
-// integers, so this does not depend on the order of the fragments. Same interface as
-// fragments_count.wgsl.
+// Visibility pass for lists whose fragments are composited one by one. It divides the scene's range
+// of depths into steps. For each pixel and step it sums the number of fragments and their optical
+// depth, -ln(1 - alpha). A list ends with the step behind which so little shows that nothing is
+// ever composited there. The sums are integers, so the ends do not depend on the order of the
+// fragments. Same interface as fragments_count.wgsl.
 // Host side and proof: src/passes/veils.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x9b37ce054ecaded7
 // #import accumulator_raster|visibility::{nearest}
@@ -19,16 +19,16 @@
 @group(0) @binding(50) var<storage, read_write> veils: array<atomic<u32>>;
 
 const VEILS: u32 = 16u;
-// Units per optical depth of 1.
+// Units of the sums per optical depth of 1.
 const VEIL_UNITS: f32 = 1024.0;
-// The least 1 - alpha that counts: for an alpha nearer to 1 its rounding would matter.
+// The lower limit of 1 - alpha: for an alpha nearer to 1, the rounding of 1 - alpha would matter.
 const LEAST_LEFT: f32 = 1e-3;
 
 // A fragment with an alpha below LEAST_COUNTED is surely not listed, so it is not counted. One with
 // an alpha below LEAST_HELD may not be listed, so it adds no optical depth.
 override LEAST_COUNTED: f32;
 override LEAST_HELD: f32;
-// The optical depth behind which nothing more shows, in units.
+// The optical depth behind which nothing more shows, in units of the sums.
 override ENOUGH_HELD: u32;
 
 // The surfel's alpha, which cover() passes to keep_nearest().
@@ -36,8 +36,8 @@ fn mark_of(surfel: u32) -> u32 {
     return bitcast<u32>(surfel_alpha(surfel));
 }
 
-// The step of a depth. The bits of positive depths have their order, and are about as far apart as
-// their logarithms.
+// The step of a depth. Steps are equal ranges of the bits of depths, which order as the depths and
+// grow about as their logarithms.
 fn veil_of(depth: f32) -> u32 {
     let first = bitcast<u32>(held.first);
     let width = (max(bitcast<u32>(held.farthest), first) - first) / VEILS + 1u;
@@ -62,7 +62,7 @@ fn nearest_at(pixel: u32) -> u32 {
     return select(NOTHING, 1u, atomicLoad(&nearest[pixel]) != 0u);
 }
 
-// The word after the starts of lists at which the last step that each pixel lists is stored.
+// The word, after the starts of lists, from which on the last listed step of each pixel is stored.
 fn ends_start() -> u32 {
     return pixels_start() + band_pixels() + 1u;
 }

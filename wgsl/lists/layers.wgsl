@@ -1,5 +1,5 @@
-// Stage 4: splits a pixel's fragments into surfaces, blends each as the nearest one is always
-// blended, and composites them from front to back. Same interface as sorted.wgsl.
+// Stage 4: splits a pixel's fragments into surfaces, blends each surface as blend.wgsl blends the
+// nearest one, and composites the surfaces from front to back. Same interface as sorted.wgsl.
 // Twin: src/passes/layers.rs.
 // All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
 // #import *::{quantise, resolve_color, sum_at, surface_depth}
@@ -19,7 +19,7 @@
 // #import side::{SIDES, SIDE_BIT}
 
 override MOST_LAYERS: u32;
-// Whether everything behind the last layer is drawn as one more, the tail.
+// Whether everything behind the last layer is drawn as one more layer, the tail.
 override TAIL: bool;
 
 fn depth_at(key: u32) -> f32 {
@@ -47,7 +47,8 @@ fn no_bend() -> Bend {
     return none;
 }
 
-// Sums the rest of the surface that starts at `first`, as far as the rounds of this dispatch last.
+// Sums the fragments of the surface that starts at `first`, from `key` on, until the surface ends
+// or this dispatch has no rounds left (next_round() in long_lists.wgsl).
 fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
     var so_far = begun;
     let front = depth_at(so_far.first);
@@ -71,8 +72,8 @@ fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
     return so_far;
 }
 
-// Sums the rest of all fragments that no layer has consumed, as far as the rounds of this dispatch
-// last.
+// Sums all fragments that no layer has consumed, from `key` on, until the list ends or this
+// dispatch has no rounds left.
 fn sum_rest(begun: Compositing, end: u32) -> Compositing {
     var so_far = begun;
     let front = depth_at(so_far.first);

@@ -14,12 +14,12 @@
 // #import resolve::{IMAGE_WORDS}
 // #import resolve_lists::{Shown}
 
-// The number of long lists; then for each its pixel, the number of finished steps of its heap sort,
-// whether compositing has begun, and the state of compositing.
+// The number of long lists; then, for each list, its pixel, the number of finished steps of its
+// heap sort, whether compositing has begun, and the state of compositing.
 @group(0) @binding(66) var<storage, read_write> found_lists: array<atomic<u32>>;
 @group(0) @binding(67) var<storage, read_write> long_lists: array<u32>;
 
-// The most fragments of a list that one invocation sorts and composites at once.
+// The greatest length of a list that one invocation sorts and composites in one dispatch.
 override LONG: u32;
 // The most that one dispatch does for a list: steps of the heap sort, and fragments visited.
 override HEAP_STEPS: u32;
@@ -49,7 +49,8 @@ fn next_round() -> bool {
     return has;
 }
 
-// Collects the long lists. The order of their numbers is never visible. One invocation per pixel.
+// Collects the long lists, numbered in arbitrary order; no image depends on that order. One
+// invocation per pixel.
 @compute @workgroup_size(WORKGROUP)
 fn find_long_lists(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -69,15 +70,15 @@ fn find_long_lists(
     }
 }
 
-// The word at which the state of the list of this number starts; the buffer's length if there is
-// none.
+// The word at which the state of long list `number` starts; the buffer's length if there is no such
+// list.
 fn kept_of(number: u32) -> u32 {
     let room = (arrayLength(&long_lists) - LONG_HEAD) / LONG_WORDS;
     return select(arrayLength(&long_lists), LONG_HEAD + number * LONG_WORDS, number < min(long_lists[0], room));
 }
 
-// The number of steps of sort_many(): one for each key that has others below it, then one for each
-// that leaves the heap.
+// The number of steps of sort_many(): a sink() for each key with children in the heap, then a pop()
+// for each key that leaves it.
 fn heap_steps(count: u32) -> u32 {
     return count / 2u + count - 1u;
 }

@@ -16,7 +16,7 @@
 @group(0) @binding(51) var<storage, read_write> moments: array<atomic<u32>>;
 
 const MOMENTS: u32 = 5u;
-// 2^26 units for an optical depth of 1. A fragment has at most 28.
+// 2^26 units for an optical depth of 1. The optical depth of a fragment is at most 28.
 const MOMENT_UNITS: f32 = 67108864.0;
 // MIXED and OF_OWN in the twin.
 const MIXED: f32 = 0.00006103515625;
@@ -30,7 +30,7 @@ fn moment_place(depth: f32) -> f32 {
     return 2.0 * depth_fraction(depth) - 1.0;
 }
 
-// The alpha of the surfel, which cover() hands on to keep_nearest().
+// The surfel's alpha, which cover() passes to keep_nearest().
 fn mark_of(surfel: u32) -> u32 {
     return bitcast<u32>(surfel_alpha(surfel));
 }
@@ -86,14 +86,14 @@ fn mass_before(b: vec4<f32>, place: f32) -> f32 {
     let c1 = (x - third * c2) / second;
     let c0 = 1.0 - second * c2;
     let own = 1.0 / (c0 + x * (c1 + x * c2));
-    // One of them may be infinitely far away; it has no mass then.
+    // One of the two other places may be infinitely far away; it then has no mass.
     let divisor = select(c2, 1e-12, abs(c2) < 1e-12);
     let half = -0.5 * c1 / divisor;
     let product = c0 / divisor;
     let root = sqrt(max(half * half - product, 0.0));
     let larger = half + select(root, -root, half < 0.0);
     let other = product / larger;
-    // Solved from total mass 1 and first moment 0.
+    // The masses at the two other places follow from total mass 1 and first moment 0.
     let of_larger = (-own * x - other * (1.0 - own)) / (larger - other);
     let of_other = 1.0 - own - of_larger;
     let before = OF_OWN * own + select(0.0, of_larger, larger < x) + select(0.0, of_other, other < x);

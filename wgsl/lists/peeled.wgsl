@@ -1,4 +1,5 @@
-// The layers that the rasteriser has peeled so far: each new one is composited behind those before.
+// The layers that the rasteriser has peeled so far: each new layer is composited behind the earlier
+// ones.
 // Host side: src/passes/peel.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x6f64d54604ba503e
 // #import *::{front_at, resolve_color, sum_at}
@@ -10,7 +11,8 @@
 // #import side::{SIDES, SIDE_BIT}
 
 // Per pixel: the premultiplied colour (four words), the transmittance, the number of layers, and
-// the nearest depths of the last front and the last back that were peeled (raster_peeled.wgsl).
+// the nearest depths of the last peeled layer that shows its front and of the last one that shows
+// its back (raster_peeled.wgsl).
 @group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
 
 const PEELED_WORDS: u32 = 8u;

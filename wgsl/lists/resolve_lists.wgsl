@@ -1,5 +1,5 @@
-// A pixel whose surfaces show through each other: composites its list (layers.wgsl or sorted.wgsl)
-// over the background. Same interface as resolve_surface.wgsl.
+// Resolves a pixel whose surfaces show through each other: composites the pixel's list (layers.wgsl
+// or sorted.wgsl) over the background. Same interface as resolve_surface.wgsl.
 // Twin: src/passes/layers.rs.
 // #import compositing|peeled::{composite}
 // #import image_*::{write_color}
@@ -16,7 +16,7 @@ struct Shown {
     color: vec4<f32>,
     transmittance: f32,
     layers: u32,
-    // How much the last layer shows, alpha times transmittance, if it is a tail; else 0.
+    // If the last layer is a tail, how much it shows: alpha times transmittance; else 0.
     tail: f32,
 }
 

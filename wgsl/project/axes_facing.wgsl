@@ -26,7 +26,7 @@ fn half_axes(surfel: Surfel, depth: f32) -> Axes {
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let row = widening(depth) / held.intrinsics.y;
     let limited = min(max(max(norm3(s), norm3(t)), LEAST_RADIUS * row), MOST_RADIUS * row);
-    // The point is no smaller than a sample, so that it shows at one.
+    // The point is at least as large as a sample, so that at least one sample shows it.
     let r = max(limited, 0.5 * widening(depth) / min(held.intrinsics.x, held.intrinsics.y));
     return Axes(
         vec3<f32>(r, 0.0, 0.0),

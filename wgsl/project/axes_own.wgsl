@@ -1,4 +1,4 @@
-// The half-axes of a surfel in camera and world space, device units: its own. Same interface as
+// The half-axes of a surfel as given, in camera and world space, device units. Same interface as
 // axes_facing.wgsl.
 // #import layout::{Surfel, held}
 // #import project::{rotate_plain}
@@ -10,7 +10,8 @@ struct Axes {
     t_world: vec3<f32>,
 }
 
-// The most by which a surfel is drawn larger than it is, device units, at any depth up to `depth`.
+// An upper bound on how much a surfel's drawn radius exceeds its given one, at any depth up to
+// `depth`; device units.
 fn growth(depth: f32) -> f32 {
     return 0.0;
 }

@@ -1,22 +1,23 @@
-// Bounding balls of surfels as the camera sees them: of batches (cull.wgsl) and of tree nodes
-// (select.wgsl). Twin: src/passes/cull.rs.
+// Bounding balls in camera space, of batches of surfels (cull.wgsl) and of tree nodes (judge.wgsl).
+// Twin: src/passes/cull.rs.
 // #import axes_*::{growth}
 // #import layout::{held}
 // #import project::{rotate_plain}
 
-// How far a low-pass may reach past its disk, pixels.
+// How far the low-pass may extend a splat past its disk, pixels.
 override FILTER_REACH: f32;
 
 struct Ball {
     // Camera space, device units.
     center: vec3<f32>,
     radius: f32,
-    // The range of depths of the fragments in the ball.
+    // The least and the greatest depth of fragments in the ball.
     nearest: f32,
     farthest: f32,
 }
 
-// The ball with a centre relative to the eye, in world axes, and a radius; device units.
+// The ball in camera space, from a centre relative to the eye (world axes) and a radius; device
+// units.
 fn ball_at(relative: vec3<f32>, radius: f32) -> Ball {
     var b: Ball;
     b.center = rotate_plain(relative);

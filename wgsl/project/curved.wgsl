@@ -1,6 +1,8 @@
 // Surfels that curve out of their planes: paraboloids over their disks, intersected exactly. Rows
-// a, b and c of a splat's record are those of U, V and W, and a_low is D, as src/passes/curved.rs
-// defines them.
+// a, b and c of a splat's record give U, V and W at a pixel; a_low is D. In the surfel's
+// coordinates (u, v, w), the point (U, V, W) of the pixel's ray lies at the depth `depth` of the
+// cap. Per longer half-axis of depth, the ray advances by spread (U, V, W) + D
+// (src/passes/curved.rs).
 // Same interface as flat.wgsl. Twins: src/scene/cap.rs, src/passes/curved.rs.
 // #import attributes::{attribute_word}
 // #import camera_*::{Fragment, holds_center, image_step, shear, spread_of, third_row, toward}
@@ -20,7 +22,8 @@
 override CAP_WORD: u32;
 
 struct Cap {
-    // The coefficients uu, uv and vv of the height, in units of the longer half-axis.
+    // The coefficients uu, uv and vv of the height (uu u^2 + 2 uv u v + vv v^2) / 2, in units of
+    // the longer half-axis.
     heights: vec3<f32>,
     // The longer half-axis over the depth; 0 for an orthographic camera.
     spread: f32,
@@ -34,7 +37,7 @@ struct Cap {
 // The position of a fragment on its surfel.
 struct Spot {
     uv: vec2<f32>,
-    // Whether its back is seen.
+    // Whether the fragment shows the surfel's back.
     away: bool,
 }
 
@@ -44,8 +47,8 @@ struct Bend {
     v: vec3<f32>,
 }
 
-// The greatest distance of a hit from the depth of U, V and W, in longer half-axes; a cap is no
-// higher than one of them.
+// The greatest distance of a hit from the depth at which U, V and W are taken, in longer half-axes.
+// No cap is higher than one longer half-axis.
 const FARTHEST_HIT: f32 = 8.0;
 
 fn world_heights(index: u32) -> vec3<f32> {
@@ -240,7 +243,8 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let root = sqrt(max(discriminant, 0.0));
     // Neither root cancels: q is the sum of two numbers of equal sign.
     let q = -0.5 * (b + select(-root, root, b >= 0.0));
-    // The slope has the sign of b at c / q, and the opposite sign at q / a.
+    // The quadratic's slope has the sign of b at c / q and the opposite sign at q / a. The slope
+    // tells which side of the cap the ray meets.
     let one = on_cap(splat, start, step, c / q, b < 0.0);
     let other = on_cap(splat, start, step, q / a, b >= 0.0);
     let nearer = other.hit && (!one.hit || other.depth < one.depth);
@@ -289,8 +293,8 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
 
 // A depth in front of every fragment of the cap itself between the pixels `first` and `last`,
 // relative to the anchor. A ray meets the plane at height h over the disk's plane at sigma = (h -
-// W) / (D_w + spread W). This grows or falls with W, and with h, wherever the divisor keeps its
-// sign, so one of the four ends is the nearest.
+// W) / (D_w + spread W). While the divisor keeps its sign, sigma is monotonic in W and in h, so the
+// least of its values at the four pairs of extremes is a lower bound.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let cap = splat.cap;
     let row = vec2<f32>(splat.c[0], splat.c[1]);

@@ -1,5 +1,6 @@
-// Points that face the camera: shapes in a plane parallel to the image, around an axis along the
-// view (Schuetz and Wimmer 2015, section III). Same interface as flat.wgsl.
+// Points that face the camera: shapes (shape_*.wgsl) that rise from a plane parallel to the image,
+// around an axis along the view (Schuetz and Wimmer 2015, section III). Same interface as
+// flat.wgsl.
 // Twin: src/passes/facing.rs.
 // #import camera_*::{Fragment, homogeneous, intersect, nearest_between}
 // #import double::{Double}
@@ -61,8 +62,8 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let abc = vec3<f32>(change * d + vec2<f32>(splat.a[2], splat.b[2]), splat.c[2]);
     let flat_ = intersect(abc);
     let uv = homogeneous(abc);
-    // All divisors are numbers of the splat, so a pixel needs no division, and no root, as squares
-    // are compared.
+    // All divisors are the same at every pixel of the splat, so a pixel needs no division. It needs
+    // no root, because squares are compared.
     let beside = abs(uv.xy) * (1.0 / uv.z);
     // A point always shows at the pixel that it lies in, like a square of that pixel's size.
     let own = abs(uv.xy) * (2.0 / change);

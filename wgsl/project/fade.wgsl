@@ -1,6 +1,6 @@
-// Splats of cuts that fade into each other, and the range of cuts that contain each
-// (src/scene/fade.rs). A fragment's weight is multiplied by the fraction of the cuts in that range.
-// Depths have no weights, so each sample takes the nearest depth of one cut.
+// Fades of levels of detail: several cuts are drawn at once, and each splat has the range of cuts
+// that contain it (src/scene/fade.rs). A fragment's weight is multiplied by the fraction of the
+// cuts in that range. Depths have no weights, so each sample takes the nearest depth of one cut.
 // Same interface as fade_absent.wgsl.
 // #import camera_*::{Fragment}
 // #import clip::{CLIP_ROWS}
@@ -48,8 +48,8 @@ fn faded(fragment: Fragment, fade: Fade) -> Fragment {
 
 // Whether the cut that the sample shows contains the splat.
 fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
-    // Fade::threshold in src/scene/fade.rs: the three lowest bits of both numbers, from the lowest
-    // on, become the bits of the cut's number from the highest on.
+    // Fade::threshold in src/scene/fade.rs, an ordered dither. From its highest bit on, the cut's
+    // number has bit 0 of x ^ y and of y, then bit 1 of both, then bit 2 of both.
     let differ = x ^ y;
     let cut = ((differ & 1u) << 5u) | ((y & 1u) << 4u)
         | ((differ & 2u) << 2u) | ((y & 2u) << 1u)

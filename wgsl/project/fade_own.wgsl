@@ -1,5 +1,5 @@
-// Fades that are given with the surfels (src/scene/fade.rs). Those of a cut come from
-// select_fades.wgsl.
+// Fades that are stored with the surfels (src/scene/fade.rs). For cuts chosen on the device,
+// select_fades.wgsl replaces this file.
 // #import attributes::{attribute_word}
 
 // The word of a surfel's attributes that holds its fade.

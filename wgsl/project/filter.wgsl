@@ -1,6 +1,6 @@
-// The numbers that a low-pass needs of a splat beside its record. The filter is centred on the
-// splat and elliptical: rho^2 = |R x|^2 for x pixels from the centre, R upper triangular. Layout
-// mirrored in src/gpu/layout.rs.
+// The values that a low-pass adds to the record of a splat. The filter is centred on the splat and
+// elliptical: rho^2 = |R x|^2 for x pixels from the centre, R upper triangular. Layout mirrored in
+// src/gpu/layout.rs.
 // #import records::{SplatRecord}
 // #import vectors::{dot2}
 // #import words|words_long::{each_word, words}
@@ -18,8 +18,8 @@ struct Filter {
     r_xx: f32,
     r_xy: f32,
     r_yy: f32,
-    // The factor on the kernel's weight; 0 if there is no filter, as for disks that reach the near
-    // depth, which are large anyway.
+    // The factor on the kernel's weight; 0 if the splat has no filter. Disks that reach the near
+    // depth have none, because they are large anyway.
     gain: f32,
 }
 

@@ -44,8 +44,8 @@ fn cap_in(record: SplatRecord) -> Cap {
 
 fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let abc = vec3<f32>(
-        // The leading parts of a thin splat sum exactly, so the order of both sums matters
-        // (rows.wgsl).
+        // The leading parts of a thin splat sum exactly only if they are summed before the trailing
+        // parts, so the order matters (rows.wgsl).
         (splat.a[0] * d.x + (splat.a[1] * d.y + splat.a[2]))
             + (splat.a_low[0] * d.x + (splat.a_low[1] * d.y + splat.a_low[2])),
         splat.b[0] * d.x + (splat.b[1] * d.y + splat.b[2]),

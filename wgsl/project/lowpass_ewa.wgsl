@@ -1,7 +1,8 @@
 // The EWA low-pass: the kernel convolved with the pixel's Gaussian in the image (Heckbert 1989;
 // Zwicker et al. 2001). With J the images of the half-axes, the ellipse of J J^T becomes that of Q
-// = J J^T + BLUR I, and the weight sinks by sqrt(|J J^T| / |Q|). Exact for a Gaussian kernel under
-// the affine image of the disk at its centre. Same interface as lowpass_max.wgsl.
+// = J J^T + BLUR I, and the weight is multiplied by sqrt(|J J^T| / |Q|). This is exact for a
+// Gaussian kernel if the disk's image is approximated by the affine one at its centre. Same
+// interface as lowpass_max.wgsl.
 // Twin: src/passes/lowpass.rs.
 // #import camera_*::{Fragment, plane_depth}
 // #import filter::{filter_rho2}

@@ -1,6 +1,7 @@
-// Stage 1: projects every surfel to a splat, once. One invocation per surfel. The rare surfels that
-// take longer (thin splats, disks that reach the near depth) and the large splats are queued and
-// processed together later, so that the other invocations of a subgroup need not wait.
+// Stage 1: projects every surfel to a splat, once. One invocation per surfel. Large splats are
+// queued, and so are the rare surfels that take longer (thin splats, disks that reach the near
+// depth). Queued ones are processed together later, so that the other invocations of a subgroup
+// need not wait.
 // Twin: src/passes/project.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x20f7c987e4d23957
 // #import axes_*::{half_axes}
@@ -21,12 +22,14 @@
 // #import words|words_long::{surfel_at}
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
-// The queue of large splats. Word 0 counts them; word 1 counts all surfels out of view. Three words
-// from QUEUE_GRID on are a grid with one workgroup for each large splat, three from QUEUE_LISTING
-// on one with a workgroup for LISTED_AT_ONCE of them. The splats' slots follow from QUEUE_START on.
+// The queue of large splats. Word 0 counts them; word 1 counts all surfels out of view. The three
+// words from QUEUE_GRID on are a grid with one workgroup per large splat. The three from
+// QUEUE_LISTING on are a grid with one workgroup per LISTED_AT_ONCE large splats. The splats' slots
+// follow from QUEUE_START on.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
-// The queue of rare surfels, in the same layout; its grid is that of project_rare.
+// The queue of rare surfels, in the same layout; its grid is that of project_rare(). `listed` is
+// the same buffer, read-only.
 @group(0) @binding(21) var<storage, read_write> rare: array<atomic<u32>>;
 @group(0) @binding(22) var<storage, read> listed: array<u32>;
 
@@ -117,7 +120,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 
-// Counts the surfels out of view, which are fewer than those in view. Copies count too.
+// Counts the surfels out of view, because they are fewer than those in view. Copies count too.
 fn count_unseen(local: u32, slot: u32, unseen: bool) {
     if (unseen) {
         atomicAdd(&group_unseen, copies_of(surfel_of(place_for(slot))));
@@ -173,7 +176,7 @@ fn arrange_rare() {
     }
 }
 
-// The number of workgroups that have at least so many invocations.
+// The number of workgroups that together have at least this many invocations.
 fn groups_of(invocations: u32) -> u32 {
     return (invocations + WORKGROUP - 1u) / WORKGROUP;
 }

@@ -1,4 +1,5 @@
-// The splats of a tile's list, one at a time. Same interface as splat_shared.wgsl.
+// Each invocation of a tile fetches the splats of the tile's list by itself, one at a time. Same
+// interface as splat_shared.wgsl.
 
 const FETCHED: u32 = 1u;
 
@@ -18,7 +19,7 @@ fn farthest_in_tile(farthest: f32) -> f32 {
     return farthest;
 }
 
-// The word that the invocation which fetched splat `from_` holds.
+// The value that `word` has in the invocation that fetched splat `from_`.
 fn handed(word: u32, from_: u32) -> u32 {
     return word;
 }

@@ -1,7 +1,7 @@
-// The splats of a tile's list, eight at a time, for software adapters, which would otherwise read
-// each word again for every invocation: the eight invocations of a tile fetch one splat each and
-// exchange them. Subgroups have at least eight invocations (src/gpu/adapter.rs) with consecutive
-// local indices. Same interface as splat_plain.wgsl.
+// The eight invocations of a tile fetch eight splats of the tile's list, one each, and exchange
+// them. Software adapters would otherwise read each word of a splat again for every invocation.
+// Subgroups have at least eight invocations (src/gpu/adapter.rs) with consecutive local indices.
+// Same interface as splat_plain.wgsl.
 
 const FETCHED: u32 = 8u;
 
@@ -26,7 +26,7 @@ fn farthest_in_tile(farthest: f32) -> f32 {
     return subgroupMax(farthest);
 }
 
-// The word that the invocation which fetched splat `from_` holds.
+// The value that `word` has in the invocation that fetched splat `from_`.
 fn handed(word: u32, from_: u32) -> u32 {
     return subgroupShuffle(word, (lane & 24u) | from_);
 }

@@ -53,7 +53,8 @@ fn weight_at(pixel: u32) -> f32 {
     return sum_at(pixel, WEIGHT_CHANNEL);
 }
 
-// Only the list of covered tiles (covered.wgsl): the rasteriser stores no depths in this buffer.
+// This buffer holds only the list of covered tiles (covered.wgsl), because the rasteriser stores no
+// depths in it.
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 

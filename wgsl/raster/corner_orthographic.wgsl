@@ -1,5 +1,5 @@
-// A corner of triangles as the orthographic camera sees it: it has an image at any depth. Same
-// interface as corner_pinhole.wgsl.
+// Projects corners of triangles by the orthographic camera. Corners have an image at any depth.
+// Same interface as corner_pinhole.wgsl.
 // Twin: src/passes/triangles.rs.
 // #import camera_*::{image_of}
 // #import corners::{Corner}

@@ -1,4 +1,4 @@
-// A corner of triangles as the pinhole camera sees it. Same interface as corner_orthographic.wgsl.
+// Projects corners of triangles by the pinhole camera. Same interface as corner_orthographic.wgsl.
 // Twin: src/passes/triangles.rs.
 // #import camera_*::{image_of}
 // #import corners::{Corner}
@@ -7,8 +7,9 @@
 // #import rows::{single}
 // #import triangles::{Triangle}
 
-// Projects a corner. Beyond the near depth its position is its image, and its share is one over its
-// depth. Any other corner has its homogeneous image, which needs no division, and the share 1.
+// Projects a corner. From the near depth on, the corner's position is its image point and its share
+// is 1 / depth. In front of the near depth, the position is the homogeneous image, which needs no
+// division, and the share is 1.
 fn corner_of(p: array<Double, 3>) -> Corner {
     if (p[2].high >= held.near) {
         return Corner(image_of(p[0], p[2], 0u), image_of(p[1], p[2], 1u), single(1.0), p[2], 1.0 / p[2].high);

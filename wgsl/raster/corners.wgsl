@@ -1,4 +1,4 @@
-// Triangles, first stage: projects every vertex to a corner, once for all its triangles. One
+// The first stage of triangles: projects every vertex to a corner, once for all its triangles. One
 // invocation per vertex.
 // Twin: src/passes/triangles.rs.
 // #import corner_*::{corner_of}
@@ -21,7 +21,8 @@ struct Corner {
     w: Double,
     // Camera-space z, device units.
     depth: Double,
-    // The factor on its area in a pixel's barycentric coordinates.
+    // The factor that converts the area opposite the corner to its barycentric coordinate, not
+    // normalised.
     share: f32,
 }
 

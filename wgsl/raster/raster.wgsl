@@ -35,8 +35,8 @@ struct ShapeCorner {
 }
 
 // Vertices per splat: 3 for a triangle, 6 for the two triangles of a quad. A quad covers fewer
-// pixels that the splat misses; a triangle costs half as much itself. So triangles serve scenes of
-// many small splats (src/passes/raster.rs).
+// pixels that the splat misses, but a triangle has half as many vertices. So triangles serve scenes
+// of many small splats (src/passes/raster.rs).
 override VERTICES: u32;
 
 // How far the shape reaches past the disk, pixels. It exceeds the rounding of corners by the
@@ -59,9 +59,9 @@ fn box_corner(number: u32) -> vec2<f32> {
 }
 
 // The image point of a corner. The shape is the triangle or parallelogram around the image of the
-// splat's disk, or around its bounding box where the former could miss pixels: the rows of a thin
-// splat have too few digits, a disk whose depth varies much has no such shape, and filters widen
-// splats.
+// splat's disk, or around the splat's bounding box where the first shape could miss pixels: the
+// rows of a thin splat have too few digits, a disk whose depth varies much has no such shape, and
+// filters widen splats.
 fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let extent = bounds(splat);
     let first = vec2<f32>(extent.first);
@@ -76,8 +76,8 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let v = cross3(c, a);
     let center = cross3(a, b);
     let thin = any(vec3<f32>(splat.a_low[0], splat.a_low[1], splat.a_low[2]) != vec3<f32>(0.0));
-    // Corners are within 2 of the centre, so the homogeneous coordinate there stays within half of
-    // its value at the centre.
+    // The u and v of corners are at most 2, so the homogeneous coordinate of a corner differs from
+    // that of the centre by less than half.
     let level = 4.0 * (abs(u.z) + abs(v.z)) < abs(center.z);
     if (FACES || FILTERED || thin || !level || any(size > vec2<f32>(4096.0))) {
         return boxed;
@@ -134,7 +134,7 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
 fn fragment_of(corner: ShapeCorner) -> Fragment {
     hold();
     let record = projected[corner.index];
-    // A constructor names every field, so that none is forgotten. The optional parts of the record
+    // A constructor needs every field, so none can be forgotten. The optional parts of the record
     // (clip, cap, fade) are read here only if there are any.
     let splat = Splat(
         corner.anchor.x,

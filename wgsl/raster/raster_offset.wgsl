@@ -1,7 +1,7 @@
 // The classic depth test: the rasteriser interpolates the depths of the quads, and the visibility
-// pass moves its depths away by epsilon (paper 000, section 5.3). The attribute pass can use early
-// depth tests, but their decisions are not exact. `depth_order` is linear over the image of a plane
-// and largest in front.
+// pass moves depths back by epsilon (paper 000, section 5.3). The attribute pass can use early
+// depth tests, but the decisions of these tests are not exact. `depth_order` is linear over the
+// image of a plane and largest in front.
 // #import blend|winner_second::{blend}
 // #import camera_*::{depth_of, depth_order}
 // #import epsilon_*::{farthest_shown, radius_of}

@@ -1,5 +1,6 @@
-// Fragments write their own depths, and the nearest ones are read back from the depth buffer. It is
-// not bound as a `texture_depth_2d`, because GLSL can only compare with those.
+// Fragments write their own depths, and the attribute pass reads the nearest depths from the depth
+// buffer. That buffer is not bound as a `texture_depth_2d`, because GLSL can only compare with such
+// textures.
 // #import footprint::{depth_scale}
 // #import layout::{NOTHING, Splat, held, held_band}
 

@@ -8,12 +8,13 @@
 // #import select::{surfel_of}
 // #import side::{SIDES, SIDE_BIT, is_shown}
 
-// The buffer `peeled` of peeled.wgsl, read-only. It has, per pixel, the nearest depth of the last
-// front and of the last back that were peeled, or 0.
+// The buffer `peeled` of peeled.wgsl, read-only. Per pixel it has, among others, the nearest depth
+// of the last peeled layer that shows its front and of the last one that shows its back; 0 if there
+// is none.
 @group(0) @binding(48) var<storage, read> told: array<u32>;
 
-// Whether the fragment belongs to an earlier layer: it lies no farther than the last layer of its
-// side accepts.
+// Whether the fragment belongs to an earlier layer: it is no farther than the last peeled layer of
+// the same side accepts.
 fn is_peeled(fragment: Fragment, radius: f32, pixel: vec2<u32>) -> bool {
     let side = select(0u, bitcast<u32>(fragment.depth) & SIDE_BIT, SIDES);
     let front = told[pixel_index(pixel.x, pixel.y) * PEELED_WORDS + PEELED_FRONTS + side];

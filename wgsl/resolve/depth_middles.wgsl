@@ -1,12 +1,13 @@
-// Sums of depths where surfaces are compared by their depths. A disk touches its surface in the
-// middle and stands out from it by the square of the distance from there. So a fragment counts by
-// the square of its weight here: the blended depth is less than two thirds as far out.
+// Sums of depths for pictures that compare surfaces by their blended depths. A disk touches the
+// surface at the disk's centre; elsewhere it stands out from the surface by the square of the
+// distance from the centre. So depths are summed with the square of the fragment's weight, which
+// moves the blended depth to less than two thirds as far from the surface.
 // Same interface as depth.wgsl. Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 // #import *::{Term, add, part_of, sum_at, term}
 // #import epsilon_*::{deepest_accepted}
 
 override DEPTH_CHANNEL: u32;
-// The channel of the weights of depths.
+// The channel of the sum of these squared weights.
 override MIDDLES_CHANNEL: u32;
 
 // LEAST_MIDDLE in src/passes/accumulate.rs.

@@ -1,6 +1,6 @@
-// Sums of depths where the nearest depth is not known yet: as fractions of the farthest depth in
-// the scene, so that their error is that of the scene's depth, not of epsilon. Same interface as
-// depth.wgsl.
+// Sums of depths where the nearest depth is not known yet. Depths are summed as fractions of the
+// farthest depth in the scene, so their error is relative to that depth, not to epsilon. Same
+// interface as depth.wgsl.
 // Twins: src/passes/accumulate.rs, src/passes/resolve.rs.
 // #import *::{Term, add, sum_at, term}
 // #import layout::{held}

@@ -1,5 +1,4 @@
-// The image without maps: each pixel is a colour, written at once. Same interface as
-// image_maps.wgsl.
+// The image without maps: each pixel is one vector, its colour. Same interface as image_maps.wgsl.
 
 @group(0) @binding(10) var<storage, read_write> image: array<vec4<f32>>;
 

@@ -1,6 +1,6 @@
-// The maps of a pixel, which follow its colour in the image. A map that is not asked for has no
-// place, and its values are not written. The numbers of fragments (count.wgsl) and of points
-// (index.wgsl) have files of their own.
+// The maps of a pixel, which follow its colour in the image. A map that was not requested has no
+// words in the image, and its values are not written. The numbers of
+// fragments (count.wgsl) and of points (index.wgsl) have files of their own.
 // All loops end, by 1 of src/gpu/loops.rs: 0x80bf639daa06c917
 // #import image_*::{write_value}
 // #import layout::{NOTHING, held}
@@ -33,7 +33,7 @@ fn no_depth() -> f32 {
     return bitcast<f32>(NOTHING ^ held.zero);
 }
 
-// Depths are in device units, and become world units.
+// Converts a depth from device units to world units, and writes it.
 fn write_depth(out: u32, depth: f32) {
     write_map(out, DEPTH_IMAGE, 0u, depth * held.world);
 }
@@ -77,7 +77,8 @@ fn write_no_texz(out: u32) {
     write_map(out, TEXZ_IMAGE, 2u, no_depth());
 }
 
-// The depth and alpha of a composited surface; the nearest ones are kept.
+// Writes the depth and alpha of a composited surface. Surfaces are numbered from the nearest; the
+// map holds the first SURFACES of them.
 fn write_surface(out: u32, number: u32, depth: f32, alpha: f32) {
     if (number < SURFACES) {
         write_map(out, SURFACES_IMAGE, 2u * number, depth * held.world);

@@ -24,8 +24,8 @@ fn shaded(premultiplied: vec4<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec4<f
     return vec4<f32>(shade_pixel(color, normal, x, y), alpha * OPACITY);
 }
 
-// Premultiplies a straight colour. The product is rounded before it is added, whatever a compiler
-// would fuse, so that every kernel that draws a sample gets the same bits.
+// Premultiplies a straight colour. The exclusive or with 0 keeps compilers from fusing the product
+// with a later addition, so every kernel that draws a sample gets the same bits.
 fn premultiplied_sample(straight: vec4<f32>) -> vec4<f32> {
     let product = vec4<f32>(straight.rgb * straight.a, straight.a);
     return bitcast<vec4<f32>>(bitcast<vec4<u32>>(product) ^ vec4<u32>(held.zero));

@@ -1,5 +1,5 @@
-// Several samples per pixel, which all other kernels treat as pixels: writes the mean of their
-// premultiplied colours (resolve_surface.wgsl, resolve_lists.wgsl). One workgroup per covered tile,
+// Several samples per pixel: writes the mean of their premultiplied colours (resolve_surface.wgsl,
+// resolve_lists.wgsl). All other kernels treat samples as pixels. One workgroup per covered tile,
 // one invocation per pixel. Same interface as resolve_pixels.wgsl. Twin: src/passes/resolve.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x2159d9d77d8a1b37
 // #import covered::{TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across, tiles_in_band}
@@ -38,8 +38,8 @@ fn resolve(
     }
 }
 
-// Writes the straight mean of the samples whose first one is at `corner`, column and row in the
-// band.
+// Writes the colour of a pixel, straight, from the sum of its samples' premultiplied colours.
+// `corner` is the first sample's column and row in the band.
 fn write_mean(corner: vec2<u32>, sum: vec4<f32>) {
     let pixel = corner.y / SAMPLES_DOWN * (held.width / SAMPLES_ACROSS) + corner.x / SAMPLES_ACROSS;
     let straight = select(vec3<f32>(0.0), sum.rgb / sum.a, sum.a > 0.0);

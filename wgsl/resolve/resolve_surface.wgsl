@@ -1,5 +1,5 @@
-// A pixel that shows only its nearest surface: the mean of its sums, or a triangle. Same interface
-// as resolve_lists.wgsl.
+// Resolves a pixel that shows only its nearest surface: the mean of the pixel's sums, or a
+// triangle. Same interface as resolve_lists.wgsl.
 // Twin: src/passes/resolve.rs.
 // #import *::{resolve_color, show, sum_at, surface_depth, weight_at}
 // #import count::{count_of, write_count}
@@ -31,7 +31,7 @@ struct Surface {
     exists: bool,
 }
 
-// The summed weight of the pixel whose sums `sums_of` names. An empty pixel's sums are not read.
+// The summed weight at `sums_of` (see surface_of()). The sums of an empty pixel are not read.
 fn shown_weight(sums_of: u32, front: f32) -> f32 {
     var weight = 0.0;
     if (bitcast<u32>(front) != NOTHING) {
@@ -41,8 +41,8 @@ fn shown_weight(sums_of: u32, front: f32) -> f32 {
     return weight;
 }
 
-// The surface of a pixel's splats. `sums_of` names its sums: by the pixel in storage, or by a slot
-// of a tile's registers.
+// The surface of a pixel's splats. `sums_of` is the index of the pixel's sums: the index of the
+// pixel if the sums are in storage, or its slot if they are in a tile's registers (tile_sums.wgsl).
 fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
     var surface: Surface;
     surface.front = front;
@@ -60,8 +60,7 @@ fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
     return surface;
 }
 
-// Resolves the pixel (x, y) of the image, the `pixel`th of the band, from the sums that `sums_of`
-// names.
+// Resolves the pixel (x, y) of the image, the `pixel`th of the band, from the sums at `sums_of`.
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
     let surface = joined(blended_at(sums_of, pixel, x, y), pixel, x, y - held_band.first_row);

@@ -1,7 +1,9 @@
-// Between stages 2 and 3, for tiles: makes for each cell of the image a list of the splats that may
-// touch it, by count, scan and place. The cells of small splats are the tiles; those of large
-// splats, which touch many, are blocks of tiles. The order within a list depends on the schedule,
-// but no minimum or sum depends on that order. Host side: src/passes/tiles.rs.
+// Runs between stages 2 and 3 if tiles are drawn: makes, for each cell of the image, a list of the
+// splats that may touch the cell. The splats of each cell are counted, a prefix sum turns counts
+// into starts, and each splat is written to its place. The cells of small splats are the tiles; the
+// cells of large splats, which touch many tiles, are blocks of tiles. The order within a list
+// depends on the schedule, but no minimum or sum depends on that order.
+// Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xce41422d9aa244b7
 // #import covered::{TILE_ROWS, TILE_WIDTH}
 // #import cull::{slot_of, surfel_in}
@@ -15,9 +17,9 @@
 // #import records::{splat_of}
 // #import words|words_long::{words}
 
-// Words 0 and 1 are the greatest length so far of all lists together, and of one list. For cell t,
-// word LIST_ENDS + t + 1 is first its count, then the start of its list, and at last the end; word
-// LIST_ENDS is 0. The lists follow from lists_start on.
+// Words 0 and 1 are the greatest lengths so far: of all lists together, and of one list. For cell
+// t, word LIST_ENDS + t + 1 is first its count, then the start of its list, and at last the end;
+// word LIST_ENDS is 0. The lists follow from lists_start on.
 @group(0) @binding(26) var<storage, read_write> lists: array<atomic<u32>>;
 
 const LIST_ENDS: u32 = 2u;
@@ -52,8 +54,9 @@ fn cells_of(pixels: Rectangle, size: vec2<u32>) -> Rectangle {
     return Rectangle((pixels.first - top) / size, (pixels.last - top) / size);
 }
 
-// Counts the splat in its cells: in each row, in those from `offset` on in steps of `step`. Once
-// the counts have become starts, a call with `enters` also writes the splat into their lists.
+// Counts the splat in the cells that it touches: in each row of cells, from `offset` on in steps of
+// `step`. Once the counts have become starts, a call with `enters` also writes the splat into the
+// lists of these cells.
 fn list_in_cells(slot: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {

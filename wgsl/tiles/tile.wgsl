@@ -1,7 +1,7 @@
 // Stages 2 to 4 by tiles of the image, from the lists that bin.wgsl made. Each tile has eight
 // invocations, and each of them keeps one column of the tile's pixels in registers. Where fetching
 // a splat costs as much as drawing its pixels, tiles are twice as high as wide; the upper and the
-// lower eight rows are then drawn separately, each with the splats that reach them. Every bit of
+// lower eight rows are then drawn separately, each half with the splats that reach it. Every bit of
 // the result is that of visibility.wgsl and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0x123395bc59143c44
@@ -35,8 +35,8 @@
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
 
 // The pixels of this invocation, from (x, y) down. `pixel` is the index of the first one in the
-// band, `pixels` their number without those past the edge of the image. `large` and `small` say
-// where the lists of its tile start and end.
+// band, `pixels` is their number, without those past the edge of the image. `large` and `small` are
+// the start and the end of the tile's list of large and of small splats.
 struct Column {
     x: u32,
     y: u32,
@@ -72,9 +72,9 @@ var<private> own_surfel: u32;
 var<private> own_splat: Splat;
 var<private> own_filter: Filter;
 
-// Fetches the splats from `place` on, of a list of `listed` in which the large ones come first.
-// Returns, for the upper and the lower half of the tile, a bit for each fetched splat that may have
-// a fragment no deeper than `deepest`.
+// Fetches the splats from `place` on, of the tile's `listed` splats, among which the large ones
+// come first. Returns, for the upper and the lower half of the tile, a bit for each fetched splat
+// that may have a fragment no deeper than `deepest`.
 fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u32> {
     let at = place + fetcher();
     let large = column.large.y - column.large.x;
@@ -112,7 +112,7 @@ fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
     );
 }
 
-// The parts of a splat that the footprint needs. A constructor names every field, so that none is
+// The parts of a splat that the footprint needs. A constructor needs every field, so none can be
 // forgotten.
 fn handed_splat(from_: u32) -> Splat {
     return Splat(
@@ -147,7 +147,8 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     );
 }
 
-// The nearest depths of the four pixels from row `y` down, with the splat's fragments.
+// Updates the nearest depths, `front`, of the four pixels from row `y` down with the splat's
+// fragments.
 fn nearer(front: vec4<f32>, splat: Splat, filter_: Filter, x: u32, y: u32) -> vec4<f32> {
     var nearest_ = front;
     for (var k = 0u; k < 4u; k++) {
@@ -241,8 +242,8 @@ fn fronts_of(column: Column, k: u32) -> vec4<f32> {
 
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
-    // A rejected fragment adds a weight of 0. With a branch, a compiler would select each stored
-    // sum instead.
+    // A rejected fragment adds a weight of 0. For a branch, a compiler would emit a select for each
+    // stored sum instead.
     let at = vec2<u32>(column.x, column.y + slot);
     let accepted = is_shown(fragment, front, attributes.radius, at);
     let weight = select(Term(0), weight_of(fragment), accepted);
@@ -252,8 +253,9 @@ fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, fron
     blend_weighted(slot, weight, depth, front, normal, attributes);
 }
 
-// Sums the fragments of a splat at eight pixels of the column, from `slot` on; `a` and `b` have
-// their nearest depths. Written out, so that no register is indexed by a run-time value.
+// Sums the fragments of a splat at eight pixels of the column, from `slot` on; `a` and `b` have the
+// nearest depths of these pixels. The calls are written out, so that no register is indexed by a
+// run-time value.
 fn gather_eight(slot: u32, next: u32, own_attributes: Attributes, a: vec4<f32>, b: vec4<f32>, column: Column) {
     let splat = handed_splat(next);
     let filter_ = handed_filter(own_filter, next);
@@ -312,8 +314,8 @@ fn tile_accumulate(
     }
 }
 
-// Sums and resolves at once, without storing the sums, where the lists have all splats. Runs over
-// covered tiles only.
+// Sums and resolves at once, without storing the sums. Used where the tiles' lists contain all
+// splats; runs over covered tiles only.
 @compute @workgroup_size(WORKGROUP)
 fn tile_resolve(
     @builtin(workgroup_id) workgroup: vec3<u32>,

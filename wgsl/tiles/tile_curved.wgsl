@@ -38,8 +38,8 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
 // Whether the splat has no fragment at `pixels`, which lie in its bounds. A ray meets the plane of
 // a height h over the disk's plane where (u, v) (D_w + spread W) = (U, V) D_w - W (D_u, D_v) + h N,
 // with N = (D_u, D_v) + spread (U, V); both sides are affine in the pixel. The cap lies between its
-// least and its largest height, so the right side at their mean is off by at most half their
-// difference times N.
+// least and its largest height, so the right side for the mean of these heights is off by at most
+// half their difference times |N|.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));

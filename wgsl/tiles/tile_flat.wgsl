@@ -26,8 +26,8 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
     return own;
 }
 
-// Whether the splat has no fragment at `pixels`, which lie in its bounds: its ellipse may miss the
-// corners of these.
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: the splat's ellipse
+// misses the corners of its bounds.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));

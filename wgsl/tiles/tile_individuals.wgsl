@@ -1,5 +1,5 @@
-// The pixels or samples of a tile's column, for pictures whose inputs are kept separate. Same
-// interface as tile_pixels.wgsl.
+// Keeps the nearest surfaces at the pixels or samples of a tile's column, for pictures whose inputs
+// are blended separately (individuals.wgsl). Same interface as tile_pixels.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0x2644c463de12ae18
 // #import individuals::{keep_nearest_of}
 // #import layout::{held}

@@ -1,4 +1,5 @@
-// The pixels of a tile's column, with one sample per pixel. Same interface as tile_samples.wgsl.
+// Resolves the pixels of a tile's column, with one sample per pixel. Same interface as
+// tile_samples.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0x580a95c3715cde77
 // #import layout::{held}
 // #import resolve_*::{resolve_pixel}

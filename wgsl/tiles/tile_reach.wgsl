@@ -1,5 +1,5 @@
-// Which rows of a tile a splat may have fragments in. The tests are conservative, so no image
-// depends on them.
+// Decides whether a splat may have fragments in the upper or the lower rows of a tile. The tests
+// are conservative, so no image depends on them.
 // #import covered::{TILE_WIDTH}
 // #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle, reach}

@@ -1,5 +1,5 @@
-// The samples of a tile's column. A pixel also has samples in the columns beside it; all are added
-// in the order of resolve_samples.wgsl. Same interface as tile_pixels.wgsl.
+// Resolves the samples of a tile's column. A pixel may have samples in several columns; they are
+// added in the order of resolve_samples.wgsl. Same interface as tile_pixels.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0xe8f9843fa8bb0301
 // #import covered::{TILE_ROWS}
 // #import layout::{WORKGROUP, held, held_band}

@@ -1,4 +1,4 @@
-// Lists of small splats, one per tile, where tiles draw these too. Same interface as
+// The lists of small splats, one per tile, where tiles draw small splats too. Same interface as
 // tile_small_absent.wgsl.
 // #import bin::{LIST_ENDS, lists_start, tile_size}
 

@@ -56,8 +56,8 @@ fn show_pair(slot: u32, channel: u32) {
     show_channel(slot, channel + 1u);
 }
 
-// Reads the sums of a pixel from the registers. Written out, so that no register is indexed by a
-// run-time value.
+// Reads the sums of a pixel from the registers. The calls are written out, so that no register is
+// indexed by a run-time value.
 fn show(slot: u32) {
     show_pair(slot, 0u);
     if (CHANNELS > 2u) { show_pair(slot, 2u); }

@@ -1,6 +1,6 @@
 // Splats and triangles that lie within epsilon of each other are blended, the nearer with the
-// greater share (after Guennebaud, Barthe and Paulin 2006, who smooth the seam so). Same interface
-// as join_nearest.wgsl.
+// greater share (after Guennebaud, Barthe and Paulin 2006, who smooth the seam in this way). Same
+// interface as join_nearest.wgsl.
 // #import epsilon_*::{deepest_accepted}
 // #import resolve_surface::{Surface}
 

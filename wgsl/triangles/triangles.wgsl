@@ -35,13 +35,13 @@ fn triangle_at(number: u32) -> Triangle {
 // Image coordinates of plain corners are below this, pixels.
 const PLAIN_REACH: f32 = 65536.0;
 
-// Whether the corner is plain: an edge between two plain corners gets its sides from f32, in every
-// triangle.
+// Whether the corner is plain. On which side of an edge between two plain corners a point lies is
+// decided in f32, in every triangle.
 fn is_plain(corner: Corner) -> bool {
     return is_before(corner) && max(abs(corner.x.high), abs(corner.y.high)) < PLAIN_REACH;
 }
 
-// The corner relative to the image point p. No digit of the difference is lost.
+// The plain corner's position relative to the image point p. No digit of the difference is lost.
 fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(
         keep(corner.x.high - p.x) + corner.x.low,
@@ -82,7 +82,7 @@ fn is_hit(sides: vec3<f32>, depth: f32) -> bool {
     return sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z && depth >= held.near;
 }
 
-// For triangles whose corners are all plain and that are not ill-formed (is_ill_formed()).
+// In f32, for triangles whose corners are all plain and that are not ill-formed (is_ill_formed()).
 fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let a = plain_spoke(triangle.a, p);
     let b = plain_spoke(triangle.b, p);
@@ -138,7 +138,8 @@ fn precise_edge(from_: Corner, to: Corner, numbers: vec2<u32>, p: vec2<f32>) -> 
     return edge;
 }
 
-// For any triangle: areas and depth in doubled arithmetic, and sides too where f32 is not enough.
+// In doubled arithmetic, for any triangle. Sides of edges between plain corners still come from
+// f32.
 fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let a = precise_edge(triangle.b, triangle.c, triangle.numbers.yz, p);
     let b = precise_edge(triangle.c, triangle.a, triangle.numbers.zx, p);
@@ -151,8 +152,8 @@ fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
         sum(product(a.area, shared_depth(triangle.a)), product(b.area, shared_depth(triangle.b))),
         product(c.area, shared_depth(triangle.c)),
     );
-    // In a sliver all areas may have other signs than their sides, which come from f32. Then each
-    // corner has an equal part.
+    // In a sliver, the signs of all areas may differ from the sides, which come from f32. Then all
+    // three barycentric coordinates are 1/3.
     let is_told = whole.high > 0.0;
     let told = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
     let parts = select(vec3<f32>(1.0 / 3.0), told, is_told);

@@ -1,4 +1,4 @@
-// The list of image tiles in which triangles show. Other pixels are not shaded, and not looked at
+// The list of image tiles in which triangles show. Pixels of other tiles are not shaded, nor read
 // when splats and triangles are joined. Same interface as triangles_tiles_absent.wgsl.
 // Host side: src/passes/triangles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x5a024c5f69138886
@@ -11,8 +11,9 @@
 // #import triangles_attributes::{triangle_pixels}
 
 // The number of listed tiles, a grid with one workgroup for each, and from TRIANGLE_TILES on the
-// tiles, 8 x 8 pixels each. After the pixels, triangle_pixels has a row for each tile of the band
-// that says whether the tile is listed.
+// tiles, 8 x 8 pixels each. After the pixels, triangle_pixels has a row for each tile of the band,
+// which says whether the tile is listed. `tiles_of_triangles` is the same buffer as
+// `triangle_tiles`, read-only.
 @group(0) @binding(70) var<storage, read_write> triangle_tiles: array<atomic<u32>>;
 @group(0) @binding(71) var<storage, read> tiles_of_triangles: array<u32>;
 
@@ -62,7 +63,7 @@ fn arrange_triangle_tiles() {
     }
 }
 
-// The tile at a place of the list; a number that is no tile past its end.
+// The tile at a place of the list; past its end, a number that is no tile.
 fn triangle_tile(place: u32) -> u32 {
     return select(0xffffffffu, tiles_of_triangles[TRIANGLE_TILES + place], place < tiles_of_triangles[0]);
 }
@@ -76,8 +77,8 @@ fn shows_triangles(x: u32, row: u32) -> bool {
     return tile_has_triangles(row / TRIANGLE_TILE * triangle_tiles_across() + x / TRIANGLE_TILE);
 }
 
-// Whether triangles show in a tile of covered.wgsl, which is one tile here, or two, one above the
-// other.
+// Whether triangles show in a tile of covered.wgsl. Such a tile consists of one tile of this file,
+// or of two, one above the other.
 fn has_triangles(tile: u32) -> bool {
     let upper = tile / triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE) * triangle_tiles_across() + tile % triangle_tiles_across();
     let below = upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u);

@@ -19,7 +19,7 @@
 @group(0) @binding(63) var<storage, read_write> rare_triangles: array<atomic<u32>>;
 @group(0) @binding(64) var<storage, read> listed_triangles: array<u32>;
 
-// Triangles that may touch more pixels get a workgroup.
+// Triangles that may touch more pixels than this get a workgroup.
 const LARGE_TRIANGLE: u32 = 1024u;
 
 // The range of image coordinates that the triangle reaches along an axis, pixels. If the near depth
@@ -74,8 +74,9 @@ fn reach_of(triangle: Triangle) -> Rectangle {
     return Rectangle(vec2<u32>(first), vec2<u32>(last));
 }
 
-// Whether f32 is not enough for the barycentric coordinates: they err by 2^-23 times the squared
-// length over twice the area, which would move depths by more than f32 may, or they are arbitrary.
+// Whether f32 is not enough for the barycentric coordinates. In f32 they err by 2^-23 times the
+// squared length of an edge over twice the area. In an ill-formed triangle this error moves depths
+// by more than the rounding of f32 may, or it is so large that the coordinates are arbitrary.
 fn is_ill_formed(triangle: Triangle) -> bool {
     let a = vec2<f32>(triangle.a.x.high, triangle.a.y.high);
     let b = vec2<f32>(triangle.b.x.high, triangle.b.y.high) - a;

@@ -7,8 +7,8 @@
 // #import layout::{held}
 // #import rows::{minor}
 
-// The position relative to the eye, device units. Where the leading parts cancel, the trailing
-// parts may be larger than their difference.
+// The position relative to the eye, device units. Where the leading parts cancel, their difference
+// may be smaller than the trailing parts, so both are added in doubled precision.
 fn relative_vertex(vertex: u32) -> array<Double, 3> {
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {

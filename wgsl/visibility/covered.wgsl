@@ -1,5 +1,5 @@
-// Stage 4, its start: lists the tiles of the image that are not empty. The others stay as the image
-// was cleared, and no invocation visits their pixels. Host side: src/passes/covered.rs.
+// The start of stage 4: lists the tiles of the image that are not empty. Empty tiles keep the
+// cleared values, and no invocation visits their pixels. Host side: src/passes/covered.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xd09eb1f53779705e
 // #import accumulator_raster|front::{visible}
 // #import accumulator_raster|occlusion::{covered_start, has_any}
@@ -14,12 +14,12 @@ override TILE_ROWS: u32;
 
 // 1 if all tiles are listed, because empty pixels of the image differ from 0 or layers are peeled.
 override LIST_EMPTY: u32;
-// 1 if inputs are kept separate. Each input then lists the tiles that it covers itself, and
-// individuals.wgsl lists those of the result.
+// 1 if inputs are blended separately (individuals.wgsl). For each input only the tiles that it
+// covers are then listed here, and list_individuals() lists those of the finished image.
 override LIST_APART: u32;
 
-// The list, from covered_start() on: the number of listed tiles; a grid with one workgroup per
-// tile; a grid with one per eight tiles; and, from COVERED_LIST on, the tiles.
+// The list lies in `nearest`, from covered_start() on: the number of listed tiles; a grid with one
+// workgroup per tile; a grid with one per eight tiles; and, from COVERED_LIST on, the tiles.
 const COVERED_GRID: u32 = 1u;
 const COVERED_GRID_OF_EIGHTS: u32 = 4u;
 const COVERED_LIST: u32 = 8u;

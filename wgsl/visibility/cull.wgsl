@@ -1,8 +1,9 @@
-// Stage 1, its start: chooses the batches of surfels that are projected. First those in view that
-// are nearer than the middle of the scene; once these are drawn, those of the others that are not
-// hidden behind them. A batch is left out only if none of its fragments could be nearest or within
-// epsilon of the nearest, so no image depends on it. The splats of the listed batches are stored in
-// slots, one batch after the other: batches that are left out take no memory.
+// The start of stage 1: chooses the batches of surfels that are projected. The near batches, in
+// view and nearer than the middle of the scene, are projected and drawn first. Then follow the far
+// batches in view that are not hidden behind what was drawn. A batch is left out only if none of
+// its fragments could be nearest or within epsilon of the nearest, so no image changes. The splats
+// of the listed batches are stored in slots, one batch after the other: batches that are left out
+// take no memory.
 // Host side and twin: src/passes/cull.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x116791cebd55d876
 // #import accumulator_raster|front::{visible}
@@ -20,9 +21,9 @@
 
 // The bounding balls of batches: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
-// The grid of workgroups that draws all listed batches; its word 1 is their number. From LIST_FAR
-// on the grid of the far batches, and from LIST_START on the numbers of the batches, the near ones
-// first.
+// From word 0 on, the grid of workgroups over all listed batches, whose word 1 is their number.
+// From LIST_FAR on, the grid over the far batches. From LIST_START on, the numbers of the batches,
+// the near ones first. `drawn` is the same buffer, read-only.
 @group(0) @binding(24) var<storage, read_write> surviving: array<atomic<u32>>;
 @group(0) @binding(25) var<storage, read> drawn: array<u32>;
 // The batches in view that are not near: how many there are, and their numbers.
@@ -37,8 +38,8 @@ const MOST_TILES: u32 = 4096u;
 // A relative margin on depths for the rounding of rows c (src/passes/cull.rs).
 const DEPTH_SLACK: f32 = 1e-3;
 
-// The slot of this invocation. A row of the dispatch is a batch, and its rows are the last batches
-// that are listed so far.
+// The slot of this invocation's splat. Each row of the dispatch is a batch, and the last row is the
+// batch that was listed last.
 fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return (drawn[1] - workgroups.y + workgroup.y) * BATCH + workgroup.x * WORKGROUP + local;
 }
@@ -135,7 +136,7 @@ fn occlude_open(
     farthest_in(linear_index(workgroup, workgroups, local), NOTHING);
 }
 
-// Runs after that, with an invocation for each of the other batches, and more that have none.
+// Runs after occlude_open(). One invocation per batch in `rest`; further invocations have no batch.
 @compute @workgroup_size(WORKGROUP)
 fn cull_far(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -7,7 +7,7 @@ fn radius_of(index: u32) -> f32 {
     return 0.0;
 }
 
-// On the camera's axis, where the length spans the most depth.
+// The farthest accepted depth on the camera's axis, where the length spans the most depth.
 fn deepest_accepted(front: f32) -> f32 {
     return min(front + (front * held.epsilon_relative + held.epsilon_absolute), held.farthest);
 }

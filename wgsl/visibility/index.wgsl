@@ -1,5 +1,7 @@
-// The index map, in words of the image: the greatest weight among the fragments within epsilon of a
-// pixel's nearest depth, and then the place of the surfel that has it. Twin: src/passes/index.rs.
+// The index map, two words per pixel of the image: the greatest weight among the fragments within
+// epsilon of the nearest depth, and the place in the scene of the surfel that has this weight. A
+// first pass over the fragments finds the weights, a second pass the surfels.
+// Twin: src/passes/index.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
 // #import *::{front_at}
 // #import blend::{fragment_weight}
@@ -20,12 +22,12 @@
 override INDEX_IMAGE: u32;
 
 // Weights this close to the greatest, in units in the last place, count as equal: two kernels may
-// round one differently.
+// round the same weight differently.
 const AS_GREAT: u32 = 4u;
 
-// Enters a fragment in the map: its weight, or with `names` the place of its surfel if the weight
-// is the greatest. Positive weights order as their bits. Places are stored as 2^32 - 1 - place, so
-// that the first is the greatest, and a cleared pixel has none.
+// Enters a fragment in the map: its weight or, if `names` is set and the weight is the greatest,
+// the place of its surfel. Positive weights order as their bits. Places are stored as 2^32 - 1 -
+// place, so that among equal weights the first surfel wins, and a cleared word means no surfel.
 fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool) {
     let fragment = footprint(splat, filter_, x, y);
     let pixel = pixel_index(x, y);

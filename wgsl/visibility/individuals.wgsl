@@ -1,5 +1,5 @@
-// Inputs that are kept separate, the individuals of Tien 2008. Each is blended by itself, one after
-// the other, and each pixel keeps the nearest of their surfaces, by the depth that each blends to
+// Inputs that are blended separately, the individuals of Tien 2008. They are drawn one after the
+// other, and each pixel keeps the nearest of their blended surfaces, compared by blended depth
 // (section 5.3). Twin: src/passes/individuals.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x4f9b625f5cb1d36b
 // #import *::{front_at}
@@ -12,8 +12,9 @@
 // #import triangles_tiles::{has_triangles}
 
 // Per pixel: the straight colour, shaded; then the normal (world space, unit length) and the depth
-// (device units, 0 if empty). For joins and maps also the depth of the nearest fragment, the summed
-// weight and the number of fragments; then the texture coordinates.
+// (device units, 0 if empty). Where joins or maps need them, two more vectors follow: the depth of
+// the nearest fragment, the summed weight and the number of fragments; then the texture
+// coordinates.
 @group(0) @binding(68) var<storage, read_write> individuals: array<vec4<f32>>;
 
 override INDIVIDUAL_VECTORS: u32;
@@ -55,7 +56,7 @@ fn order_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     return order;
 }
 
-// Whether a is shown in place of b: it is nearer, or at equal depth greater in the first value that
+// Whether a is shown in place of b: a is nearer or, at equal depth, greater in the first value that
 // differs. So the order of the inputs is never visible.
 fn shows_before(a: Surface, b: Surface) -> bool {
     let by_color = order_of(a.color, b.color);
@@ -75,7 +76,7 @@ fn keep_nearest_of(sums_of: u32, pixel: u32, x: u32, y: u32) {
     }
 }
 
-// Runs after an individual is summed. One workgroup per tile that it covers.
+// Runs after an individual is summed. One workgroup per tile that the individual covers.
 @compute @workgroup_size(WORKGROUP)
 fn keep_individual(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -94,7 +95,8 @@ fn keep_individual(
     }
 }
 
-// Runs after all individuals: lists the tiles in which any shows. One invocation per tile.
+// Runs after all individuals: lists the tiles in which any individual or triangle shows. One
+// invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn list_individuals(
     @builtin(workgroup_id) workgroup: vec3<u32>,

@@ -6,8 +6,8 @@
 // #import camera_*::{Fragment}
 // #import layout::{kept_depth}
 
-// The nearest fragment of each pixel: kept depth (high word) and colour (low word). A cleared word
-// means an empty pixel.
+// The nearest fragment of each pixel: kept_depth() in the high word and colour in the low word. A
+// cleared word means an empty pixel.
 @group(0) @binding(43) var<storage, read_write> winners: array<atomic<u64>>;
 
 // The word that a surfel's fragments store beside their depth: its colour.

@@ -1,5 +1,5 @@
-// Stage 2, its end: the farthest of the nearest depths in each tile of pixels. Stage 3 uses it to
-// skip splats that are hidden completely, without a look at their pixels. No image depends on it.
+// The end of stage 2: stores the farthest of the nearest depths in each tile of pixels. With these,
+// stage 3 skips completely hidden splats without reading their pixels. Skipping changes no image.
 // Host side: src/passes/visibility.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xc48f03445918a49c
 // #import *::{nearest_at}
@@ -43,8 +43,8 @@ fn covered_start() -> u32 {
     return band_pixels() + tiles.x * tiles.y;
 }
 
-// Whether a tile of covered.wgsl has a fragment. That tile is one tile here, or two, one above the
-// other.
+// Whether a tile of covered.wgsl has a fragment. Such a tile consists of one occlusion tile, or of
+// two, one above the other.
 fn has_any(tile: u32) -> bool {
     let tiles = occlusion_tiles();
     let y = tile / tiles.x * (TILE_ROWS / OCCLUSION_TILE);

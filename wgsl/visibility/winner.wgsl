@@ -1,5 +1,5 @@
-// Pictures in which only the nearest fragment shows: it has weight 1, and nothing is summed. Joined
-// in place of blend.wgsl, the weights of a kernel, an accumulator and the sums of colours.
+// Pictures in which only the nearest fragment shows: it has weight 1, and nothing is summed. This
+// file replaces blend.wgsl, the kernel's weights, the accumulator and the sums of colours.
 // Twin: src/passes/winner.rs.
 // #import attributes::{attribute_word}
 // #import epsilon_*::{radius_of}

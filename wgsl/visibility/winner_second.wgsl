@@ -1,6 +1,6 @@
-// Without 64-bit atomics: a second pass over the fragments stores the colour of those at the
-// nearest depth; among several, the greatest word. Both passes evaluate the same footprint, so the
-// nearest fragment has exactly the stored depth.
+// Without 64-bit atomics, a second pass over the fragments stores the colour of the fragment at the
+// nearest depth; among several such fragments, the colour whose word is greatest. Both passes
+// evaluate the same footprint, so the nearest fragment has exactly the stored depth.
 // #import blend|winner::{Attributes}
 // #import camera_*::{Fragment}
 

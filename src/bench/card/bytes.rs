@@ -4,23 +4,23 @@
 //! repeated accesses hit a cache. A pass moves more where caches miss, and may be faster than
 //! memory where its data fit in a cache.
 //!
-//! For n surfels in b batches, d of them drawn, p pixels, c of them covered, and per pixel S words
-//! of sums and W words of the image, in bytes:
+//! The table gives bytes for n surfels in b batches. d surfels are drawn, and c of the p pixels are
+//! covered. A pixel has S words of sums and W words in the image.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
 //! | project | 36 n | 64 n |
-//! | the same where batches are culled | 36 d + 16 b | 64 d |
+//! | project where batches are culled | 36 d + 16 b | 64 d |
 //! | visibility | 64 d + 4 p | |
 //! | accumulate | 64 d + 4 c | 4 S c |
 //! | resolve | 4 c + 4 S c | 4 W c |
 //! | accumulate where tiles gather and resolve | 4 c | 4 W c |
 //!
-//! A surfel has 36 bytes ([`Surfel`]), or 48 if centres have low-order parts, its splat 64
-//! ([`Splat`]), and the bounding sphere of a batch 16. Visibility reads all nearest depths, one
-//! word per pixel, to find hidden splats. Three things are left out: the atomic writes of depths,
-//! the clears before a pass, and the colours and half-axes that accumulate reads of visible splats,
-//! whose number is not known here.
+//! A surfel takes 36 bytes ([`Surfel`]), or 48 if centres have low-order parts. A splat takes 64
+//! bytes ([`Splat`]), and the bounding sphere of a batch 16. Visibility reads all nearest depths,
+//! one word per pixel, to find hidden splats. Three things are left out: the atomic writes of
+//! depths, the clears before a pass, and the colours and half-axes that accumulate reads for
+//! visible splats. The number of visible splats is not known here.
 
 use std::collections::BTreeMap;
 

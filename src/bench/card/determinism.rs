@@ -1,8 +1,8 @@
 //! Compares images that must be bit-identical.
 //!
-//! For each deterministic accumulator: two frames of one renderer, and a frame of another. For
-//! `fixed`: its image under each organisation, without each optimisation, and from reversed
-//! surfels.
+//! Each deterministic accumulator must give the same image in two frames of one renderer and in a
+//! frame of a second renderer. The accumulator `fixed` must also give it with each organisation,
+//! without each optimisation, and from surfels in reverse order.
 
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ const SHARE: f64 = 0.4;
 /// surfels for batches to be culled.
 const SIZES: [(u64, u32); 2] = [(200_000, 1024), (5_000, 160)];
 
-/// Mean splat radii in pixels: a small one, and one that tiles or workgroups draw.
+/// Mean splat radii, pixels: small splats, and splats so large that tiles or workgroups draw them.
 const FOOTPRINTS: [f64; 2] = [1.5, 12.0];
 
 /// A comparison of two images that must be bit-identical.
@@ -36,14 +36,14 @@ pub struct Comparison {
     pub what: String,
     /// Number of compared values: four of the colour and those of the maps, over all pixels.
     pub values: u64,
-    /// Number of values whose bits differ; all, if sizes or maps differ.
+    /// Number of values whose bits differ. Equals `values` if the images differ in size or maps.
     pub differing: u64,
     /// Whether no value differs.
     pub equal: bool,
 }
 
 impl Comparison {
-    /// Compares an image, made as `what` says, with the `expected` one.
+    /// Compares the image `found`, which was made as `what` says, with the image `expected`.
     pub fn of(
         (scene, accumulator): (&str, Accumulator),
         what: impl Into<String>,
@@ -65,7 +65,8 @@ impl Comparison {
     }
 }
 
-/// Iterates over all bits of a frame: as floats, -0 would equal 0 and NaN would differ from itself.
+/// Iterates over a frame's values as bits: as floats, -0 would equal 0 and NaN would differ from
+/// itself.
 fn bits(frame: &Frame) -> impl Iterator<Item = u32> + '_ {
     let maps = frame.maps().iter().collect::<Vec<_>>().into_iter().filter_map(|map| frame.map(map));
     frame.color.iter().flatten().chain(maps.flatten()).map(|value| value.to_bits())
@@ -152,7 +153,7 @@ fn options(accumulator: Accumulator) -> Settings {
     Settings { accumulator, maps: Maps::ON_DEVICE, ..Settings::default() }
 }
 
-/// A way to render that must give the image of `fixed`.
+/// A way to render that must give the same image as the default settings with `fixed`.
 struct Variant {
     what: String,
     options: Settings,
@@ -174,7 +175,7 @@ fn variants() -> Vec<Variant> {
         variants.push(variant(&format!("without {name}"), without(vec![optimisation])));
     }
     variants.push(variant("without any optimisation", without(all)));
-    // Without the optimisation `order`, which would sort both scenes into the same order.
+    // Leaves out the optimisation `order`, which would sort both scenes into the same order.
     let options = without(vec![Optimisation::Order]);
     variants.push(Variant { what: "surfels in reverse, without order".into(), options, reverse: true });
     variants

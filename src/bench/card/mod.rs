@@ -1,6 +1,6 @@
 //! Tests accuracy, determinism, speed and copy bandwidth of one adapter within a time limit.
 //!
-//! [`run`] performs the steps in an order in which each helps to interpret the next. It writes
+//! [`run`] performs the steps in an order in which each step helps to interpret the next. It writes
 //! [`FILES`] after each step, so that an interrupted run keeps its results. If a step fails, the
 //! error is added to the [`Record`] and the next step opens the adapter again.
 
@@ -40,7 +40,7 @@ pub struct Asked {
     pub quick: bool,
     /// Time limit in minutes. Work that does not fit is skipped and listed in [`Record::left_out`].
     pub minutes: f64,
-    /// The studies; the caller takes their quick forms in a quick run.
+    /// The studies. For a quick run, the caller passes their quick forms.
     pub studies: Vec<Definition>,
     /// The command line, as it is recorded.
     pub command: String,
@@ -48,7 +48,7 @@ pub struct Asked {
     pub date: String,
 }
 
-/// The callbacks that report how far a run is.
+/// The callbacks that report the progress of a run.
 #[derive(Clone, Copy)]
 pub struct Told<'a> {
     /// Receives the progress within a step, in units of work.
@@ -69,7 +69,7 @@ const STEPS: [Work; 5] = [
     ("studies", studies::run),
 ];
 
-/// Buffer size in bytes and number of timed runs of the copy bandwidth: full run, quick run.
+/// Buffer size in bytes and number of timings of the copy bandwidth, in a full and in a quick run.
 const COPIED: [(u64, u32); 2] = [(256 << 20, 9), (32 << 20, 5)];
 
 /// Runs all steps and writes their records into `folder`, which is created if it is missing.
@@ -77,7 +77,8 @@ const COPIED: [(u64, u32); 2] = [(256 << 20, 9), (32 << 20, 5)];
 /// # Errors
 ///
 /// [`Error::NoAdapter`] if the adapter does not exist or cannot be opened again, and
-/// [`Error::Write`]. All other errors are in the record ([`Record::failures`]).
+/// [`Error::Write`] if a file cannot be written. All other errors are in the record
+/// ([`Record::failures`]).
 pub fn run(asked: &Asked, folder: &Path, told: Told<'_>) -> Result<Record> {
     let start = Instant::now();
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;

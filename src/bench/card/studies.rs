@@ -25,7 +25,7 @@ pub struct StudyRecord {
     pub about: String,
     /// Duration, seconds.
     pub seconds: f64,
-    /// Number of measurements: configurations on points of scenes.
+    /// Number of measurements: one per configuration and point of a scene's sweep.
     pub measurements: usize,
     /// The configuration whose time is the unit of relative times, if there is one.
     pub baseline: Option<String>,
@@ -44,9 +44,9 @@ pub struct StudyRecord {
 pub struct ConfigRecord {
     /// The name.
     pub config: String,
-    /// Number of scenes and points of sweeps that it was measured on.
+    /// Number of points in the sweeps of all scenes that the configuration was measured on.
     pub scenes: usize,
-    /// Time over the baseline's on the same scene; `None` without a baseline.
+    /// Time divided by the baseline's time on the same scene; `None` without a baseline.
     pub time_over_baseline: Option<Summary>,
     /// The largest RMSE against the f64 reference.
     pub worst_rmse: Option<f64>,
@@ -67,7 +67,7 @@ fn digest(definition: &Definition, study: &Study) -> Vec<ConfigRecord> {
     definition.configs.iter().filter_map(|config| of(&config.name)).collect()
 }
 
-/// Checks that each study has a name that can be a folder of its own.
+/// Checks that the names of all studies differ and can be folder names.
 ///
 /// # Errors
 /// [`Error::Usage`] if a name is not a plain folder name, or if two studies share it.
@@ -135,7 +135,8 @@ fn study(card: &mut Card<'_>, definition: &Definition, deadline: Instant) -> Res
     failed.map_or(Ok(()), Err)
 }
 
-/// Estimates the time of the next point: the last one's, times the ratio of surfels if above 1.
+/// Estimates the time of the next point of a sweep from the last point's time. The estimate grows
+/// in proportion to the number of surfels, but never shrinks.
 fn expected(last: Option<(Option<u64>, Duration)>, next: Point) -> Duration {
     let Some((count, time)) = last else { return Duration::ZERO };
     let ratio = next.count.zip(count).map_or(1.0, |(next, last)| next as f64 / last.max(1) as f64);

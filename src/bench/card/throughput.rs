@@ -1,4 +1,5 @@
-//! Times frames of growing spheres: each pass, and its bytes against the copy bandwidth.
+//! Times each pass in frames of spheres with growing numbers of surfels, and compares the pass's
+//! bandwidth with that of copies.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -25,7 +26,7 @@ const FRAMES: [u32; 2] = [15, 3];
 /// The smallest number of timed frames, however long they take.
 const FEWEST_FRAMES: usize = 3;
 
-/// Time after which a size gets no more frames than [`FEWEST_FRAMES`].
+/// Time after which a sphere gets no further frame, if it has [`FEWEST_FRAMES`].
 const FRAMES_TIME: Duration = Duration::from_secs(10);
 
 /// Untimed frames: the first finds the buffer sizes, the second allocates the buffers.
@@ -74,7 +75,8 @@ pub struct PassRecord {
     pub least_bytes: Option<u64>,
     /// `least_bytes` per second of the median time, in GB/s (10^9 bytes).
     pub gb_per_second: Option<f64>,
-    /// `gb_per_second` over the median copy bandwidth, if measured. Above 1 caches are at work.
+    /// `gb_per_second` over the median copy bandwidth, if measured. A value above 1 shows that
+    /// caches helped.
     pub share_of_copy: Option<f64>,
 }
 
@@ -139,7 +141,7 @@ fn of_size(card: &Card<'_>, surfels: u64) -> Result<Throughput> {
     Ok(found)
 }
 
-/// Summarises the `reports` of the same `frame`; there is at least one.
+/// Summarises the `reports` of repeated renders of `frame`. There is at least one report.
 fn summarised(reports: &[Report], frame: &Frame, needs: &SceneNeeds, copy: Option<f64>) -> Throughput {
     let summary = |of: &dyn Fn(&Report) -> Option<f64>| {
         Summary::of(&reports.iter().filter_map(of).collect::<Vec<_>>()).unwrap_or_default()

@@ -14,8 +14,8 @@ use super::output::Format;
 /// Render point clouds and meshes to a PNG or EXR image.
 ///
 /// Without a camera the scene is framed from its bounds. Several inputs make one scene. With
-/// --cameras there is a picture for each camera of a file, in a folder; those that are written stay
-/// if a later one fails.
+/// --cameras there is a picture for each camera of a file, in a folder; pictures that are already
+/// written stay if a later one fails.
 #[derive(Args)]
 #[command(
     allow_negative_numbers = true,
@@ -62,8 +62,8 @@ pub struct Arguments {
 pub(super) struct ViewArguments {
     /// Many cameras: a transforms.json, a list of cameras, or a folder of COLMAP's text files
     ///
-    /// A transforms.json is one of NeRF, instant-ngp or nerfstudio. Each camera names its image,
-    /// folders included
+    /// A transforms.json has the format of NeRF, instant-ngp or nerfstudio. Each picture is named
+    /// after its camera's image, folders included
     #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "target", "up", "fov", "ortho", "intrinsics"])]
     pub(super) cameras: Option<PathBuf>,
     /// Format of the images of --cameras [default: png; exr with --aov]
@@ -78,7 +78,7 @@ pub(super) struct ViewArguments {
 }
 
 impl Arguments {
-    /// Lists all files that are read, `inputs` included and those of `--cameras` not.
+    /// Lists all files that are read: `inputs` and the files of all options except `--cameras`.
     pub(super) fn files<'a>(&'a self, inputs: &'a Files) -> impl Iterator<Item = Source<'a>> {
         let SceneOptions { surfels, triangles, .. } = &self.scene;
         let others = triangles.texture.iter().chain(&self.camera.file).chain(&surfels.textures);

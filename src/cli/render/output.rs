@@ -33,7 +33,7 @@ impl Format {
         }
     }
 
-    /// Returns the extension of its files.
+    /// Returns the file extension.
     pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",

@@ -1,5 +1,5 @@
-//! `epsplat render --cameras`: a picture for each camera. While one is rendered, earlier ones are
-//! encoded and written.
+//! `epsplat render --cameras`: renders a picture for each camera. While one picture is rendered,
+//! earlier pictures are encoded and written.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -21,7 +21,7 @@ use super::{Arguments, check_format};
 
 /// Limit of host memory for frames that wait for a writer or are being written, bytes.
 ///
-/// A single larger frame is still written.
+/// A frame that alone exceeds the limit is still written.
 const MOST_WAITING: u64 = 1 << 30;
 
 /// The JSON report of a view's picture.
@@ -30,7 +30,7 @@ struct Written {
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
-    /// Counts of what was read; None if the inputs were read whole.
+    /// Numbers of nodes, points and bytes that were read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<ReadReport>,
     /// Milliseconds of encoding and writing, while other pictures were rendered.
@@ -40,14 +40,14 @@ struct Written {
 #[derive(Serialize)]
 struct Reports {
     views: Vec<Written>,
-    /// Number of threads that encoded and wrote.
+    /// Number of threads that encoded and wrote pictures.
     writers: usize,
     /// Milliseconds of rendering, summed over all views.
     render_ms: f64,
     /// Milliseconds of encoding and writing, summed over all views.
     write_ms: f64,
     /// Milliseconds from the scene in host memory to the last written picture. For files that are
-    /// read in part they start when the overview is in memory.
+    /// read in part, the time starts when the overview is in memory.
     total_ms: f64,
 }
 
@@ -100,7 +100,8 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     tell(arguments, pictures, writers, start)
 }
 
-/// Prints notes and the summary or JSON of all pictures. `start` is when the scene was in memory.
+/// Prints notes and the summary or JSON of all pictures. `start` is the time at which the scene was
+/// in memory.
 fn tell(arguments: &Arguments, views: Vec<Written>, writers: NonZeroUsize, start: Instant) -> Result<()> {
     views.iter().for_each(|view| note_overflows(&view.report));
     note_cut(views.iter().map(|view| &view.report), arguments.options.levels.splats);
@@ -170,9 +171,10 @@ fn check_outputs(arguments: &Arguments, inputs: &Files, cameras: &Path, views: &
     folders.into_iter().try_for_each(atomic::try_folder)
 }
 
-/// Fails if the output folder is the cameras' own or cannot be created.
+/// Fails if the output folder is the folder of the cameras, or cannot be created.
 ///
-/// Pictures are named after the cameras' photographs and would overwrite them there.
+/// Pictures have the names of the cameras' photographs, so in that folder they would overwrite
+/// these.
 fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
     if output.metadata().is_ok_and(|output| !output.is_dir()) {
         return Err(Error::write(output, std::io::ErrorKind::NotADirectory.into()));
@@ -193,7 +195,7 @@ fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
     folder.metadata().map(drop).map_err(|error| Error::write(output, error))
 }
 
-/// Returns the number of threads that write frames of so many pixels: at least 1.
+/// Returns the number of threads that write frames of `pixels` pixels with `maps`: at least 1.
 fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let frame = pixels * pixel_bytes(maps);

@@ -25,7 +25,7 @@ pub(super) fn converted(value: Value, kind: ScalarKind) -> Result<Value, Fault> 
     };
     Ok(match kind {
         ScalarKind::Float | ScalarKind::AbstractFloat => Value::Float(number),
-        // Between integers the bits stay; from a float, `as` saturates as WGSL does.
+        // Conversions between integers keep the bits. From a float, `as` saturates as in WGSL.
         ScalarKind::Sint | ScalarKind::AbstractInt => match value {
             Value::Unsigned(bits) => Value::Signed(bits as i32),
             _ => Value::Signed(number as i32),
@@ -114,14 +114,15 @@ pub(super) fn binary(op: BinaryOperator, left: Value, right: Value) -> Result<Va
     })
 }
 
-/// An operation on integers of 32 bits, which lie in 64; its low bits are the result.
+/// Applies an operator to 32-bit integers in i64 variables. The low 32 bits of the returned value
+/// are the result.
 fn whole(op: BinaryOperator, a: i64, b: i64) -> Result<i64, Fault> {
     use BinaryOperator as Op;
     Ok(match op {
         Op::Add => a + b,
         Op::Subtract => a - b,
         Op::Multiply => a.wrapping_mul(b),
-        // As WGSL has it: a division by 0 leaves the dividend, and its remainder is 0.
+        // As in WGSL, a division by 0 gives the dividend, with the remainder 0.
         Op::Divide => a.checked_div(b).unwrap_or(a),
         Op::Modulo => a.checked_rem(b).unwrap_or(0),
         Op::And => a & b,
@@ -131,7 +132,7 @@ fn whole(op: BinaryOperator, a: i64, b: i64) -> Result<i64, Fault> {
     })
 }
 
-/// A function of one to three scalars.
+/// Evaluates a built-in function of one to three scalars.
 pub(super) fn math(
     fun: MathFunction,
     first: Value,
@@ -149,7 +150,8 @@ pub(super) fn math(
     }
 }
 
-/// A function of integers of 32 bits, which lie in 64; its low bits are the result.
+/// Evaluates a function of 32-bit integers, the first of which is given as i64. The low 32 bits of
+/// the returned value are the result.
 fn of_integers(fun: MathFunction, a: i64, second: Option<Value>, third: Option<Value>) -> Result<i64, Fault> {
     let number = |value: Option<Value>| match value {
         Some(Value::Signed(number)) => Ok(i64::from(number)),
@@ -166,7 +168,7 @@ fn of_integers(fun: MathFunction, a: i64, second: Option<Value>, third: Option<V
     })
 }
 
-/// A function of one number; None for a function of several.
+/// Evaluates a function of one number; None if the function takes several.
 fn of_one(fun: MathFunction, x: f64) -> Option<f64> {
     Some(match fun {
         MathFunction::Abs => x.abs(),
@@ -214,7 +216,7 @@ fn of_one(fun: MathFunction, x: f64) -> Option<f64> {
     })
 }
 
-/// A function of two or three numbers.
+/// Evaluates a function of two or three numbers.
 fn of_several(fun: MathFunction, x: f64, second: Option<Value>, third: Option<Value>) -> Result<f64, Fault> {
     let float = |value: Option<Value>| match value {
         Some(Value::Float(number)) => Ok(number),

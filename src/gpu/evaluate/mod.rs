@@ -1,8 +1,8 @@
 //! Evaluates a WGSL function of one number on the processor, in f64: the twin of a kernel that a
 //! user wrote.
 //!
-//! It interprets the function's naga IR: numbers, truth values, local variables, branches, loops
-//! and calls. A function that needs more (vectors, memory) cannot be evaluated.
+//! The evaluator interprets the function's naga IR: numbers, truth values, local variables,
+//! branches, loops and calls. A function that needs more (vectors, memory) cannot be evaluated.
 
 mod arithmetic;
 
@@ -19,20 +19,21 @@ use naga::valid::Capabilities;
 use super::interface::Interface;
 use arithmetic::{binary, converted, math, of_literal, recast, unary};
 
-/// The most rounds that all loops, and the calls of functions, may take together.
+/// Limit of loop rounds and function calls, counted together.
 const MOST_ROUNDS: u32 = 10_000;
 
-/// The most calls inside each other. WGSL has no recursion, so this bounds only the stack.
+/// Limit of nested calls. WGSL has no recursion, so this bounds only the stack.
 const DEEPEST: u32 = 64;
 
-/// Why a call gave no number.
+/// The reason why an evaluation gave no number.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
-    /// The function uses what is not evaluated here.
+    /// The function uses a feature, named here, that the evaluator does not support.
     Unsupported(String),
-    /// Its loops and calls take more than [`MOST_ROUNDS`] rounds.
+    /// Loop rounds and calls exceed [`MOST_ROUNDS`].
     Endless,
-    /// The text is not valid by itself: the line and column of the fault, and what it is.
+    /// The text is not valid WGSL by itself. Has the line and column of the fault, and its
+    /// description.
     Invalid(Option<(u32, u32)>, String),
 }
 
@@ -78,8 +79,8 @@ impl Evaluated {
     /// Parses `text` and finds its function `name`, which takes and returns one f32.
     ///
     /// # Errors
-    /// [`Fault::Invalid`] for a text that is not valid by itself, [`Fault::Unsupported`] for one
-    /// without such a function.
+    /// [`Fault::Invalid`] if the text is not valid by itself, [`Fault::Unsupported`] if it has no
+    /// such function.
     pub fn new(text: &str, name: &str, overrides: &[(&'static str, f64)]) -> Result<Self, Fault> {
         let Interface { module, .. } = Interface::of(text, Capabilities::empty()).map_err(|invalid| {
             let (at, sentence) = invalid.parts();
@@ -98,10 +99,10 @@ impl Evaluated {
         Ok(Self { module, function, overrides })
     }
 
-    /// The function's value at `argument`.
+    /// Returns the function's value at `argument`.
     ///
     /// # Errors
-    /// A [`Fault`] if it has none.
+    /// A [`Fault`] if the function gives no value.
     pub fn at(&self, argument: f64) -> Result<f64, Fault> {
         let mut rounds = 0;
         let function = &self.module.functions[self.function];
@@ -133,7 +134,7 @@ impl Evaluated {
         }
     }
 
-    /// The value of a constant expression of the module.
+    /// Evaluates a constant expression of the module.
     fn global(&self, handle: Handle<Expression>) -> Result<Value, Fault> {
         let all = &self.module.global_expressions;
         match all[handle] {
@@ -171,7 +172,7 @@ impl Evaluated {
     }
 }
 
-/// A call that is under way.
+/// A call in progress.
 struct Call<'a> {
     of: &'a Evaluated,
     function: &'a Function,
@@ -290,7 +291,7 @@ impl Call<'_> {
         }
     }
 
-    /// The value of an expression: as a statement left it, or evaluated now.
+    /// Returns the value that a statement stored for an expression, or evaluates the expression.
     fn value(&mut self, handle: Handle<Expression>) -> Result<Value, Fault> {
         match self.values.get(&handle) {
             Some(value) => Ok(*value),

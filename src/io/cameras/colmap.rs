@@ -41,8 +41,8 @@ pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
 }
 
-/// The cameras by identifier. A camera that cannot be used is kept with its line and the reason: it
-/// matters only to the images that refer to it.
+/// The cameras by identifier. For a camera that cannot be used, the map has its line and the
+/// reason: only images that refer to this camera are errors.
 type Lenses = HashMap<u64, Result<Camera, String>>;
 
 fn opened(path: &Path) -> io::Result<File> {
@@ -109,7 +109,8 @@ fn images(lines: &mut Lines<impl BufRead>, lenses: &Lenses) -> Result<Vec<NamedC
     let mut images = Vec::new();
     while lines.next_record()? {
         images.push(image(&lines.line, lenses).map_err(|what| lines.fault(&what))?);
-        // In a file without the lines of points, every second image would be lost silently.
+        // Without this check, every second image would be lost silently in a file without the lines
+        // of points.
         if lines.next()? && !lines.are_points() {
             return Err(lines.fault(
                 "not points X Y POINT3D_ID of the image in the line before; an image without points is followed by an empty \

@@ -1,4 +1,5 @@
-//! Sets of cameras that reconstruction and radiance-field programs write: a picture for each.
+//! Sets of cameras, as reconstruction and radiance-field programs write them. Each camera gives one
+//! picture.
 
 mod colmap;
 mod transforms;
@@ -68,8 +69,9 @@ fn check_names(cameras: &[NamedCamera]) -> Result<(), Fault> {
 /// Extensions of image files; anything else after a dot belongs to the name.
 const IMAGES: [&str; 12] = ["png", "jpg", "jpeg", "exr", "hdr", "tif", "tiff", "webp", "bmp", "ppm", "pgm", "dng"];
 
-/// The name of the picture that a file calls `path`. Parts that would leave a folder are dropped:
-/// roots, drives and `..`. None if nothing remains, or the name has control characters.
+/// Converts the `path` of a picture in a camera file to its name. Parts that would leave a folder
+/// are dropped: roots, drives and `..`. None if nothing remains, or the name has control
+/// characters.
 fn name_of(path: &str) -> Option<String> {
     if path.chars().any(char::is_control) {
         return None;

@@ -7,10 +7,10 @@ use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
 use rayon::prelude::*;
 
-/// Converts a run's colour numbers to colours by the rules for their kind.
+/// Converts the colour numbers of a run of points to colours, by the rules for their kind.
 ///
-/// Points without a colour get the default one. Floats become 8-bit codes only if the rule and the
-/// alphas are 8-bit, else linear light.
+/// Points without a colour get the default colour. Floats become 8-bit codes if both the rule and
+/// the alphas are 8-bit, else linear light.
 pub(super) fn colors(numbers: Numbers, rule: Rule, alpha: Option<AlphaRule>) -> Colors {
     let kind = numbers.kind;
     match (numbers.values, rule) {
@@ -72,7 +72,7 @@ fn opaque([r, g, b]: [f32; 3]) -> [f32; 4] {
     [r, g, b, 1.0]
 }
 
-/// Maps (channel, number) to linear light.
+/// Returns the function that maps (channel, number) to linear light.
 fn light(rule: Rule, kind: Kind) -> impl Fn(usize, f64) -> f32 {
     let (bytes, words) = (&*SRGB8_TO_LINEAR, &*SRGB16_TO_LINEAR);
     // Floats without limits in the header may be brighter than white, so they are not clamped.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 /// Points per parallel chunk.
 const TOGETHER: usize = 1 << 14;
 
-/// Numbers beyond this magnitude are ignored, as placeholders for infinity.
+/// Numbers above this magnitude are ignored: they are placeholders for infinity.
 const LARGEST: f64 = 1e12;
 
 /// Statistics of the numbers of all channels. Zeros, NaN and magnitudes above [`LARGEST`] only
@@ -96,8 +96,8 @@ impl Evidence {
 }
 
 impl Numbers {
-    /// Folds the colours of all points that have one with `add`, in parallel, and joins partial
-    /// results with `both`. The default value must be neutral for `both`.
+    /// Applies `add` to the colours of all points that have a colour, in parallel, and joins
+    /// partial results with `both`. The default value must be neutral for `both`.
     pub(super) fn fold<T: Default + Send>(
         &self,
         add: impl Fn(T, [f64; 3]) -> T + Sync,

@@ -8,20 +8,20 @@
 //! outliers are allowed: "most" means at least 99 of 100 numbers that are not zero.
 //!
 //! - Bytes, also signed ones, are 8-bit sRGB codes.
-//! - Integers, most of them at most 255, are 8-bit sRGB codes; the few above become 255.
-//! - 16-bit integers, most of them `257 v` or most of them `256 v`, are the 8-bit sRGB codes `v`.
+//! - Integers are 8-bit sRGB codes if most of them are at most 255; the few larger ones become 255.
+//! - 16-bit integers are the 8-bit sRGB codes `v` if most of them are `257 v`, or most are `256 v`.
 //! - Other integers are 16-bit sRGB codes if most are at most 65535, else sRGB codes of their type.
-//! - Numbers with limits in the header are sRGB codes between these. The limits are ignored if more
-//!   than 1 of 100 numbers lies outside, if they reach from 0 to 4095 or more and most numbers are
-//!   at most 255, or if they reach from 0 to 255 or more and the numbers are fractions, none above
-//!   one. Then the rule for the type holds.
-//! - Floats, more of them above 1 than between 0 and 1 and at least one 2 or more, are sRGB codes
-//!   of 0 to 255 if most are at most 255, else of 0 to 65535.
+//! - Numbers with limits in the header are sRGB codes between these. Limits are ignored, and the
+//!   rule for the type holds, in three cases: more than 1 of 100 numbers lies outside; the limits
+//!   reach from 0 to 4095 or more, but most numbers are at most 255; the limits reach from 0 to 255
+//!   or more, but the numbers are fractions, none above one.
+//! - Floats are sRGB codes if more of them are above 1 than between 0 and 1, and at least one is 2
+//!   or more. The codes range from 0 to 255 if most are at most 255, else from 0 to 65535.
 //! - Other floats are fractions of white: linear light in a PLY file, else sRGB.
 //!
-//! Alphas are interpreted separately, in the same way. Where the colours of a file are missing or
-//! all zero, its intensities become grey: white is the 99.9th percentile over all inputs, and black
-//! is zero, or the 0.1th percentile if some intensities are negative.
+//! Alphas are interpreted separately, in the same way. If the colours of a file are missing or all
+//! zero, its intensities become grey: white is the 99.9th percentile over all inputs, and black is
+//! zero, or the 0.1th percentile if some intensities are negative.
 
 mod apply;
 mod evidence;
@@ -51,8 +51,8 @@ impl Number {
     pub(super) const WORD: Self = Self::Integer(u16::MAX as u64);
 }
 
-/// Facts about colour numbers that are known before the values. Runs of one kind are interpreted
-/// together.
+/// Facts about colour numbers that are known before the numbers are read. Runs of one kind are
+/// interpreted together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
     pub(super) number: Number,
@@ -138,7 +138,7 @@ pub struct RawColors {
     /// The class of each point; empty unless classes have different opacities.
     pub(super) classes: Vec<u8>,
     pub(super) opacities: ClassOpacities,
-    /// For each point, whether it is kept, if some are dropped. Dropped points still count in the
+    /// For each point, whether it is kept; None if all are. Dropped points still count in the
     /// decision about the range.
     pub(super) keep: Option<Vec<bool>>,
 }
@@ -169,8 +169,8 @@ impl RawColors {
 pub struct ColorRules {
     colors: Vec<(Kind, Rule)>,
     alphas: Vec<(Number, AlphaRule)>,
-    /// Black and white of integer intensities, and of floats. The outer option is None until it is
-    /// decided, the inner one if all intensities are equal.
+    /// The intensities that become black and white: of integers, and of floats. The outer option is
+    /// None until they are decided; the inner one is None if all intensities are equal.
     shades: [Option<Option<Shading>>; 2],
 }
 

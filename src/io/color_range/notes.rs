@@ -7,7 +7,7 @@ use super::shade::Shading;
 use crate::io::about::{Attribute, Role};
 use crate::scene::color::srgb_to_linear;
 
-/// A picture is nearly black if fewer than 1 of [`FEW`] numbers reaches this code of 255.
+/// Colours are nearly black if fewer than one number in [`FEW`] reaches this 8-bit code.
 const DARK: f64 = 16.0;
 const FEW: u64 = 100;
 
@@ -26,7 +26,7 @@ pub(super) struct Told {
     descriptions: Vec<String>,
     /// Black and white of the intensities, if they are drawn.
     shading: Option<Shading>,
-    /// The largest alpha, if the alphas are so small that they are hardly opacities.
+    /// The largest alpha, if all alphas are so small that they can hardly be opacities.
     doubtful_alpha: Option<f64>,
 }
 
@@ -71,7 +71,7 @@ impl Told {
         self.doubtful_alpha = self.doubtful_alpha.or(doubtful);
     }
 
-    /// Records the black and white of the intensities.
+    /// Records the intensities that become black and white.
     pub fn shades(&mut self, shading: Shading) {
         self.shading = Some(shading);
     }

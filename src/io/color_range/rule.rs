@@ -78,7 +78,7 @@ impl Rule {
         }
     }
 
-    /// The number that is white, of each channel.
+    /// The number that means white, for each channel.
     pub fn white(&self) -> [f64; 3] {
         match self {
             Self::Bytes => [255.0; 3],
@@ -107,8 +107,8 @@ impl Rule {
     }
 }
 
-/// Whether the numbers are 8-bit codes widened to 16 bits: nearly all times 257, or nearly all
-/// times 256.
+/// Whether the numbers are 8-bit codes widened to 16 bits: nearly all are multiples of 257, or
+/// nearly all are multiples of 256.
 fn is_widened(evidence: &Evidence) -> bool {
     let all = evidence.nonzero;
     evidence.widened.iter().any(|widened| few(all - widened.min(&all), all))
@@ -152,10 +152,11 @@ impl AlphaRule {
         Self { full, bytes: full == 255.0 && fractions == 0, largest }
     }
 
-    /// Whole alphas up to this of 255 are doubtful: they look like class numbers.
+    /// Alphas are doubtful if they are whole numbers of at most this, of 255: they look like class
+    /// numbers.
     const FAINT: f64 = 31.0;
 
-    /// Whether the alphas are so small that they are hardly opacities.
+    /// Whether all alphas are so small that they can hardly be opacities.
     pub fn is_doubtful(&self) -> bool {
         self.bytes && self.largest <= Self::FAINT
     }

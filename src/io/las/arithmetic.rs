@@ -6,18 +6,19 @@ use std::io::{self, Read};
 
 /// Shortest interval; when it is shorter, the decoder reads another byte.
 const MIN_LENGTH: u32 = 1 << 24;
-/// Fractional bits of a symbol's share of the interval.
+/// Fractional bits of a symbol's probability.
 const SYMBOL_BITS: u32 = 15;
-/// Fractional bits of the share of a zero bit.
+/// Fractional bits of the probability of a zero bit.
 const BIT_BITS: u32 = 13;
-/// Widest corrector (coded difference) that is one symbol, bits; of wider ones, the top eight are.
+/// Widest corrector (coded difference) that is coded as one symbol, bits. In a wider corrector,
+/// only the top eight bits are a symbol.
 const SYMBOL_WIDTH: u32 = 8;
 
 /// Adaptive probabilities of symbols.
 #[derive(Debug)]
 struct SymbolModel {
     counts: Vec<u32>,
-    /// The sum of the shares of all symbols before each one, in units of 2^-15.
+    /// For each symbol, the sum of the probabilities of all symbols before it, in units of 2^-15.
     starts: Vec<u32>,
     total: u32,
     cycle: u32,
@@ -58,7 +59,7 @@ impl SymbolModel {
 struct BitModel {
     zeros: u32,
     total: u32,
-    /// The share of zero, in units of 2^-13.
+    /// The probability of a zero bit, in units of 2^-13.
     zero_share: u32,
     cycle: u32,
     until_update: u32,
@@ -84,7 +85,7 @@ impl BitModel {
     }
 }
 
-/// The interval that the bytes read so far leave.
+/// The state of the decoder: the interval that the bytes read so far have narrowed down.
 #[derive(Debug)]
 struct Decoder<R> {
     bytes: R,
@@ -104,7 +105,8 @@ impl<R: Read> Decoder<R> {
             let mut byte = [0];
             self.bytes.read_exact(&mut byte)?;
             self.value = (self.value << 8) | u32::from(byte[0]);
-            // A valid stream never reaches zero; with a corrupt one this must not loop forever.
+            // In a valid stream the length never reaches 0; in a corrupt one, `max(1)` ends the
+            // loop.
             self.length = (self.length << 8).max(1);
         }
         Ok(())

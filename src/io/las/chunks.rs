@@ -1,5 +1,5 @@
 //! Checks the lengths in a LAS or LAZ file against the size of the file, before the decoder
-//! allocates memory by them.
+//! allocates memory of these lengths.
 //!
 //! The decoder trusts all lengths in a file: of records, chunks and layers. One flipped bit could
 //! make it allocate gigabytes, and no error handling survives that, so each length is checked here
@@ -12,12 +12,12 @@ use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
-/// Largest decoded chunk, bytes, that is decoded in parallel with others. A file with a larger one
-/// is decoded by one thread, which needs no buffer for it.
+/// Largest chunk that is decoded in parallel with others, bytes after decoding. A file with a
+/// larger chunk is decoded by one thread, which needs no buffer for the chunk.
 pub(super) const CHUNK_LIMIT: u64 = 1 << 28;
 
-/// No byte holds more points than this: the cheapest point is one symbol of 64 with the probability
-/// 1 - 63 / 2^15, which is 0.0028 bits.
+/// Upper bound of the points in a compressed byte. The cheapest point is one symbol, of 64 possible
+/// ones, with the probability 1 - 63 / 2^15: it takes 0.0028 bits.
 pub(super) const MOST_A_BYTE: u64 = 1 << 12;
 
 /// Index of the layer of intensities among those of a point.
@@ -89,7 +89,8 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
                 "the header promises {promised} points, more than a file of {length} bytes can hold"
             ));
         }
-        // A single run of points has no chunk size, but the decoder takes 0 for a table of chunks.
+        // Without chunks, the chunk size may be 0. The decoder would take that for chunks of
+        // variable size and read their table, so it is shown 1.
         file.get_mut().show(at + CHUNK_SIZE as u64, &u32::to_le_bytes(1));
         return Ok(Decoding::Sequential);
     }
@@ -112,7 +113,8 @@ pub(super) fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> R
         let Ok(record) = Vlr::read_from(&mut *file, false) else {
             return malformed("it ends inside its variable-length records");
         };
-        // The decoder's own condition: with another one, it could use a record that is not checked.
+        // The condition must be the decoder's own: otherwise the decoder could use another record,
+        // which was not checked.
         let name = record.user_id.split(|byte| *byte == 0).next();
         if record.record_id == 22204 && name == Some(b"laszip encoded") {
             return Ok(Some((file.stream_position()? - record.data.len() as u64, record.data)));
@@ -124,7 +126,7 @@ pub(super) fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> R
 /// The compression of the points.
 #[derive(Debug)]
 pub(super) struct Scheme {
-    /// 1: one run of points without chunks; 2: chunks; 3: chunks of layers.
+    /// 1: points without chunks; 2: chunks; 3: chunks of layers.
     pub(super) compressor: u16,
     /// Points per chunk; `None` if the chunk table gives them.
     pub(super) chunk: Option<u32>,
@@ -149,7 +151,8 @@ impl Scheme {
         let (mut record, mut layers, mut kinds) = (0, Vec::new(), Vec::new());
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
-            // With another size than the kind's own, the decoder would find unchecked layers.
+            // If an item differed in size from its kind, the decoder would find layers that were
+            // not checked.
             let (own_size, own_layers) = match kind {
                 0 => (size, 0),              // extra bytes
                 6 => (20, 0),                // point of formats 0 to 5
@@ -163,7 +166,8 @@ impl Scheme {
                 14 => (size, size as usize), // extra bytes: one layer each
                 _ => return None,
             };
-            // Only chunks of layers may have layers: elsewhere, their lengths are not checked.
+            // Items with layers are valid only in chunks of layers: elsewhere the lengths of layers
+            // are not checked.
             if size != own_size || (kind >= 10) != (compressor == 3) {
                 return None;
             }
@@ -179,7 +183,8 @@ impl Scheme {
         // The usual order in LAS files: a point, then its colour; what follows does not matter.
         let usual = kinds.first() == Some(&10) && (!has_color || matches!(kinds.get(1), Some(11 | 12)));
         let needed = |(kind, layer): (u16, usize)| match kind {
-            // Position, class and flags of a point, and its intensity if there are no colours.
+            // A point's position, class and flags are needed, and its intensity if there are no
+            // colours.
             10 => layer < INTENSITIES || !has_color && layer == INTENSITIES,
             11 | 12 => layer == 0,
             _ => false,
@@ -191,7 +196,8 @@ impl Scheme {
         Some(Self { compressor, chunk, record, has_color, needed, extra, intensities })
     }
 
-    /// Sets whether intensities are needed beside colours, which may turn out to be all zero.
+    /// Sets whether intensities are needed although there are colours: these may turn out to be all
+    /// zero.
     pub(super) fn need_intensities(&mut self, taken: bool) {
         if let Some(needed) = self.intensities.and_then(|layer| self.needed.get_mut(layer)) {
             *needed = taken;
@@ -211,8 +217,8 @@ impl Scheme {
         self.record + 4 + 4 * self.needed.len() as u64
     }
 
-    /// The number of points in the head `start` of a chunk of `bytes` bytes; None if its layers do
-    /// not fit in the chunk.
+    /// The number of points that the head `start` of a chunk states; None if the layers do not fit
+    /// in the `bytes` bytes of the chunk.
     pub(super) fn points_in(&self, start: &[u8], bytes: u64) -> Option<u64> {
         let words = start.get(self.record as usize..self.start() as usize)?.as_chunks().0;
         let mut words = words.iter().map(|word| u64::from(u32::from_le_bytes(*word)));
@@ -221,7 +227,7 @@ impl Scheme {
     }
 }
 
-/// A run of points that is compressed by itself.
+/// Points that are compressed independently of all others.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Chunk {
     pub(super) points: u64,
@@ -282,8 +288,8 @@ pub(super) fn chunk_table(
     Ok(chunks)
 }
 
-/// Checks that the layers of each chunk lie within it. The heads also give the number of points of
-/// the last chunk, which may be shorter.
+/// Checks that the layers of each chunk lie within it. Also limits each chunk's number of points to
+/// that in its head, because the last chunk may be shorter.
 fn check_layers(
     file: &mut (impl Read + Seek),
     mut at: u64,
@@ -338,7 +344,7 @@ mod tests {
         assert_eq!(needed(&[(10, 30), (11, 6), (14, 2)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (12, 8), (13, 29)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (14, 6)]), [0, 1, 2, 3, 4]);
-        // In another order the decoder would select other layers than those that are asked for.
+        // In another order the decoder would select the wrong layers.
         assert_eq!(needed(&[(10, 30), (14, 1), (11, 6)]).len(), 11);
         assert_eq!(needed(&[(14, 1), (10, 30)]).len(), 10);
     }

@@ -1,4 +1,4 @@
-//! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture needs few.
+//! COPC 1.0: LAZ files whose chunks are the nodes of an octree. A picture needs only a few nodes.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
 use super::extra::Normals;
@@ -17,7 +17,8 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
-/// Where a COPC file identifies itself: the header and the data of its first record.
+/// Offsets of the header and of the data of the first record, bytes: there a COPC file identifies
+/// itself.
 const RECORD: u64 = 375;
 const INFO: u64 = RECORD + 54;
 const INFO_SIZE: usize = 160;
@@ -45,9 +46,9 @@ pub struct Copc {
     pub(super) transforms: Vector<Transform>,
     /// The number of points of all nodes.
     pub(super) count: u64,
-    /// The attribute that shows, once points have been read.
+    /// The attribute that is drawn as colour, once points have been read.
     pub(super) looks: Option<Looks>,
-    /// The meaning of the numbers of colours, once [`read`](Self::read) has read some.
+    /// The rules for colour numbers; the first nodes that [`read`](Self::read) reads decide them.
     pub(super) rules: ColorRules,
     /// The normals among the extra bytes of points.
     pub(super) normals: Option<Normals>,
@@ -65,7 +66,7 @@ pub(super) struct Chunk {
     pub first: u64,
 }
 
-/// An entry of a page that is a node.
+/// An entry of an octree page, for a node.
 struct Entry {
     offset: u64,
     bytes: u64,
@@ -95,7 +96,7 @@ impl Copc {
         self.chunks.iter().map(|chunk| chunk.bytes).sum()
     }
 
-    /// Bytes that [`read`](Self::read) reads for these nodes; a node counts 0 until it was read.
+    /// Bytes that [`read`](Self::read) reads for these nodes; a node that was never read counts 0.
     pub fn bytes_read(&self, nodes: &[usize]) -> u64 {
         nodes.iter().filter_map(|&node| self.layers[node].as_ref()).map(Layers::bytes).sum()
     }
@@ -138,11 +139,12 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         return malformed("its LASzip record does not describe its points");
     }
     if !format.is_extended || scheme.has_color != format.has_color {
-        // Bytes that are read as colours come from other items then, so all layers are needed.
+        // In this case, bytes that are read as colours come from other items, so all layers are
+        // needed.
         scheme.needed.fill(true);
         scheme.intensities = None;
     }
-    // Needed until a colour that is not zero has been read.
+    // Intensities are needed until a colour that is not zero has been read.
     scheme.need_intensities(true);
     let mut info = [0; INFO_SIZE];
     file.seek(SeekFrom::Start(INFO))?;
@@ -186,7 +188,8 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     })
 }
 
-/// Reads the entries of all pages, from the root page on, by level and position.
+/// Reads the entries of all pages of the octree, starting at the root page. Keys are level and
+/// position.
 fn entries(
     file: &mut (impl Read + Seek),
     root: [u64; 2],
@@ -194,7 +197,8 @@ fn entries(
 ) -> Result<BTreeMap<(u32, [u32; 3]), Entry>, Fault> {
     let mut entries = BTreeMap::new();
     let mut pages = vec![root];
-    // Pages that refer to each other in a circle have more entries than the file can hold.
+    // This limit ends the loop if pages refer to each other in a circle: the file cannot hold as
+    // many entries.
     let mut left = length / ENTRY;
     while let Some([offset, bytes]) = pages.pop() {
         let within = offset.checked_add(bytes).is_some_and(|end| end <= length);
@@ -234,8 +238,8 @@ fn entries(
     Ok(entries)
 }
 
-/// The nodes and their chunks, sorted by level and position. Checks that each node has a parent,
-/// and that chunks lie in the file and do not overlap.
+/// Returns the nodes and their chunks, sorted by level and position. Checks that each node has a
+/// parent, and that chunks lie in the file and do not overlap.
 fn checked(
     entries: BTreeMap<(u32, [u32; 3]), Entry>,
     (scheme, length): (&Scheme, u64),

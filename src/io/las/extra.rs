@@ -3,7 +3,7 @@
 use crate::io::attributes::{NORMAL, find_triple};
 use las::raw::Vlr;
 
-/// User and number of the record.
+/// User and id of the record.
 const USER: &[u8] = b"LASF_Spec";
 const EXTRA: u16 = 4;
 
@@ -34,7 +34,7 @@ const HAS_OFFSET: u8 = 1 << 4;
 const SCALE: usize = 112;
 const OFFSET: usize = 136;
 
-/// The attributes in their order; None if this is another record.
+/// Parses the attributes that the record describes, in order; None for any other record.
 pub(super) fn fields(record: &Vlr) -> Option<Vec<Field>> {
     let user = record.user_id.split(|byte| *byte == 0).next();
     if record.record_id != EXTRA || user != Some(USER) {
@@ -81,7 +81,8 @@ impl Field {
     }
 }
 
-/// The three attributes that are normals, after the `own` bytes of the point format.
+/// The three attributes that are the components of normals. They follow the `own` bytes of the
+/// point format.
 #[derive(Clone, Debug)]
 pub(super) struct Normals {
     own: usize,
@@ -89,7 +90,8 @@ pub(super) struct Normals {
 }
 
 impl Normals {
-    /// Finds normals among `fields`, for a format of `own` bytes; None unless three are numbers.
+    /// Finds normals among `fields`, for a format of `own` bytes; None unless all three components
+    /// exist and are numbers.
     pub fn of(fields: &[Field], own: u16) -> Option<Self> {
         let found = find_triple(NORMAL, fields.iter().map(|field| field.name.as_str()))?;
         let fields = found.map(|index| fields[index].clone());
@@ -103,7 +105,8 @@ impl Normals {
     }
 }
 
-/// Size of an attribute, bytes: one to three numbers, or for the type 0 as many as the options say.
+/// Size of an attribute, bytes: one to three numbers, or for type 0 as many bytes as the options
+/// say.
 fn size(kind: u8, options: u8) -> u16 {
     const SIZES: [u16; 10] = [1, 1, 2, 2, 4, 4, 8, 8, 4, 8];
     match kind {

@@ -24,7 +24,8 @@ const WARNING: &str = "warning: ";
 /// System identifiers that do not name a scanner.
 const NO_SYSTEMS: [&str; 5] = ["MERGE", "MODIFICATION", "EXTRACTION", "TRANSFORMATION", "OTHER"];
 
-/// Steps of the coordinates by which points may exceed the header's bounding box.
+/// Points may exceed the header's bounding box by this many steps (scale factors) of the
+/// coordinates.
 const STEPS: f64 = 2.0;
 
 /// Facts of a file that are known before its points are read.
@@ -133,7 +134,7 @@ fn records(file: &mut (impl Read + Seek), header: &Header) -> Result<Records, Fa
     Ok(Records { systems: found, extra, end })
 }
 
-/// A sentence if the two point counts disagree.
+/// A sentence if the point count of LAS 1.4 and the legacy count disagree.
 fn counts(header: &Header, legacy: u32) -> Option<String> {
     let large = header.large_file?.number_of_point_records;
     let legacy = u64::from(legacy);
@@ -145,7 +146,8 @@ fn counts(header: &Header, legacy: u32) -> Option<String> {
     Some(format!("its header says {large} points, and {legacy} in the field of older versions: {taken} are read"))
 }
 
-/// A sentence if the file has space for more points, or returns have more points than there are.
+/// A sentence if the file has space for more points than its header says, or if the point counts by
+/// return add up to more.
 fn room(header: &Header, length: u64) -> Option<String> {
     let count = promised(header);
     let by_return: u64 = match header.large_file {
@@ -163,7 +165,7 @@ fn room(header: &Header, length: u64) -> Option<String> {
     (is_plain && held > count).then(|| format!("its header says {count} points, and the file has bytes for {held}"))
 }
 
-/// A sentence if the version does not have the point format.
+/// A sentence if the file's version does not define its point format.
 fn formats(header: &Header) -> Option<String> {
     let format = header.point_data_record_format & 0x3f;
     let since = match format {
@@ -204,7 +206,7 @@ fn places(header: &Header, end: u64) -> Vec<String> {
     notes
 }
 
-/// A sentence if scales put points into wrong positions.
+/// A warning if a scale is 0, negative or not finite.
 fn scale(scales: [f64; 3]) -> Option<String> {
     let along = |is: fn(f64) -> bool| {
         let axes = scales.iter().zip(["x", "y", "z"]).filter(|(scale, _)| is(**scale)).map(|(_, axis)| axis);

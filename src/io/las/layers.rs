@@ -1,4 +1,5 @@
-//! Chunks of layers, each of which holds one quantity of all points; only needed layers are read.
+//! Chunks that consist of layers. Each layer holds one quantity of all points; only needed layers
+//! are read.
 
 use super::chunks::Scheme;
 use crate::io::fault::{Fault, reserve};
@@ -11,14 +12,14 @@ use std::ops::Range;
 pub(super) struct Layers {
     /// The head of the chunk: its first point, its number of points, and the length of each layer.
     /// Layers that are not needed have the length 0, which means that all points have the first
-    /// one's value.
+    /// point's value.
     start: Vec<u8>,
     /// The needed layers, as ranges of bytes from the start of the chunk.
     runs: Vec<Range<u64>>,
 }
 
 impl Layers {
-    /// Selects the needed layers of a chunk with this head, [`Scheme::start`] bytes.
+    /// Selects the needed layers of a chunk. `start` is its head, [`Scheme::start`] bytes.
     pub(super) fn of(mut start: Vec<u8>, scheme: &Scheme) -> Self {
         let lengths = start[scheme.record as usize + 4..].as_chunks_mut().0;
         let mut runs: Vec<Range<u64>> = Vec::new();

@@ -85,7 +85,8 @@ fn whole(
     });
     let (file, decoding, promised, found) = opened?;
     if promised == 0 {
-        // The decoder would still trust the length of a chunk table, which is not checked here.
+        // The decoder is not called: it would trust the length of the chunk table, which was not
+        // checked.
         return Ok(described(Points { up: Some(Up::Z), ..Points::default() }, found, &name, options));
     }
     progress.begin(&format!("reading {name}"), promised);
@@ -170,7 +171,8 @@ fn decode(
     Ok(kept.points(0..read, read_options))
 }
 
-/// Adds what the file, called `name`, says of itself, and notes about odd fields and coordinates.
+/// Adds the file's description of itself, and notes about odd fields and coordinates. `name` is the
+/// file's name.
 fn described(mut points: Points, found: Found, name: &str, options: &ReadOptions) -> Points {
     points.notes.extend(found.notes.iter().cloned());
     points.notes.extend(found.outside(name, &points.positions));
@@ -197,7 +199,7 @@ fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transfor
     Ok((format, transforms))
 }
 
-/// The attribute that shows as the colour of points.
+/// The attribute that is drawn as the colour of points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Looks {
     Colors,
@@ -208,13 +210,13 @@ enum Looks {
 #[derive(Default)]
 struct Kept<'a> {
     positions: Vec<[f64; 3]>,
-    /// The normals among the extra bytes, and their values.
+    /// Where the normals are among the extra bytes, and their values.
     has_normals: Option<&'a Normals>,
     normals: Vec<[f32; 3]>,
     codes: Vec<[u16; 3]>,
     /// Collected until a colour that is not zero occurs.
     intensities: Vec<u16>,
-    /// The attribute that shows, once it is known.
+    /// The attribute that is drawn as colour, once it is known.
     looks: Option<Looks>,
     /// `looks` was known before these points were read.
     decided: bool,
@@ -253,9 +255,9 @@ impl<'a> Kept<'a> {
         points
     }
 
-    /// The collected points, which were read in `runs` of indices, of a file of `all` points.
-    /// Points keep their indices if the file has fewer than 2^32; otherwise they are numbered as
-    /// they are kept.
+    /// The collected points, with their indices in the file. `runs` are the ranges of indices that
+    /// were read, and `all` is the number of points in the file. From 2^32 points on, indices do
+    /// not fit in u32, and points are numbered in the order in which they are kept.
     fn numbered(self, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Points {
         let numbers = || runs.iter().cloned().flatten();
         let mut points = self.points(numbers(), options);
@@ -267,7 +269,8 @@ impl<'a> Kept<'a> {
         points
     }
 
-    /// Adds the points of a block, of which `first` is the first index, except deleted ones.
+    /// Adds the points of a block, except deleted ones. `first` is the index of the block's first
+    /// point.
     fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
         let mut keeps = Vec::with_capacity(block.len());
         for ((withheld, class), number) in withheld(block).zip(classes(block)).zip(first..) {
@@ -302,8 +305,9 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// Leaves out the points whose class has the opacity 0, once all of them have been used to find the
-/// range of colours. `numbers` are the indices of all points that were read.
+/// Marks the points whose class has the opacity 0 as left out. They are removed only later, because
+/// they count in the decision about the range of colours. `numbers` are the indices of all points
+/// that were read.
 fn leave_out_unseen(points: &mut Points, numbers: impl Iterator<Item = u64>) {
     let Some(raw) = &mut points.raw else { return };
     let keep: Vec<bool> = raw.classes.iter().map(|class| raw.opacities.of(*class) > 0.0).collect();
@@ -360,7 +364,7 @@ mod tests {
         let mut bytes = compressed();
         let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
         let table = u64::from_le_bytes(*bytes[start..].first_chunk().unwrap()) as usize;
-        // A chunk count that would take 64 GiB, and the bytes with which its decoder starts.
+        // A chunk count that would take 64 GiB, and the first bytes of a table for its decoder.
         bytes.truncate(table + 4);
         bytes.extend([0xff; 4]);
         bytes.extend([0x7f; 64]);
@@ -369,8 +373,8 @@ mod tests {
         assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
     }
 
-    /// A decoder's panics are not printed, whatever thread of its pool they occur on; others are.
-    /// The output is checked from outside, by a process of its own.
+    /// A decoder's panics are not printed, on whatever thread of its pool they occur; other panics
+    /// are. The test starts itself in another process and checks the output of that process.
     #[test]
     fn a_decoders_panic_is_not_printed() {
         const WHOSE: &str = "EPSPLAT_TEST_PANIC";

@@ -15,19 +15,20 @@ use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor};
 use rayon::prelude::*;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-/// Bytes that are read, and bytes of records that are decoded, in one batch; a larger node is a
-/// batch of its own.
+/// Limits of a batch of nodes: bytes that are read, and bytes of decoded records. A node that
+/// exceeds a limit is a batch of its own.
 const MOST_READ: u64 = 1 << 25;
 const MOST_DECODED: u64 = 1 << 27;
 
 impl Copc {
-    /// Reads the points of these nodes, given by their indices in the octree, in the order of the
-    /// file, as [`read`](super::read) does for a whole file. The first nodes that are read decide
-    /// for all later ones what the numbers of 16-bit colours and intensities mean.
+    /// Reads the points of `nodes`, given by their indices in the octree, as [`read`](super::read)
+    /// reads a whole file. Points are in the order of the file. The first nodes that are read
+    /// decide what 16-bit colours and intensities mean in all later nodes.
     ///
     /// Points have their indices in the file if it has fewer than 2^32 points; otherwise they are
-    /// numbered as they are kept. A node that cannot be decoded is left out and named in
-    /// [`Points::unread`], if another one can be decoded and [`ReadOptions::strict`] is not set.
+    /// numbered in the order in which they are kept. A node that cannot be decoded is left out and
+    /// named in [`Points::unread`], if another one can be decoded and [`ReadOptions::strict`] is
+    /// not set.
     ///
     /// # Errors
     ///
@@ -39,8 +40,8 @@ impl Copc {
         Ok(points)
     }
 
-    /// The same, but with colours as they are in the file ([`Points::raw`]), so that their meaning
-    /// can be decided together with other files.
+    /// Reads nodes as [`read`](Self::read) does, but keeps colours as they are in the file
+    /// ([`Points::raw`]). Their meaning can then be decided together with other files.
     ///
     /// # Errors
     ///
@@ -106,8 +107,8 @@ impl Copc {
         Ok(Points { unread, ..points })
     }
 
-    /// Decides by the first nodes that are read whether colours or intensities show, for all nodes.
-    /// If colours do, intensities are no longer read.
+    /// Decides from the first nodes that are read whether colours or intensities are drawn, for all
+    /// nodes. If colours are drawn, intensities are no longer read.
     fn decide(&mut self, kept: &Kept) {
         if self.looks.is_none() && !kept.positions.is_empty() {
             self.looks = Some(kept.looks.unwrap_or(Looks::Intensities));
@@ -133,8 +134,8 @@ impl Copc {
         batches
     }
 
-    /// Looks at the chunks of nodes whose layers are not known yet. Nodes whose chunk is invalid
-    /// are removed from `nodes`.
+    /// Reads the heads of the chunks of nodes whose layers are not known yet. Nodes whose chunk is
+    /// invalid are removed from `nodes`.
     fn look(
         &mut self,
         nodes: &mut Vec<usize>,

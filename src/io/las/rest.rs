@@ -27,7 +27,7 @@ struct Place {
 }
 
 /// Reads the points of all chunks that can be decoded, of a file whose chunk table is intact. Fails
-/// if all chunks can be decoded, or none.
+/// if no chunk can be decoded, or if all can: then the damage is elsewhere.
 pub(super) fn read(
     (mut file, length): (File, u64),
     path: &Path,
@@ -82,9 +82,9 @@ pub(super) fn read(
     Ok(Points { unread, ..described(points, found, &name, options) })
 }
 
-/// Where the chunks of a table are, from `offset` on. The last chunk is cut to the `promised`
-/// points, as a table of equal chunks gives it the full size. Fails if the chunks hold fewer
-/// points.
+/// Where the chunks of a table are in the file; the first is at `offset`. All chunks together are
+/// cut to the `promised` points, because a table of equal chunks gives the last one the full size.
+/// Fails if the chunks hold fewer points.
 fn places(table: &[Chunk], mut offset: u64, promised: u64) -> Result<Vec<Place>, Fault> {
     let (mut places, mut first) = (Vec::new(), 0);
     for (index, &Chunk { points, bytes }) in table.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! Adapts the header of a LAS file to the decoder: valid headers that it does not know are shown to
-//! it as ones that it knows.
+//! Adapts the header of a LAS file to the decoder. Valid headers that the decoder does not know are
+//! shown as similar headers that it knows.
 
 use crate::io::fault::Fault;
 use std::fs::File;
@@ -16,23 +16,23 @@ const COUNTS_END: u64 = 255;
 /// Size of the counts of LAS 1.0 to 1.3, bytes: of all points, and of five returns.
 const LEGACY_COUNTS_SIZE: usize = 24;
 
-/// A file that reads as if a few of its bytes were others.
+/// A file in which a few bytes are replaced when they are read.
 #[derive(Debug)]
 pub(super) struct Shown {
     file: File,
     at: u64,
-    /// The replaced bytes, and their offsets.
+    /// The replacement bytes, and their offsets.
     others: Vec<(u64, Vec<u8>)>,
     /// The file's own point count in the field of LAS 1.0 to 1.3; 0 for LAS 1.5, which has none.
     pub(super) legacy: u32,
 }
 
 impl Shown {
-    /// Starts at the beginning of the file.
+    /// Reads the file from its beginning, with a header that the decoder knows.
     ///
-    /// LAS 1.5 is shown as 1.4, whose header is the same except for times at its end, and without
-    /// the legacy counts, which 1.5 abolished. LAS 1.4 with a point format of 6 or above, where
-    /// legacy counts have no meaning, is shown without them if it has the other count. Versions
+    /// LAS 1.5 is shown as LAS 1.4, whose header differs only by times at its end. Legacy counts
+    /// are shown as 0: version 1.5 abolished them. They are also shown as 0 in LAS 1.4 with a point
+    /// format of 6 or above, where they have no meaning, if the count of LAS 1.4 is not 0. Versions
     /// other than 1.0 to 1.5 are refused.
     pub(super) fn new(mut file: File) -> Result<Self, Fault> {
         let mut start = Vec::new();

@@ -3,7 +3,7 @@
 use las::raw::Vlr;
 use std::io::{Read, Seek, SeekFrom};
 
-/// User and numbers of the records: keys, the texts of keys, and well-known text.
+/// User and ids of the records: GeoTIFF keys, the texts of keys, and well-known text.
 const USER: &[u8] = b"LASF_Projection";
 const KEYS: u16 = 34735;
 const TEXTS: u16 = 34737;
@@ -18,7 +18,7 @@ const CITATIONS: [u16; 3] = [3073, 1026, 2049];
 /// The kind of model whose coordinates are degrees; others are projected or geocentric.
 const MODEL_OF_DEGREES: u16 = 2;
 
-/// The code of a system without a code.
+/// The code that means that a system has none.
 const USER_DEFINED: u16 = 32767;
 
 /// Longest text that is read, bytes, and the number of extended records that are looked at.
@@ -78,8 +78,8 @@ impl Records {
     }
 }
 
-/// The EPSG code of the whole system: the last entry within its brackets. Codes of parts are
-/// followed by more brackets.
+/// The EPSG code of the coordinate system as a whole: the last entry before `]]` at the end of the
+/// text. The codes of its parts are followed by more brackets.
 fn code_of_whole(text: &str) -> Option<&str> {
     let inner = text.strip_suffix("]]")?.trim_end_matches('"');
     let digits = inner.len() - inner.trim_end_matches(|c: char| c.is_ascii_digit()).len();
@@ -152,7 +152,7 @@ mod tests {
         let degrees = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984"],ID["EPSG",4326]]"#;
         let expected = System { name: "WGS 84 (EPSG:4326)".into(), geographic: Some(true) };
         assert_eq!(System::of_text(degrees), expected);
-        // The code of a unit is not that of the whole.
+        // The code of a unit is not that of the coordinate system.
         let feet = r#"PROJCS["Lambert",GEOGCS["NAD83"],UNIT["foot",0.3048,AUTHORITY["EPSG","9002"]]]"#;
         assert_eq!(System::of_text(feet), System { name: "Lambert".into(), geographic: Some(false) });
         let keys = [1, 1, 0, 3, MODEL, 0, 1, 1, PROJECTED, 0, 1, 25832, 3073, TEXTS, 6, 0];

@@ -105,9 +105,9 @@ impl Faces {
         Ok(())
     }
 
-    /// Checks that all indices are below `counts`. Programs write indices of texture coordinates
-    /// and normals even where a file has none at all, so these are ignored; so is every invalid
-    /// index of texture coordinates unless `strict`.
+    /// Checks that all indices are below `counts`. Some programs write indices of texture
+    /// coordinates or normals although the file has none at all; these indices are ignored. Unless
+    /// `strict`, every invalid index of texture coordinates is ignored too.
     pub(super) fn check(&mut self, counts: [usize; 3], strict: bool) -> Result<(), Fault> {
         self.has_texture &= counts[TEXTURE] > 0;
         self.lacks_normal |= counts[2] == 0;

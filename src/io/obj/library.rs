@@ -39,9 +39,9 @@ impl ColorMap {
     }
 }
 
-/// The materials of a library with their names, in order. Keywords may be in any case, and lines
-/// that cannot be read are skipped. One such line would make the parser drop all materials, so it
-/// is given only lines that it can read.
+/// The materials of a library with their names, in order. Keywords may be upper or lower case.
+/// Lines that cannot be read are skipped: a single one would make the parser (`tobj`) drop all
+/// materials.
 pub(super) fn definitions(text: &str) -> Vec<(String, Definition)> {
     let (mut lines, mut named) = (String::new(), false);
     for line in text.lines() {

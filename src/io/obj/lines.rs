@@ -18,8 +18,8 @@ const LINE_LIMIT: usize = 1 << 24;
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
-    /// The colour and alpha of each position, as they are in the file, NaN for a vertex without
-    /// one; empty if no vertex has one.
+    /// The colour and alpha of each position, as they are in the file. NaN for a vertex without a
+    /// colour; empty if no vertex has a colour.
     colors: Vec<[f64; 4]>,
     /// The codes of `#MRGB` lines, vertex by vertex.
     polypaint: Vec<[u8; 4]>,
@@ -37,12 +37,12 @@ pub(super) struct Lines {
     count: u64,
 }
 
-/// Reads line by line.
+/// Reads a file line by line.
 struct Reader<'a, R> {
     reader: R,
     progress: &'a dyn Progress,
     unreported: u64,
-    /// Lines so far, the current one included.
+    /// The number of lines read so far, including the current one.
     count: u64,
     line: Vec<u8>,
     /// The byte that ends a line.

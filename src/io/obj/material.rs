@@ -17,9 +17,9 @@ use crate::io::{Material, Mesh};
 /// Longest material library, bytes; the rest is ignored.
 const LONGEST: u64 = 1 << 24;
 
-/// Gives `mesh` its materials. Triangles have indices into `names`, and `libraries` are those that
-/// the OBJ file at `path` names. Texture coordinates are mapped as the options `-s` and `-o` of the
-/// images say.
+/// Gives `mesh` its materials. Triangles have indices into `names`; `libraries` are the texts after
+/// `mtllib` in the OBJ file at `path`. Texture coordinates are mapped by the options `-s` and `-o`
+/// of the images.
 ///
 /// Libraries and images that cannot be read are named in the notes of the mesh. A material that no
 /// library defines is white. If none is defined at all, no triangle has a material.
@@ -93,7 +93,8 @@ fn defined(beside: &mut Beside, libraries: &[String], notes: &mut Vec<String>) -
     defined
 }
 
-/// The files of the `libraries` that the OBJ file at `path` names, and of their images.
+/// The paths of the `libraries` that the OBJ file at `path` names, and of the images that the
+/// libraries name.
 pub(super) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
     let mut beside = Beside::of(path);
     let mut files = Vec::new();

@@ -1,5 +1,5 @@
-//! Wavefront OBJ: the vertices of a mesh as points with normals and radii from its faces, or the
-//! triangles themselves.
+//! Wavefront OBJ, read as points or as a mesh. Points are the vertices, with normals and radii from
+//! the faces.
 
 mod encoding;
 mod faces;
@@ -22,16 +22,17 @@ use std::path::{Path, PathBuf};
 /// Reads the vertices of an OBJ file, one point for each `v` line in their order, whatever groups
 /// and materials the faces have.
 ///
-/// - Normals: if every face corner of the file names a `vn`, the mean of those at a vertex;
-///   otherwise the mean of the normals of its faces, weighted by area. A vertex without a face has
-///   none (zero). In a file without faces but with one `vn` for each `v`, they are paired.
-/// - Radii: 1.1 times the smallest radius with which disks at a triangle's corners cover it, the
-///   largest over the vertex's triangles. Polygons are cut into triangles. A vertex without a
-///   triangle has none (zero).
+/// - Normals: if every face corner of the file names a `vn`, a vertex gets the mean of those at its
+///   corners; otherwise the mean of its faces' normals, weighted by area. A vertex without a face
+///   gets zero, which means none. In a file without faces but with as many `vn` as `v`, each `v`
+///   gets the `vn` with the same index.
+/// - Radii: 1.1 times the covering radius of a triangle, the largest over the vertex's triangles.
+///   Disks with the covering radius at the three corners just cover the triangle. Polygons are cut
+///   into triangles first. A vertex without a triangle gets zero, which means none.
 /// - Colours: the three numbers after a vertex's coordinates, sRGB-coded; the numbers of all
-///   vertices decide whether they range to 1 or to 255 ([`RawColors`]). A fourth is alpha. If no
-///   vertex has any, those of ZBrush's lines `#MRGB` are used.
-/// - Materials and images of its triangles, as [`read_mesh`] reads them.
+///   vertices decide whether they range to 1 or to 255 ([`RawColors`]). A fourth number is alpha.
+///   If no vertex has a colour, those of ZBrush's lines `#MRGB` are used.
+/// - Materials and images: those of the triangles, as [`read_mesh`] reads them.
 ///
 /// Text may be in UTF-16 of either byte order, with a byte order mark. Up is y. Lines, points and
 /// curves are skipped. A missing MTL file or image is not an error, but named in [`Points::notes`].
@@ -50,18 +51,18 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     Ok(points)
 }
 
-/// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with a vertex
-/// for every `v` line.
+/// Reads the triangles of an OBJ file as one mesh, whatever their groups and materials. Every `v`
+/// line is a vertex.
 ///
 /// Polygons are cut into triangles, concave ones correctly. If every corner of the file names a
 /// `vn`, corners have these normals; otherwise the mesh is faceted. A triangle has texture
 /// coordinates if all of its corners name a `vt`. Colours are as in [`read`]; lines, points and
-/// curves are skipped. A file without faces is a mesh without triangles, and no error here.
+/// curves are skipped. A file without faces is a mesh without triangles, which is not an error
+/// here.
 ///
-/// From MTL files, whatever the case of their names and keywords, the reader takes the diffuse
-/// colour `Kd` (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or TGA, sRGB;
-/// with `-s`, `-o` and `-clamp`). Files that cannot be read are left out and named in
-/// [`Mesh::notes`].
+/// MTL files give the diffuse colour `Kd` (linear light), the opacity `d` and the image `map_Kd`
+/// (PNG, JPEG, BMP or TGA, sRGB; with `-s`, `-o` and `-clamp`). The case of file names and keywords
+/// does not matter. Files that cannot be read are left out and named in [`Mesh::notes`].
 ///
 /// # Errors
 ///
@@ -134,7 +135,8 @@ fn points(lines: Lines, path: &Path, ignore_alpha: bool) -> Result<Points> {
     })
 }
 
-/// The mesh without colours and materials, the names of its libraries, and those of its materials.
+/// The mesh without colours and materials, the names of its libraries, and the names of its
+/// materials.
 fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
     let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());

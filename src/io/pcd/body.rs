@@ -180,8 +180,8 @@ pub(super) fn compressed(
     Ok(reading.into_points())
 }
 
-/// For each cell its field, the place of its numbers in the data, and whether it is a packed
-/// colour.
+/// For each [`Cell`] its field, the place of its numbers in the data, and whether the cell is a
+/// packed colour.
 struct Cells<'a>(Vec<(&'a Field, Place, bool)>);
 
 impl<'a> Cells<'a> {

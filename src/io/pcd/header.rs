@@ -44,7 +44,7 @@ pub(super) struct Header {
     pub(super) data: Data,
     /// Bytes per point.
     pub(super) row: u64,
-    /// Lines and bytes of the header.
+    /// The number of lines of the header, and of its bytes.
     pub(super) lines: u64,
     pub(super) bytes: u64,
     /// The byte that ends a line: `\n` or `\r`.
@@ -62,7 +62,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let complete = line.last() == Some(&line_end);
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
-        // Keywords may be in any case.
+        // Keywords may be upper or lower case.
         let keyword = words.next().map(str::to_ascii_uppercase);
         let keyword = keyword.as_deref();
         // The last line of a file without points may lack its line end.

@@ -19,9 +19,10 @@ use points::Columns;
 /// - `x y z` of any type become f64 positions. Organised clouds mark missing points by non-finite
 ///   coordinates.
 /// - `normal_x normal_y normal_z`, or one field of three numbers, become normals.
-/// - `rgb` or `rgba`, one number of 4 bytes of any type, becomes an 8-bit sRGB code: blue in the
-///   lowest byte, then green, red, and in `rgba` alpha, unless alpha is 0 in the whole file. Some
-///   programs write this code as the value of a float.
+/// - `rgb` or `rgba`, one number of 4 bytes of any type, becomes 8-bit sRGB codes: blue is the
+///   lowest byte, then follow green and red. In `rgba` the highest byte is alpha; it is ignored if
+///   it is 0 in the whole file. Some programs write these bytes as the value of a float, not as its
+///   bits.
 /// - `red green blue` with or without `alpha`, or one field of three or four numbers, become
 ///   colours according to the range of their values.
 /// - `intensity` becomes grey if there are no colours, or all are zero.
@@ -33,8 +34,8 @@ use points::Columns;
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read.
 /// [`Error::Malformed`](crate::Error::Malformed) where the header is invalid, `x`, `y` or `z` is
-/// missing, the file ends before the number of points in its header, a number in text is invalid,
-/// or compressed data cannot be decoded.
+/// missing, the file holds fewer points than its header says, a number in text is invalid, or
+/// compressed data cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

@@ -15,7 +15,7 @@ pub(super) struct Cell {
     pub(super) part: u64,
 }
 
-/// The numbers of a point that are used. All other members are indices into `cells`.
+/// The numbers of a point that are used: `cells`. All other members are indices into `cells`.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
     pub(super) cells: Vec<Cell>,
@@ -247,8 +247,8 @@ fn unpack_values(codes: &mut [[u8; 4]]) {
     let value = |[red, green, blue, alpha]: [u8; 4]| f32::from_le_bytes([blue, green, red, alpha]);
     let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;
     let all_whole = codes.iter().all(|code| is_whole(value(*code)));
-    // Colours whose fourth byte was never set, as in PCL's own sample, may be whole numbers too. If
-    // all have the same upper byte, they are taken as bits.
+    // Packed bits whose fourth byte was never set, as in PCL's own sample, may be whole numbers
+    // too. If all upper bytes are equal, the floats are taken as bits.
     let one_exponent = codes.windows(2).all(|pair| pair[0][3] == pair[1][3]);
     if !all_whole || one_exponent {
         return;
@@ -267,7 +267,7 @@ pub(super) struct Place {
 }
 
 impl Field {
-    /// The little-endian number at the offset `at`; the bits of a packed colour.
+    /// The little-endian number at the offset `at`, or the bits of a `packed` colour.
     pub(super) fn number(&self, bytes: &[u8], at: usize, packed: bool) -> f64 {
         use Scalar::{Float, Signed, Unsigned};
         macro_rules! number {

@@ -43,7 +43,8 @@ pub(super) fn read<const BIG: bool>(
     Ok(contents)
 }
 
-/// Reads the rows of an element with positions, and the [`TreeRow`]s if it is the nodes.
+/// Reads the rows of an element with positions. Also returns the [`TreeRow`]s if the element is the
+/// nodes of levels of detail.
 pub(super) fn vertices<const BIG: bool>(
     mut reader: impl BufRead,
     vertex: &Element,
@@ -113,8 +114,8 @@ impl<'a> Decoder<'a> {
 /// Decodes one column of a block into `values`, replacing its content.
 fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar: Scalar, values: &mut Vec<f64>) {
     fn strided<const N: usize>(block: &[u8], row_size: usize, offset: usize) -> impl Iterator<Item = [u8; N]> {
-        // Columns lie within their rows, so the default is never used. `filter_map` would have no
-        // exact size, with which `extend` reserves its memory once.
+        // Columns lie within their rows, so the default is never used. `filter_map` would hide the
+        // exact size, by which `extend` reserves its memory once.
         let number = move |row: &[u8]| row.get(offset..).and_then(|rest| rest.first_chunk().copied()).unwrap_or([0; N]);
         block.chunks_exact(row_size).map(number)
     }
@@ -300,7 +301,7 @@ mod tests {
     use super::*;
     use crate::io::ply::header;
 
-    /// In both byte orders, and with more rows than one block holds.
+    /// Tests both byte orders, and more rows than one block holds.
     #[test]
     fn rows_in_memory_are_those_of_a_stream() {
         let text = "ply\nformat binary_little_endian 1.0\nelement vertex 90000\nproperty double x\nproperty float y\nproperty short z\n\

@@ -13,8 +13,8 @@ use glam::DVec3;
 enum Shape {
     /// The list is the outline of one polygon.
     Polygon,
-    /// Each vertex forms a triangle with the two before it, of which every second one is reversed;
-    /// -1 starts a new strip.
+    /// Each vertex forms a triangle with the two vertices before it, and every second triangle is
+    /// reversed. -1 starts a new strip.
     Strip,
 }
 
@@ -29,7 +29,7 @@ pub(super) enum Role {
     TextureNumber,
     /// A colour channel: 0 to 3 for red, green, blue and alpha.
     Color(usize),
-    /// It is skipped.
+    /// The property is skipped.
     Unused,
 }
 
@@ -37,18 +37,19 @@ pub(super) enum Role {
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     triangles: Vec<[u32; 3]>,
-    /// Polygons of more than three corners: the index of their first triangle, and their count.
+    /// Polygons of more than three corners: the index of the first triangle, and the number of
+    /// triangles.
     polygons: Vec<(usize, usize)>,
-    /// Whether rows of the current element have texture coordinates, and whether those of any
-    /// element have texture indices.
+    /// Whether rows of the current element have texture coordinates, and whether rows of any
+    /// element so far have texture indices.
     placed: bool,
     numbered: bool,
     /// The types of the colour channels, alpha optional; None if rows have no colour.
     channels: Option<[Option<Scalar>; 4]>,
-    /// One colour per triangle, numbers as in the file, NaN if its row has none; empty if no
+    /// The colour of each triangle as it is in the file; NaN if the row has no colour. Empty if no
     /// element of faces has colours.
     colors: Vec<[f32; 4]>,
-    /// Texture coordinates of each triangle; they end at the first face that has none.
+    /// Texture coordinates of the triangles before the first face that has none.
     texture: Vec<[[f32; 2]; 3]>,
     /// Index of each triangle's texture among the textures of the file.
     texture_numbers: Vec<u32>,
@@ -70,8 +71,8 @@ pub(super) struct Faces {
     odd: bool,
 }
 
-/// The elements up to the last one that a reader uses. A file may end in the elements after it, but
-/// not in those before it.
+/// The elements up to the last one that a reader uses. A file may end early after this element, but
+/// not before.
 pub(super) fn needed(elements: &[Element]) -> &[Element] {
     let read =
         |element: &Element| element.name == "vertex" || is_tree(element) || is_whole(element) || Faces::are(element);
@@ -96,7 +97,8 @@ impl Faces {
         element.properties.iter().any(|property| role(element, property) == Role::Corners)
     }
 
-    /// How each property of an element is used; sets the state that depends on it.
+    /// Returns how each property of an element is used, and sets `channels`, `placed` and
+    /// `numbered`.
     pub(super) fn roles(&mut self, element: &Element) -> Vec<Role> {
         let mut found = false;
         let mut role = |property: &Property| match role(element, property) {
@@ -165,7 +167,8 @@ impl Faces {
             (Some(first), Some(second)) => {
                 let turned = self.shape == Some(Shape::Strip) && self.odd;
                 let triangle = if turned { [second, first, third] } else { [first, second, third] };
-                // Strips contain triangles without area wherever they turn a corner.
+                // Triangles without area are dropped: strips contain some wherever they turn a
+                // corner.
                 if first.0 != second.0 && second.0 != vertex && vertex != first.0 {
                     self.triangles.push(triangle.map(|(vertex, _)| vertex));
                     if self.placed {
@@ -234,7 +237,8 @@ fn corners_of<T: Copy>(fan: &[[T; 3]]) -> Vec<T> {
     fan.iter().take(1).flat_map(|&[a, b, _]| [a, b]).chain(fan.iter().map(|&[.., c]| c)).collect()
 }
 
-/// Replaces a polygon's fan by other triangles of it, `parts`, given by corner indices.
+/// Replaces a polygon's fan by another triangulation: `parts` are the corner indices of its
+/// triangles.
 fn remake<T: Copy>(fan: &mut [[T; 3]], parts: &[[usize; 3]]) {
     let corners = corners_of(fan);
     fan.iter_mut().zip(parts).for_each(|(triangle, part)| *triangle = part.map(|corner| corners[corner]));

@@ -4,12 +4,12 @@
 //! The file holds the parameters as they are trained. `scale_0`, `scale_1` and, in three
 //! dimensions, `scale_2` are logarithms of standard deviations. `rot_0` (w) to `rot_3` are a
 //! quaternion of any length. `opacity` is the argument of the logistic function. `f_dc_0` to
-//! `f_dc_2` and `f_rest_0`, `f_rest_1` and so on are coefficients of spherical harmonics: all of
-//! red, then green, then blue. Normals `nx ny nz`, if present, are zeros and ignored.
+//! `f_dc_2` and `f_rest_0`, `f_rest_1` and so on are coefficients of spherical harmonics: those of
+//! red, then of green, then of blue. Normals `nx ny nz`, if present, are zeros and ignored.
 //!
-//! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: sRGB codes of 0 to
-//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` these are ignored, as in the method's own
-//! viewer.
+//! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: sRGB codes from 0 to
+//! 255 (`ushort`: to 65535; `float`: to 1). With `f_dc_0`, `red green blue` are ignored, as in the
+//! method's own viewer.
 //!
 //! `filter_3D` is the standard deviation f of a filter (Mip-Splatting, Yu et al. 2024). Each
 //! standard deviation s becomes `sqrt(s^2 + f^2)`, and the opacity is multiplied by
@@ -28,7 +28,7 @@ use crate::scene::{Colors, Harmonics};
 /// A Gaussian counts as flat if its shortest half-axis is at most this fraction of the middle one.
 const FLAT: f64 = 0.1;
 
-/// Largest fraction of a file's Gaussians that may be thicker than that.
+/// Largest fraction of a file's Gaussians that may be thicker than [`FLAT`].
 const MOST_THICK: f64 = 0.01;
 
 /// The constant spherical harmonic, `1 / (2 sqrt(pi))`.
@@ -44,7 +44,7 @@ pub(super) struct GaussianLayout {
     pub(super) opacity: usize,
     pub(super) base: Base,
     pub(super) degree: u32,
-    /// Coefficients beyond the constant one: all of red, then green, then blue.
+    /// Coefficients beyond the constant one: those of red, then of green, then of blue.
     pub(super) rest: Vec<usize>,
     /// The standard deviation of the filter of Mip-Splatting.
     pub(super) filter: Option<usize>,
@@ -177,8 +177,9 @@ impl<'a> Gaussians<'a> {
         let mut axes: Vec<(f64, DVec3)> = deviations.into_iter().zip(units).collect();
         let mut ratio = None;
         if axes.len() == 3 {
-            // The other two deviations keep the file's order. A NaN counts as the shortest and is
-            // handed on to a remaining half-axis, so that the Gaussian is not drawn.
+            // The shortest deviation is removed; the other two keep the file's order. A NaN counts
+            // as the shortest and is passed on to a remaining half-axis, so that the Gaussian is
+            // not drawn.
             let shortest =
                 (0..3).fold(2, |least, k| if axes[k].0 < axes[least].0 || axes[k].0.is_nan() { k } else { least });
             let (thickness, _) = axes.remove(shortest);
@@ -233,7 +234,8 @@ fn widened(deviations: &mut [f64], filter: f64) -> f64 {
     left
 }
 
-/// Counts the thick ones among these ratios and finds their median; None if there are none.
+/// Counts the ratios above [`FLAT`], and finds the median of all ratios. None if there are no
+/// ratios.
 fn flattened(mut ratios: Vec<f32>) -> Option<Flattened> {
     if ratios.is_empty() {
         return None;

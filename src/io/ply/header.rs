@@ -87,7 +87,7 @@ pub(super) struct Element {
 /// How the colours of rows are interpreted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tints {
-    /// The file is epsplat's, so floats are known to be linear light.
+    /// epsplat wrote the file, so floats are known to be linear light.
     pub(super) own: bool,
     /// Alphas are ignored.
     pub(super) ignore_alpha: bool,
@@ -99,7 +99,7 @@ pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
     pub(super) comments: Comments,
-    /// Lines up to and including `end_header`; an ASCII file's first value is on the next one.
+    /// Lines up to and including `end_header`; an ASCII file's first value is on the next line.
     pub(super) lines: u64,
     /// The byte that ends a line.
     pub(super) line_end: u8,
@@ -112,7 +112,7 @@ pub(super) struct Comments {
     pub(super) textures: Vec<String>,
     /// `up y` or `up z`: the axis that points up.
     pub(super) up: Option<Up>,
-    /// `triangles NAME`: the mesh file that the surfels are drawn beside.
+    /// `triangles NAME`: a mesh file that is drawn together with the surfels.
     pub(super) beside: Option<String>,
     /// `closed`: the surfels cover a closed surface.
     pub(super) closed: bool,
@@ -159,7 +159,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
         let keyword = words.next();
-        // If no values follow, the last line may lack its end.
+        // If no values follow, the last line may lack its line end.
         if !complete && keyword != Some("end_header") {
             return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
                 format!("line {number} of the PLY header is longer than {LINE_LIMIT} bytes")
@@ -227,7 +227,8 @@ fn property<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Property> {
         }
         scalar => Kind::Scalar(Scalar::parse(scalar)?),
     };
-    // The format has no spaces in names, but programs write scalar fields under names with spaces.
+    // The format does not allow spaces in names, but programs write names of scalar fields with
+    // spaces.
     let name = words.collect::<Vec<_>>().join(" ");
     (!name.is_empty()).then_some(Property { name, kind })
 }

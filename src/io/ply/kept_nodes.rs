@@ -1,4 +1,4 @@
-//! Nodes of levels of detail, kept in an unnamed temporary file until all have been built.
+//! Nodes of levels of detail, stored in an unnamed temporary file until all nodes have been built.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -25,8 +25,8 @@ pub struct KeptNodes {
 }
 
 impl KeptNodes {
-    /// Creates an empty array in an unnamed file in `folder`, which the system deletes when this is
-    /// dropped; errors name it `path`.
+    /// Creates an empty array in an unnamed file in `folder`. The system deletes the file when the
+    /// array is dropped. Errors call the file `path`.
     ///
     /// # Errors
     ///

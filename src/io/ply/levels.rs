@@ -15,7 +15,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Pieces with a smaller gap between them, bytes, are read in one go, the gap included.
+/// Two pieces are read in one go, together with the gap between them, if the gap is shorter than
+/// this, bytes.
 const GAP: u64 = 1 << 14;
 
 /// Longest read that covers more than one piece, bytes.
@@ -37,13 +38,13 @@ pub struct Levels {
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
-    /// The facts of all its points together, from the element `scene`.
+    /// The facts of all points of the file together, from the element `scene`.
     pub whole: Whole,
     /// The axis that points up, if the file says so.
     pub up: Option<Up>,
-    /// Its surfels cover a closed surface.
+    /// The surfels cover a closed surface.
     pub closed: bool,
-    /// Its normals do not tell the two sides of a surface apart.
+    /// The normals do not tell the two sides of a surface apart.
     pub unsided: bool,
 }
 
@@ -58,7 +59,7 @@ struct Stretch {
 
 impl Levels {
     /// Opens a binary little-endian PLY file with levels of detail and the element `scene`. Returns
-    /// None for any other file, and for one that is drawn beside a mesh.
+    /// None for any other file, and for a file whose surfels are drawn together with a mesh.
     ///
     /// # Errors
     ///
@@ -207,7 +208,8 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
         return Err(Fault::Malformed("its element 'scene' has a value that is not a number or is too large".into()));
     }
     let whole = whole::parse(&row, surfels, nodes);
-    // The reader of the whole file ignores such a row, too.
+    // f32 coordinates about such an origin lack precision. The reader of the whole file ignores
+    // this row, too.
     if !whole.is_near() {
         return Ok(None);
     }
@@ -260,7 +262,7 @@ mod tests {
 
     use super::*;
 
-    /// Whatever the gaps between pieces and their lengths are.
+    /// Tests pieces of many lengths, with many gaps between them.
     #[test]
     fn pieces_are_read_as_they_lie() {
         let all: Vec<u8> = (0..6 * SPAN as u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();

@@ -1,7 +1,7 @@
 //! PLY: a streaming reader for meshes and clouds of tens of millions of vertices, and writers.
 //!
-//! Written files are binary little-endian. A vertex has those of these properties that are known,
-//! in this order:
+//! Written files are binary little-endian. A vertex has the following properties as far as they are
+//! known, in this order:
 //!
 //! | properties | type | content |
 //! |---|---|---|
@@ -19,29 +19,30 @@
 //!
 //! The ellipse is p + u s + v t with u² + v² <= 1, and its normal is s x t.
 //!
-//! Levels of detail are an element `node` after the vertices, which are in the order of the tree. A
-//! node has `x y z`, `radius`, half-axes, cap and colour as above, and `cone first count leaf`:
+//! Levels of detail are a tree of nodes: the element `node`, after the vertices. The vertices are
+//! in the order of the tree. A node has `x y z`, `radius`, half-axes, cap and colour as above, and
+//! `cone first count leaf`:
 //!
-//! - `radius` is that of a sphere around everything below the node; it is larger where that does
-//!   not lie on the node's cap.
-//! - `cone` is the smallest cosine of the angle between the node's normal and a normal below it; -1
-//!   where normals have no side.
-//! - `first` and `count` are the range of its children, or of the vertices of a leaf; `leaf` says
-//!   which ([`Hierarchy`](crate::scene::Hierarchy)).
+//! - `radius` is that of a sphere around everything below the node. It is larger than necessary
+//!   where surfels lie off the node's cap.
+//! - `cone` is the smallest cosine of the angle between the node's normal and a normal of the
+//!   surfels below it; -1 if normals have no side.
+//! - `first` and `count` are the range of the node's children, or of the vertices of a leaf; `leaf`
+//!   says which ([`Hierarchy`](crate::scene::Hierarchy)).
 //!
-//! An element `scene` then holds facts of all vertices together, for readers of a part: origin,
-//! bounds and ranges ([`Whole`](crate::scene::Whole)).
+//! An element `scene` then holds facts of all vertices together, for programs that read only a part
+//! of the file: origin, bounds and ranges ([`Whole`](crate::scene::Whole)).
 //!
 //! The header may have these comments, which no other program writes or reads: `up y` or `up z`;
-//! `closed` for surfels that cover a closed surface; `unsided` where normals have no side;
-//! `triangles NAME` for surfels that are drawn beside a mesh in the same folder, and `hybrid` in
-//! that mesh.
+//! `closed` for surfels that cover a closed surface; `unsided` if normals have no side;
+//! `triangles NAME` for surfels that are drawn together with a mesh in the same folder, and
+//! `hybrid` in the file of that mesh.
 //!
-//! Files of Gaussians, whose vertices have other names, are read too ([`read`]), and so are
-//! SuperSplat's compressed ones.
+//! Files of Gaussians, whose vertices have other properties, are read too ([`read`]), and so are
+//! SuperSplat's compressed Gaussians.
 //!
 //! Normals, colours and texture coordinates have MeshLab's names. MeshLab, CloudCompare and Open3D
-//! ignore the half-axes: to them such a file is a cloud with normals and colours.
+//! ignore the half-axes, and show such a file as a cloud with normals and colours.
 
 mod ascii;
 mod binary;

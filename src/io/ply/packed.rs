@@ -3,7 +3,7 @@
 //! | property | bits, highest first | content |
 //! |---|---|---|
 //! | `packed_position` | 11, 10, 11 | x, y, z from `min_x` to `max_x` and so on |
-//! | `packed_rotation` | 2, 10, 10, 10 | index of the largest `rot_0` to `rot_3`; others times √2 |
+//! | `packed_rotation` | 2, 10, 10, 10 | index of the largest `rot_k`; the other three times √2   |
 //! | `packed_scale` | 11, 10, 11 | `scale_0` to `scale_2` from `min_scale_x` to `max_scale_x` ... |
 //! | `packed_color` | 8, 8, 8, 8 | red, green, blue from `min_r` to `max_r` ..., opacity |
 //!
@@ -30,7 +30,8 @@ const BLOCK: usize = 1 << 20;
 /// The four words of a Gaussian.
 pub(super) const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
-/// The smallest and largest values of a chunk: positions, scales and colours, which may be missing.
+/// Properties of a chunk: the smallest and largest positions, scales and colours. Those of colours
+/// may be missing.
 const RANGES: [[[&str; 3]; 2]; 3] = [
     [["min_x", "min_y", "min_z"], ["max_x", "max_y", "max_z"]],
     [["min_scale_x", "min_scale_y", "min_scale_z"], ["max_scale_x", "max_scale_y", "max_scale_z"]],
@@ -106,7 +107,7 @@ pub(super) fn read(
 }
 
 /// The columns of an unpacked Gaussian: scales, rotation, opacity, the constant harmonic, and
-/// `rest` coefficients of the others.
+/// `rest` coefficients of the other harmonics.
 fn layout(rest: usize) -> GaussianLayout {
     let degree = (0..=MOST_DEGREE).find(|degree| 3 * terms_of(*degree) == rest).unwrap_or(0);
     GaussianLayout {
@@ -169,8 +170,8 @@ fn coefficient(byte: u8) -> f64 {
     (part - 0.5) * 8.0
 }
 
-/// Offsets within a chunk's row of the ranges of positions, scales and colours, bytes; None for
-/// colours that are missing.
+/// Finds the ranges of positions, scales and colours in a chunk's row, as offsets in bytes. None
+/// for colours whose range is missing.
 fn ranges(chunks: &Element) -> Result<[Option<[[usize; 3]; 2]>; 3], Fault> {
     let mut all = [None; 3];
     for (k, names) in RANGES.into_iter().enumerate() {
@@ -182,7 +183,7 @@ fn ranges(chunks: &Element) -> Result<[Option<[[usize; 3]; 2]>; 3], Fault> {
     Ok(all)
 }
 
-/// Offsets of the bytes of harmonics within a row.
+/// Offsets within a row of the bytes that are coefficients of harmonics.
 fn rest(element: &Element) -> Result<Vec<usize>, Fault> {
     let place = |k: usize| offset_of(element, &format!("f_rest_{k}"), Some(Scalar::U8));
     let found: Vec<usize> = (0..element.properties.len()).map_while(place).collect();

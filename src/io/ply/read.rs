@@ -22,14 +22,14 @@ use std::path::{Component, Path, PathBuf};
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
 /// - `x y z` of any scalar type become f64 positions.
-/// - `nx ny nz` become normals, and `radius` (or else `scale`) radii in world units; other names
-///   that programs write are known, too.
+/// - `nx ny nz` become normals, and `radius` (or else `scale`) becomes radii in world units. Other
+///   common names are accepted, too.
 /// - `sx sy sz` and `tx ty tz`, if all six exist, become half-axes in world units.
 /// - `texture_u texture_v` (also `texcoord_u texcoord_v`, `s t`, `u v`) become texture coordinates.
 /// - `red green blue` (also `r g b`, `diffuse_red ...`) with optional `alpha` become colours.
-///   `uchar` are 8-bit sRGB codes and stay so. The range of other types is found from all numbers
-///   of a scene ([`RawColors`](crate::io::RawColors)); `float` and `double` from 0 to 1 are linear
-///   light. Alpha is always straight and linear.
+///   Numbers of type `uchar` are 8-bit sRGB codes and stay so. The range of other types is found
+///   from all numbers of a scene ([`RawColors`](crate::io::RawColors)); `float` and `double` from 0
+///   to 1 are linear light. Alpha is always straight and linear.
 /// - `intensity` (also `scalar_Intensity ...`) becomes grey if colours are missing or all zero.
 ///
 /// A file with a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips` is a
@@ -44,8 +44,8 @@ use std::path::{Component, Path, PathBuf};
 /// ellipsoids of any thickness lose their shortest axis.
 ///
 /// Comments in the header: `up y` or `up z` names the axis that points up; `closed` says that
-/// surfels cover a closed surface; `triangles NAME` names a mesh in the same folder to draw beside
-/// them.
+/// surfels cover a closed surface; `triangles NAME` names a mesh in the same folder that is drawn
+/// together with them.
 ///
 /// Other properties and elements are skipped; elements after the last one that is used are not even
 /// parsed. A file without vertices is valid.
@@ -56,7 +56,7 @@ use std::path::{Component, Path, PathBuf};
 /// [`Error::Malformed`](crate::Error::Malformed) if the header is not a PLY header, `x`, `y` or `z`
 /// is missing, the file ends before the vertices or faces that its header promises, a word of an
 /// ASCII file is not a number, a list has a negative length, a face names a vertex that does not
-/// exist, or the mesh to draw beside it is not a regular file in the same folder.
+/// exist, or the mesh that `triangles` names is not a regular file in the same folder.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let path = input.path.clone();
     let (mut points, mut faces, textures) = contents(input, options, progress)?;
@@ -73,7 +73,8 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     points.normals.get_or_insert(normals);
     points.of_mesh = points.radii.is_none() && points.axes.is_none();
     points.radii.get_or_insert(radii);
-    // If vertices alone have texture coordinates, these stay with the points, for any image.
+    // Triangles get the texture coordinates of vertices only if the file names images or its faces
+    // have colours. Otherwise only the points have them, for any image.
     let is_painted = !textures.is_empty() || faces.texture.is_some() || faces.colors.is_some();
     let of_vertices = points.texture.as_ref().filter(|_| is_painted).map(|texture| corners(&faces.triangles, texture));
     let mut mesh = Mesh {
@@ -97,9 +98,9 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 /// Corners have the normals, colours and texture coordinates of their vertices. If every face has a
 /// list `texcoord`, as MeshLab writes it, texture coordinates are taken from there.
 ///
-/// Faces may have colours, `red green blue` with or without `alpha`; those of vertices take
-/// precedence unless they are all the same. Integers are sRGB codes of 8 bits, or of 16 if some
-/// exceed 255. Floats are linear light if none exceeds 1, or else such codes.
+/// Faces may have colours, `red green blue` with or without `alpha`; colours of vertices take
+/// precedence unless all of them are the same. Integers are sRGB codes of 8 bits, or of 16 bits if
+/// some exceed 255. Floats are linear light if none exceeds 1, else sRGB codes like integers.
 ///
 /// The images (PNG, JPEG, BMP or TGA beside the file) that comments `TextureFile` name are the
 /// materials. `texnumber` of a face is the index of its material, 0 if absent. Images that cannot
@@ -138,8 +139,8 @@ fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
     triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
 }
 
-/// Keeps either the colours of vertices or those of faces: those of vertices, as they are finer,
-/// unless they are all the same, as programs write such ones unasked.
+/// Keeps either the colours of vertices or those of faces. Colours of vertices are finer, so they
+/// are kept unless all are the same: programs write a single colour for all vertices unasked.
 fn choose_colors(points: &mut Points, faces: &mut Triangles) {
     if faces.colors.is_none() {
         return;
@@ -169,7 +170,7 @@ fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) ->
         let texture = images.read(&path, false, &mut mesh.notes)?;
         materials.push(Material { image: texture.is_some().then_some(path), name, diffuse: [1.0; 4], texture });
     }
-    // Without any image, the colours of the vertices show.
+    // If no image can be read, the colours of the vertices are drawn.
     let painted = mesh.texture.is_some() && materials.iter().any(|material| material.texture.is_some());
     mesh.material = painted.then_some(numbers);
     mesh.materials = materials;
@@ -207,7 +208,7 @@ pub fn textures_of_hybrid(path: &Path) -> Option<Vec<PathBuf>> {
     comments.hybrid.then(|| comments.textures.iter().map(|name| beside(folder, name)).collect())
 }
 
-/// The path of a file that a header names, with the separators of Windows or others.
+/// The path of a file that a header names. The name may have Windows backslashes.
 fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
 }
@@ -241,8 +242,8 @@ fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
     }
 }
 
-/// Reads the vertices, the triangles, whose vertex indices are valid, and the names of textures.
-/// Colours of vertices stay as they are in the file.
+/// Reads the vertices, the triangles and the names of textures, and checks the vertex indices of
+/// triangles. Colours of vertices stay as they are in the file.
 fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

@@ -1,5 +1,5 @@
-//! Surfel rows of equal length in a file, readable from any thread and at any index: those of a
-//! binary PLY file, or of an unnamed temporary file.
+//! Rows of surfels, all of equal length, that any thread can read at any index. They are in a
+//! binary PLY file, or in an unnamed temporary file.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -40,15 +40,17 @@ pub struct Rows {
     /// The properties of rows that are written; None for an input.
     written: Option<Properties>,
     comments: Comments,
-    /// The meaning of the numbers of colours.
+    /// The rules that decide what colour numbers mean.
     rules: ColorRules,
 }
 
 impl Rows {
-    /// Opens the vertex rows of a binary PLY file. Returns None for any other file, and where a
-    /// vertex is more or less than a disk: for meshes, Gaussians, texture coordinates, files with
-    /// levels of detail or drawn beside a mesh, and vertices without half-axes that lack normals or
-    /// radii.
+    /// Opens the vertex rows of a binary PLY file. Returns None for any other file, and for a file
+    /// whose vertices are not merely disks:
+    ///
+    /// - meshes, Gaussians, and vertices with texture coordinates;
+    /// - files with levels of detail, and files that are drawn together with a mesh;
+    /// - vertices without half-axes that lack normals or radii.
     ///
     /// # Errors
     ///
@@ -101,8 +103,8 @@ impl Rows {
         }))
     }
 
-    /// Creates an empty array of rows with these properties in an unnamed file in `folder`, which
-    /// the system deletes when this is dropped; errors name it `path`.
+    /// Creates an empty array of rows with these properties in an unnamed file in `folder`. The
+    /// system deletes the file when the array is dropped. Errors call the file `path`.
     ///
     /// # Errors
     ///
@@ -191,8 +193,8 @@ impl Rows {
         read.map(|(points, _)| points).map_err(|fault| fault.of(&self.path))
     }
 
-    /// Decides what the numbers of colours mean in the files of one scene, together. Reads all rows
-    /// of the files whose layout leaves it open.
+    /// Decides what colour numbers mean, from all `files` of one scene together. Reads all rows of
+    /// each file whose layout does not decide it.
     ///
     /// # Errors
     ///

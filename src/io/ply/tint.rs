@@ -33,7 +33,7 @@ impl Tint {
             return Self::Codes;
         }
         let widest = color.into_iter().max_by_key(|scalar| (scalar.is_float(), scalar.size()));
-        // Byte channels beside wider ones are judged with these.
+        // Byte colours beside a wider alpha are interpreted like 16-bit integers.
         let of_color = match widest.map_or(Number::Byte, number) {
             Number::Byte => Number::WORD,
             wider => wider,
@@ -42,14 +42,15 @@ impl Tint {
     }
 }
 
-/// An 8-bit code. A negative number is a code above 127 that was stored as a signed byte.
+/// Converts a number to an 8-bit code. A negative number is a code above 127 that was stored as a
+/// signed byte.
 pub(super) fn code(value: f64) -> u8 {
     // The casts saturate at the ends of the range.
     if value < 0.0 { (value as i8).cast_unsigned() } else { value as u8 }
 }
 
-/// A number of a colour whose range is not known yet. Negative numbers of signed bytes and 16-bit
-/// integers are codes that were stored as signed.
+/// Converts a colour number whose range is not known yet. Negative numbers of signed bytes and
+/// 16-bit integers are codes that were stored as signed.
 pub(super) fn number(value: f64, scalar: Scalar) -> f32 {
     match scalar {
         Scalar::I8 if value < 0.0 => (value + 256.0) as f32,

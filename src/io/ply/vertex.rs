@@ -38,7 +38,7 @@ pub(super) struct Layout {
     alpha: Option<usize>,
     tint: Tint,
     pub(super) intensity: Option<usize>,
-    /// epsplat wrote the file, so the range of its colours is known without those of other files.
+    /// epsplat wrote the file, so the range of its colours is known without looking at other files.
     own: bool,
     texture: Option<[usize; 2]>,
     texture_number: Option<usize>,
@@ -51,7 +51,8 @@ pub(super) struct Layout {
 /// Properties of a node beside its ellipse and its colour ([`TreeRow`]).
 pub(super) const NODE_NAMES: [&str; 4] = ["cone", "first", "count", "leaf"];
 
-/// Whether an element is the nodes of levels of detail: other programs may have another `node`.
+/// Whether an element is the nodes of levels of detail. Other programs may write another element
+/// `node`.
 pub(super) fn is_tree(element: &Element) -> bool {
     let has = |name: &str| element.properties.iter().any(|property| property.name == name);
     element.name == "node" && ["x", "y", "z", "sx", "tz", "radius"].into_iter().chain(NODE_NAMES).all(has)
@@ -236,7 +237,7 @@ pub(super) struct Vertices<'a> {
 }
 
 impl<'a> Vertices<'a> {
-    /// Reserves memory for `rows` points; the caller limits them by the length of the file.
+    /// Reserves memory for `rows` points; the caller limits this number by the length of the file.
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
         let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -327,7 +328,7 @@ impl<'a> Vertices<'a> {
             self.texture_slopes.extend((0..rows).map(slopes));
         }
         if let Some([cone, first, count, leaf]) = layout.node {
-            // The casts turn invalid numbers into other ones, with which the tree fails its check.
+            // The casts turn invalid numbers into integers with which the tree fails its check.
             self.rows.extend((0..rows).map(|row| TreeRow {
                 cone: value(cone, row) as f32,
                 first: value(first, row) as u32,

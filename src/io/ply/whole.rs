@@ -8,7 +8,8 @@ use glam::DVec3;
 /// The name of the element.
 pub(super) const ELEMENT: &str = "scene";
 
-/// Its properties, all `double`: boxes and colours as minimum and maximum, flags last.
+/// The properties of the element, all `double`: boxes and colours as minimum and maximum, flags
+/// last.
 const NAMES: [&str; 44] = [
     "origin_x",
     "origin_y",
@@ -65,7 +66,7 @@ pub(super) fn lines() -> String {
     format!("element {ELEMENT} 1\n{properties}")
 }
 
-/// Whether an element is exactly this one.
+/// Whether an element has the name, row and properties of this one.
 pub(super) fn is_whole(element: &Element) -> bool {
     let is = |(property, name): (&Property, &str)| property.name == name && property.kind == Kind::Scalar(Scalar::F64);
     element.name == ELEMENT

@@ -112,8 +112,8 @@ pub struct Properties {
 
 impl Properties {
     /// The properties with which `points` are written without loss: `double` if a coordinate is not
-    /// an f32, `alpha` if one is not 1. With half-axes, normals and radii are written too, for
-    /// programs that know only those.
+    /// an f32, and `alpha` beside 8-bit colours only if some alpha is not 1. With half-axes,
+    /// normals and radii are written too, for programs that know only those.
     pub fn of(points: &Points) -> Self {
         Self {
             double_coordinates: points.positions.iter().flatten().any(|c| f64::from(*c as f32) != *c && !c.is_nan()),
@@ -290,8 +290,8 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     written
 }
 
-/// Writes `count` rows, of which `encode` appends the bytes. All threads encode some blocks while
-/// those before them are written.
+/// Writes `count` rows; `encode` appends the bytes of one row. All threads encode the next blocks
+/// while the previous blocks are written.
 pub(super) fn write_rows(
     out: &mut (impl Write + Send),
     count: usize,

@@ -12,12 +12,13 @@ use crate::io::Mesh;
 use crate::io::atomic::write_whole;
 use crate::progress::Progress;
 
-/// Corners that agree in all of position, normal and colour, to the bit, share a vertex.
+/// The bits of position, normal and colour of a corner. Corners with equal keys share a vertex.
 type Key = ([u64; 3], [u32; 3], [u32; 4]);
 
-/// Writes the triangles of `mesh`, whose arrays must be consistent ([`Mesh::check`]), so that
-/// [`read_mesh`](super::read_mesh) returns them: with normals, and with colours in linear light,
-/// including those of materials.
+/// Writes the triangles of `mesh` so that [`read_mesh`](super::read_mesh) returns them.
+///
+/// Normals are written too, and colours in linear light, including those of materials. The arrays
+/// of the mesh must be consistent ([`Mesh::check`]).
 ///
 /// `images` are names of files beside the written one, one for each material that has an image, in
 /// the order of materials. Each must hold the image times the diffuse colour

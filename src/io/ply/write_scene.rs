@@ -17,7 +17,7 @@ use crate::scene::{Colors, Hierarchy, Scene, Whole};
 use crate::{Progress, Result};
 
 /// Writes the surfels of `scene` and their levels of detail, so that [`read`](super::read) returns
-/// them; `beside` is a mesh that they are drawn beside.
+/// them; `beside` is a mesh that is drawn together with the surfels.
 ///
 /// # Errors
 ///
@@ -82,7 +82,7 @@ pub(crate) fn write_kept(
 pub(super) struct Head<'a> {
     pub properties: Properties,
     pub count: u64,
-    /// A mesh that the surfels are drawn beside.
+    /// A mesh that is drawn together with the surfels.
     pub beside: Option<&'a Path>,
     /// The properties of nodes, and their number.
     pub nodes: Option<(Properties, u64)>,
@@ -183,18 +183,18 @@ impl Nodes {
         nodes.fold(|| none, |all, (index, node)| all.with(node, low(index))).reduce(|| none, Self::both)
     }
 
-    /// The same with the properties that another node needs.
+    /// Adds the properties that another node needs.
     pub fn with(self, node: &Node, low: [f32; 3]) -> Self {
         Self {
             double: self.double || needs_double(self.position(node, low)),
             caps: self.caps || !node.cap.is_flat(),
-            // Alpha below 1 needs a code below 255.
+            // Any alpha below 1 needs the property `alpha`.
             opaque: self.opaque && node.color[3] >= 1.0,
             ..self
         }
     }
 
-    /// The same with the properties that other nodes need.
+    /// Joins the properties that two sets of nodes need.
     pub fn both(self, other: Self) -> Self {
         Self {
             double: self.double || other.double,
@@ -225,7 +225,8 @@ impl Nodes {
         (self.origin + (center + low)).to_array()
     }
 
-    /// Appends the bytes of a node; `low` is its centre less the one in f32, world units.
+    /// Appends the bytes of a node; `low` is its centre minus the centre rounded to f32, world
+    /// units.
     pub fn encode(&self, node: &Node, low: [f32; 3], rows: &mut Vec<u8>) {
         let color = if self.coded { Color::Srgb8(srgb8(node.color)) } else { Color::Linear(node.color) };
         let vertex = Vertex {

@@ -1,4 +1,4 @@
-//! Rows of branches: the data that they store per node, and their conversion to the device's
+//! The rows of a branch: the data that a branch stores per node, and its conversion to the device's
 //! layout.
 
 use glam::DVec3;
@@ -17,8 +17,8 @@ pub struct Row {
     pub(super) first: u32,
     /// [`TreeNode::below`].
     pub(super) below: u32,
-    /// Whether all children of its node are in this branch, so that they may be judged together
-    /// ([`TreeNode::children`]).
+    /// Whether all children of the row's node are in the same branch, so that they may be judged
+    /// together ([`TreeNode::children`]).
     pub(super) together: bool,
 }
 
@@ -31,7 +31,7 @@ impl Branch {
         TreeNode { center: surfel.center, radius, first, below, children, cone }
     }
 
-    /// The place in the scene of the only surfel of a row's node, if that is a leaf of one surfel.
+    /// The index in the scene of the surfel of a row that is a leaf of one surfel; else `None`.
     pub fn only_surfel(&self, row: usize) -> Option<u32> {
         let Row { first, below, .. } = self.nodes[row];
         (below == LEAF << KIND_SHIFT | 1).then(|| self.surfels.start + first)
@@ -41,8 +41,9 @@ impl Branch {
 /// The value of [`TreeNode::children`] for a node whose children are judged one by one.
 pub(super) const ONE_BY_ONE: f32 = -1.0;
 
-/// The largest radius of an inner node's children, except leaves of one surfel, if the node's ball
-/// holds all their centres. Otherwise the children are judged one by one.
+/// The largest ball radius of an inner node's children; leaves of one surfel do not count.
+///
+/// Returns [`ONE_BY_ONE`] if the centre of some child lies outside the node's ball.
 fn children_of(tree: &Hierarchy, number: u32) -> f32 {
     let node = &tree.nodes[number as usize];
     let center = |number: u32| {

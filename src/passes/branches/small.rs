@@ -5,14 +5,15 @@ use super::MOST_OF_LEAF;
 use super::row::{COUNT_MASK, Row};
 use crate::gpu::layout::{JUDGED, WORKGROUP};
 
-/// The rounds of all its loops after which llvmpipe ends an invocation, whatever is left to do.
+/// The total rounds of all loops of an invocation after which llvmpipe ends it, even if it is not
+/// done.
 pub(super) const MOST_ROUNDS: u64 = 65_535;
 
 /// The most rounds in which an invocation judges and spreads its nodes of a level, if none has more
 /// than `below` surfels or children.
 ///
-/// Each node takes one round for each of these, and at most nine for reaching it, the ends of
-/// loops, and sums.
+/// Each node takes one round per surfel or child, and at most nine more to reach the node, to end
+/// loops, and to sum.
 pub(super) const fn rounds_of(below: u32) -> u64 {
     JUDGED as u64 * (below as u64 + 9)
 }
@@ -31,7 +32,7 @@ pub(super) struct Small {
 }
 
 impl Small {
-    /// Starts with a branch of so many roots, which one invocation visits.
+    /// Starts with a branch of `roots` roots: one invocation visits them all, in one round each.
     pub fn of(roots: u64) -> Self {
         Self { levels: 0, rounds: roots, ended: false }
     }

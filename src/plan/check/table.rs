@@ -1,4 +1,4 @@
-//! The rows: what does not go together, and what to do instead.
+//! The rows of rejected combinations, each with what to do instead.
 
 use super::{Clash, SceneClash};
 use crate::plan::{Accumulator, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, Settings};
@@ -16,7 +16,8 @@ fn is_composited(options: &Settings) -> bool {
     options.composite != Composite::Opaque
 }
 
-/// Whether the rasteriser, if it draws, finds the nearest fragment as the kernels do.
+/// Whether nearest fragments are found by exact depths: always, except with the rasteriser's own
+/// depth test.
 fn has_exact_depths(options: &Settings) -> bool {
     options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact)
 }
@@ -31,12 +32,12 @@ fn has_tail(options: &Settings) -> bool {
     last && options.tail == Tail::Sum
 }
 
-/// Whether triangles are among what is drawn.
+/// Whether the scene has triangles.
 fn has_triangles(facts: &Facts) -> bool {
     facts.mesh.triangles > 0
 }
 
-/// Options that clash in any scene.
+/// Combinations of options that are rejected for every scene.
 pub(super) const OPTIONS: [Clash; 28] = [
     Clash {
         applies: |options, _| options.facing.is_some() && (is_lit(options) || options.maps.has(Map::Normal)),
@@ -172,7 +173,7 @@ pub(super) const OPTIONS: [Clash; 28] = [
     },
 ];
 
-/// Options that no tiles draw.
+/// Options that tiles cannot draw.
 pub(super) const TILES: [Clash; 3] = [
     Clash {
         applies: |options, _| tiles_asked(options) && is_composited(options),
@@ -224,7 +225,7 @@ pub(super) const TEXTURES: [Clash; 3] = [
     },
 ];
 
-/// Scenes that their options do not fit.
+/// Combinations of scenes and options that are rejected.
 pub(super) const SCENES: [SceneClash; 12] = [
     SceneClash {
         applies: |facts, options, _| options.cull == Cull::Back && !facts.oriented,
@@ -236,7 +237,7 @@ pub(super) const SCENES: [SceneClash; 12] = [
         sentence: "the scene has no levels of detail: leave --lod and --splats out, or make some with epsplat lod",
     },
     SceneClash {
-        // A scene may say how it is composited, so this is asked where both are known.
+        // The default composite depends on the scene, so this is checked when the scene is known.
         applies: |_, options, _| {
             options.maps.has(Map::Surfaces) && (!is_composited(options) || options.composite.is_order_free())
         },

@@ -1,11 +1,10 @@
 //! Generated surfaces as Gaussian surfels, whose spherical harmonics approximate shading by a light
-//! beside the eye.
+//! at the eye.
 //!
-//! A surface of albedo a, seen along d with the unit normal n, has the colour
-//! `a (0.25 + 0.75 c) + 0.3 c^8` with `c = max(0, -d . n)`. It is expanded in spherical harmonics
-//! up to degree 3: `c^s = sum over l of A_l sum over m of Y_lm(n) Y_lm(-d)`, where, by Funk and
-//! Hecke, `A_l = 2 pi` times the integral over t from 0 to 1 of `t^s P_l(t)`, and P_l is Legendre's
-//! polynomial.
+//! A surface of albedo a, seen along d with the unit normal n, has the colour `a (0.25 + 0.75 c) +
+//! 0.3 c^8` with `c = max(0, -d . n)`. It is expanded in spherical harmonics up to degree 3: `c^s =
+//! sum over l of A_l sum over m of Y_lm(n) Y_lm(-d)`. By Funk and Hecke, `A_l = 2 pi` times the
+//! integral over t from 0 to 1 of `t^s P_l(t)`, where P_l is Legendre's polynomial.
 
 use std::f64::consts::PI;
 
@@ -57,7 +56,7 @@ pub fn gaussians(shape: Shape, count: u64) -> Points {
     }
 }
 
-/// A pseudorandom number in [0, 1). Multiples of an irrational number would correlate with the
+/// A hash of the index in [0, 1). Multiples of an irrational number would correlate with the
 /// lattice of the positions.
 fn scrambled(index: u64) -> f64 {
     (random::mixed((index + 1).wrapping_mul(random::STEP)) >> 11) as f64 / (1u64 << 53) as f64

@@ -11,8 +11,8 @@ use crate::scene::Colors;
 /// Generates a mesh of about `triangles` triangles with the shape's normals and colours at their
 /// corners.
 ///
-/// Triangles are counter-clockwise as seen from the side of the normals. The shells, and the two
-/// crossing squares, follow one another.
+/// Triangles are counter-clockwise as seen from the side of the normals. The mesh lists one shell,
+/// or one crossing square, after the other.
 pub fn mesh(shape: Shape, triangles: u64) -> Mesh {
     let mut mesh = Mesh { normals: Some(Vec::new()), colors: Some(Colors::Srgb8(Vec::new())), ..Mesh::default() };
     let triangles = triangles.max(2) as f64;
@@ -47,8 +47,8 @@ pub fn mesh(shape: Shape, triangles: u64) -> Mesh {
     mesh
 }
 
-/// Adds a grid of `columns` and `rows` over [0, 1] x [0, 1], without triangles that have no area.
-/// If it is `closed`, the last column joins the first.
+/// Adds a grid of `columns` x `rows` cells over [0, 1] x [0, 1], which `at` maps to the surface.
+/// Triangles without area are left out. If the grid is `closed`, the last column joins the first.
 fn add(mesh: &mut Mesh, shape: Shape, [columns, rows]: [u32; 2], closed: bool, at: impl Fn(f64, f64) -> DVec3) {
     let first = mesh.positions.len() as u32;
     let (columns, rows) = (columns.max(1), rows.max(1));

@@ -8,15 +8,15 @@ use super::{SHELLS, Shape, TORUS_MAJOR, TORUS_MINOR};
 /// is none, or the direction has no length.
 ///
 /// t is in units of the direction's length, and accurate to about 1e-12 relative to the distance
-/// from the scene, except within rounding of grazing the surface.
+/// from the scene, except where the ray grazes the surface within rounding.
 pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<f64> {
     let length = direction.length();
     if !(length.is_normal() && origin.is_finite()) {
         return None;
     }
     let direction = direction / length;
-    // The ray starts at its point nearest to the scene's centre, so that a far eye costs no digits
-    // but those of t.
+    // Intersections are computed relative to the ray's point nearest to the scene's centre, so a
+    // distant eye costs digits only in the final t.
     let shift = -origin.dot(direction);
     let nearest = origin + direction * shift;
     let first = |t: f64| t + shift > 0.0;
@@ -51,9 +51,9 @@ fn square(start: DVec3, direction: DVec3) -> Option<f64> {
 /// line's point nearest to the world origin, `direction` a unit vector.
 ///
 /// With q = |p|^2 + R^2 - r^2 the torus is q^2 = 4 R^2 (x^2 + y^2), a quartic in t. The roots of
-/// its derivative, found in the same way, separate its roots, so none is lost and none needs an
-/// initial guess. Up to three Newton steps on the signed distance then remove the rounding error of
-/// the coefficients.
+/// the quartic's derivative, found in the same way, separate the roots of the quartic. So no root
+/// is lost, and no initial guess is needed. Up to three Newton steps on the signed distance then
+/// remove the rounding error of the coefficients.
 fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
     let reach = TORUS_MAJOR + TORUS_MINOR;
     let half_chord_squared = reach * reach - start.length_squared();

@@ -7,7 +7,7 @@ const WORDS: &str = "THE NEAREST POINT WINS ";
 /// The number of lines, from the top; the first is half as high as the square.
 const LINES: i32 = 8;
 
-/// Rows and columns of a letter's cell; the last of each are empty.
+/// Rows and columns of a letter's cell; the last row and the last column are empty.
 const CELL: (f64, u64) = (8.0, 6);
 
 /// The rows of a letter, five columns each, the left one in the highest bit.

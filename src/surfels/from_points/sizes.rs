@@ -73,8 +73,8 @@ impl Sizes {
         Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
     }
 
-    /// The half-axes of points with the normals `point_normals`, None for disks, and the longer of
-    /// them, world units.
+    /// Returns the half-axes of points with the normals `point_normals` (None for disks), and the
+    /// lengths of the longer half-axes, world units.
     pub(super) fn of_points(
         &self,
         (distinct, graph): (&DistinctPositions, &NeighbourGraph),
@@ -108,9 +108,8 @@ impl Sizes {
         if radius > 0.0 { self.world(radius) } else { LONE_RADIUS }
     }
 
-    /// The half-axes at a position for a point with the normal `normal`, world units. Even if that
-    /// is not the position's own normal, they are limited to the length of the position's own
-    /// ellipse.
+    /// The half-axes at a position for a point with the normal `normal`, world units. The length of
+    /// the position's own ellipse limits them, even if `normal` is not the position's own normal.
     fn ellipse(
         &self,
         (distinct, graph): (&DistinctPositions, &NeighbourGraph),

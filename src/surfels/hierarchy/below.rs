@@ -49,12 +49,13 @@ pub(super) struct Child<'a, Key> {
     pub node: &'a Node,
     /// The part of its centre beyond f32.
     pub low: [f32; 3],
-    /// The number of surfels below it. It may be 0 unless the child is right below the node that is
-    /// being computed.
+    /// The number of surfels below the child. It is reliable only for direct children of the node
+    /// that is being computed, else it may be 0.
     pub surfels: u64,
 }
 
-/// A tree in which all nodes below those that are being computed are known.
+/// A tree that is being built from the leaves up: all nodes below the ones being computed are
+/// finished.
 pub(super) trait Below: Sync {
     /// Identifies a node.
     type Key: Copy + Send + Sync;
@@ -70,7 +71,7 @@ pub(super) trait Below: Sync {
 }
 
 /// A node as it is stored while the tree is built: with the part of its centre beyond f32, or
-/// without it where no centre has one.
+/// without that part if no centre of the scene has one.
 pub(super) trait Stored: Copy + Send + Sync + From<NodeAndLow> {
     /// The node, and the part of its centre beyond f32.
     fn told(&self) -> (&Node, [f32; 3]);
@@ -94,12 +95,12 @@ impl From<NodeAndLow> for Node {
     }
 }
 
-/// A tree in memory whose nodes below some level are known.
+/// A tree in memory whose nodes below some level are finished.
 #[derive(Clone, Copy)]
 pub(super) struct InMemory<'a, N> {
     pub scene: &'a Scene,
     pub tree: &'a Octree,
-    /// The index of the first known node; `nodes` starts with it.
+    /// The index of the first finished node; `nodes` starts with it.
     pub first: usize,
     pub nodes: &'a [N],
 }
@@ -111,7 +112,7 @@ impl<N> InMemory<'_, N> {
 }
 
 impl<N: Stored> Below for InMemory<'_, N> {
-    /// The index of its set.
+    /// The index of the node's set.
     type Key = u32;
 
     fn is_leaf(&self, of: u32) -> bool {

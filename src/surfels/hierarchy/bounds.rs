@@ -20,17 +20,19 @@ const MANY: u64 = 1 << 16;
 /// Weight of the root mean square distance of a node's points from its cap, which is added in
 /// quadrature to the radius of its sphere: points off the cap are the error of the node's picture.
 ///
-/// For equal numbers of splats, the pictures of the Dragon, igea and autzen come nearer to those of
-/// all surfels by 1.1, 0.8 and 0.2 dB with a weight of 10, by 1.5, 1.2 and 0.0 dB with 16, and by
-/// 1.9, 2.0 and -0.4 dB with 30: 16 is about the largest weight that makes none of them worse.
+/// For equal numbers of splats, this weight brings pictures of the Dragon, igea and autzen nearer
+/// to those of all surfels. The gains are 1.1, 0.8 and 0.2 dB with a weight of 10; 1.5, 1.2 and 0.0
+/// dB with 16; and 1.9, 2.0 and -0.4 dB with 30. So 16 is about the largest weight that makes none
+/// of them worse.
 const OFF_CAP: f64 = 16.0;
 
-/// The largest factor by which points off the cap enlarge a node's sphere. It is limited as the
-/// sphere also decides whether the node is out of view: a node is divided at most one level sooner.
+/// The largest factor by which points off the cap enlarge a node's sphere. It is limited because
+/// the sphere also decides whether the node is out of view. With this limit, a node is divided at
+/// most one level sooner.
 const MOST_LARGER: f64 = 2.0;
 
-/// Returns the node of surfel `index` of `scene`, which has the sums `sums`, and the part of its
-/// centre beyond f32.
+/// Returns the node of the single surfel `index` of `scene`, whose sums are `sums`, and the part of
+/// the node's centre beyond f32.
 pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) -> Made {
     let Disk { surfel, cap, .. } = Disk::of(scene, index);
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -47,10 +49,10 @@ pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) ->
     (node, scene.low.get(index).copied().unwrap_or_default())
 }
 
-/// Returns the node of the surfels below `of`, which have these sums on `lattice`, and the part of
-/// its centre beyond f32.
+/// Returns the node with the key `of`, and the part of its centre beyond f32. `sums` are the sums
+/// of its surfels, with moments on `lattice`.
 ///
-/// The caller sets its `first`, `count` and `leaf`.
+/// The caller sets the node's `first`, `count` and `leaf`.
 pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: &B, known: &Known) -> Made {
     let Known { origin, oriented, scales, .. } = known;
     let (normal, sided) = sums.normal(*oriented);
@@ -94,8 +96,7 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     (node, low.to_array())
 }
 
-/// Bounds all `surfels` below a node. Nodes that cannot change the result are skipped, so it equals
-/// the bounds over all surfels.
+/// Bounds all `surfels` below a node. Nodes that cannot change the result are skipped.
 fn bound<B: Below>(of: &Bounding, (key, surfels): (B::Key, u64), below: &B, sided: bool) -> Bound {
     if below.is_leaf(key) || surfels <= MANY {
         return bound_from(of, key, below, sided);
@@ -117,7 +118,7 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
         // The child with the largest rim is last, as `open` is a stack.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
-    // The farthest disk comes first: after it most of the others cannot change the bounds.
+    // The farthest disk comes first, because most other disks cannot change the bounds after it.
     let mut disks: Vec<(f64, Disk)> = Vec::new();
     let mut look = |key: B::Key, most: &Bound, all: &mut Bound| {
         if most.rim <= all.rim {
@@ -130,7 +131,7 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
         }
         disks.iter().for_each(|(_, disk)| *all = all.both(of.of(disk, all, most)));
     };
-    // Without sides a node's cone is -1, so cosines are not needed.
+    // If normals have no side, a node's cone is -1, so cosines are not needed.
     let asked = |most: Bound| if sided { most } else { Bound { cosine: 1.0, ..most } };
     if below.is_leaf(key) {
         look(key, &asked(Bound::ALL), &mut all)

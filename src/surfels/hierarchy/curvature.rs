@@ -17,14 +17,14 @@ use crate::surfels::eigen::Symmetric3;
 /// is smaller: 76 degrees.
 const LEAST_COSINE: f64 = 0.25;
 
-/// Added to the diagonal of the normal equations, as a fraction of the sum of squares: points on a
-/// line determine nothing across it.
+/// Added to the diagonal of the normal equations, as a fraction of the sum of squares, because
+/// points on a line do not determine the curvature across the line.
 const RIDGE: f64 = 1e-3;
 
 /// Nodes whose normals [align](super::sums::Sums::alignment) less than this are flat: the normals
 /// belong to no single surface, and a cap fitted to them would shade to a speck of light. Of the
-/// values from 0.7 to 0.95, this one brings the Dragon's nodes at 4 to 64 px nearest to all
-/// surfels.
+/// values from 0.7 to 0.95, this one brings pictures of the Dragon's nodes at 4 to 64 px nearest to
+/// the picture of all surfels.
 pub(super) const LEAST_ALIGNMENT: f64 = 0.9;
 
 /// The heights of a plane.
@@ -83,10 +83,10 @@ pub(super) fn mean_height(heights: Heights, covariance: Symmetric3, plane: [DVec
 /// A lower bound of the root mean square distance of points from a cap with these heights, along
 /// its normal, world units.
 ///
-/// Their variance along the normal, by the covariance `all`, is reduced by `tr (H C)² / 2`, the
-/// variance of the cap's heights H over a normal distribution with the covariance C of `centers`.
-/// The latter is more than over a disk or a square, so nothing that the cap shows is counted. A cap
-/// that bends away from points in a plane is not detected.
+/// The points' variance along the normal, from the covariance `all`, is reduced by `tr (H C)² / 2`.
+/// This is the variance of the cap's heights H over a normal distribution with the covariance C of
+/// `centers`. It exceeds the variance over a disk or a square, so the result counts no distance
+/// that the cap explains. A cap that bends away from points in a plane is not detected.
 pub(super) fn off_cap(heights: Heights, [all, centers]: [Symmetric3; 2], plane: [DVec3; 3]) -> f64 {
     let [.., normal] = plane;
     let shown = matrix(heights) * in_plane(centers, plane);
@@ -177,8 +177,8 @@ mod tests {
     #[test]
     fn what_lies_off_a_cap_counts() {
         let root = |height: &dyn Fn(f64, f64) -> (f64, DVec2)| build(field(height, true), &()).unwrap().1.nodes[0];
-        // The reach of the node's own ellipse, which equals that of the surfels below it where its
-        // ellipse ends there.
+        // The reach of the node's own ellipse and cap. It equals the reach of the surfels below the
+        // node where the ellipse bounds them tightly.
         let own = |node: &Node| f64::from(node.surfel.radius()) + node.cap.highest();
         let plane = root(&|_, _| (0.0, DVec2::ZERO));
         assert!(f64::from(plane.radius) < 1.001 * own(&plane), "{} {}", plane.radius, own(&plane));

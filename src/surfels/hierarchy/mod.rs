@@ -67,8 +67,8 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))
 }
 
-/// Puts the scene in the order of the tree, whose points are `points`. Returns it with the places
-/// of the points.
+/// Puts the scene in the order of the tree, whose points are `points`. Returns the scene with the
+/// lattice coordinates (places) of the points.
 fn sorted(tree: &Octree, mut points: Vec<Element>, scene: Scene) -> (Scene, Vec<i32>) {
     in_order(tree, &mut points, &scene);
     let order: Vec<u32> = points.par_iter().map(|element| element.index).collect();
@@ -97,8 +97,8 @@ fn scene_as_in_a_file(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Sorts the points of each leaf by place and content, so that their order does not depend on that
-/// of the scene.
+/// Sorts the points of each leaf by place and content, so that their order does not depend on the
+/// order of the scene's surfels.
 fn in_order(tree: &Octree, points: &mut [Element], scene: &Scene) {
     let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
     leaves.par_sort_unstable_by_key(|set| set.first);

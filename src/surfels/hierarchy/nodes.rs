@@ -87,7 +87,7 @@ impl Sets<'_> {
         Sums::of(&self.places[set.range()], self.scene, set.first as usize, &self.known.scales)
     }
 
-    /// Computes the node of set `number`; `nodes` holds the known nodes from index `first` on.
+    /// Computes the node of set `number`; `nodes` holds the finished nodes from index `first` on.
     fn made<N: Stored>(&self, number: u32, sums: &Sums, (first, nodes): (usize, &[N])) -> Made {
         let lattice = &self.tree.lattices[self.tree.sets[number as usize].lattice as usize];
         let below = InMemory { scene: self.scene, tree: self.tree, first, nodes };
@@ -104,7 +104,8 @@ impl Sets<'_> {
         (Node { first: set.first, count: set.range().len() as u32, ..node }, low).into()
     }
 
-    /// Computes the node of a divided set; `nodes.1` holds the known nodes from index `nodes.0` on.
+    /// Computes the node of a divided set; `nodes.1` holds the finished nodes from index `nodes.0`
+    /// on.
     fn inner<N: Stored>(&self, number: u32, sums: &Sums, nodes: (usize, &[N])) -> N {
         let set = &self.tree.sets[number as usize];
         let (node, low) = self.made(number, sums, nodes);

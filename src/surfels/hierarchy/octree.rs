@@ -20,7 +20,8 @@ const MANY: usize = 1 << 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Element {
-    /// Its place on the lattice of the smallest set that contains it.
+    /// The point's lattice coordinates, called its place, on the lattice of the smallest set that
+    /// contains it.
     pub place: [i32; 3],
     /// The index of its surfel.
     pub index: u32,
@@ -177,8 +178,8 @@ fn divided(own: &mut [Element], deepest: bool, position: &(impl Fn(u32) -> DVec3
 
 /// The octant of a place in a set of `count` points whose places add up to `sum`, one bit per axis.
 ///
-/// Bit k is set if `count q_k > Σ q_k`, which is exact. Places at the mean are low, so a set of
-/// different places always has at least two octants.
+/// Bit k is set if `count q_k > Σ q_k`, which is exact. A coordinate at the mean gets the bit 0, so
+/// a set of different places always has at least two octants.
 pub(super) fn octant(place: [i32; 3], count: i64, sum: [i64; 3]) -> usize {
     (0..3).fold(0, |octant, k| octant | usize::from(count * i64::from(place[k]) > sum[k]) << k)
 }

@@ -22,15 +22,15 @@ const ROUNDED: f64 = 1.0 + 1e-14;
 /// determines its angle poorly.
 const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
 
-/// Added to the tangent of a cone's angle for the same reason, and because a node's normal is
-/// rounded.
+/// Added to the tangent of a cone's angle, because near 1 a cosine determines its angle poorly, and
+/// because a node's normal is rounded.
 const TURNED_MORE: f64 = 2e-3;
 
 /// Subtracted from a cosine before it is rounded to f32.
 const ROUNDED_OFF: f64 = 1e-7;
 
-/// A disk is also projected along its own normal, or along a direction that leans from the node's
-/// normal by at most this tangent: 76 degrees.
+/// A disk is also projected along its own normal. If that normal leans from the node's normal by a
+/// larger tangent than this (76 degrees), a direction between both with this tangent is used.
 const STEEPEST: f64 = 4.0;
 
 /// The orientation and the aspect ratio of an ellipse: two vectors along its half-axes in a node's
@@ -139,23 +139,23 @@ pub(super) fn longest([ss, st, tt]: [f64; 3]) -> f64 {
 
 /// The largest distance from 0 to a point of the ellipse `at + u cos φ + v sin φ`, or hardly more.
 ///
-/// Its square is the maximum of `|a + M w|²` over the unit circle, and by duality the minimum of
-/// `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1, where λ_i are the eigenvalues of `MᵀM`, largest
+/// Its square is the maximum of `|a + M w|²` over the unit circle. By duality, this is the minimum
+/// of `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1. Here λ_i are the eigenvalues of `MᵀM`, largest
 /// first, and b is `Mᵀa` along its eigenvectors. Any such λ gives an upper bound; the tightest is
 /// where the derivative is 0.
 fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
     let (mean, half) = (0.5 * (uu + vv), length(0.5 * (uu - vv), uv));
     let [first, second] = [mean + half, mean - half];
-    // Both vectors are along the eigenvector; the longer one has not cancelled. For a circle any
-    // direction is an eigenvector.
+    // Both vectors are along the eigenvector; the longer one has lost no digits to cancellation.
+    // For a circle any direction is an eigenvector.
     let (one, other) = (DVec2::new(first - vv, uv), DVec2::new(uv, first - uu));
     let longer = if one.length_squared() > other.length_squared() { one } else { other };
     let axis = longer.try_normalize().unwrap_or(DVec2::X);
     let b = DVec2::new(u.dot(at), v.dot(at));
     let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
     let (b1, b2) = (b.x * b.x, b.y * b.y);
-    // Two Newton steps toward the root of the derivative, from beyond it.
+    // Two Newton steps toward the root of the derivative, from above the root.
     let least = first + b.x.abs();
     let mut lambda = first + b.length();
     for _ in 0..2 {
@@ -207,8 +207,8 @@ impl Bounding {
         bound
     }
 
-    /// The [`Bound::rim`] of a surfel with the unit normal `own`; any smaller value if it does not
-    /// exceed `known`.
+    /// The [`Bound::rim`] of a surfel with the unit normal `own`. If it does not exceed `known`,
+    /// any smaller value may be returned.
     fn rim(&self, Disk { surfel, center, cap }: &Disk, own: DVec3, known: f64) -> f64 {
         let offset = center - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -240,10 +240,10 @@ impl Bounding {
     /// How far a point moves in (u, v), for each unit of height over the node's cap, if it is
     /// projected along the normal `own` instead of the node's.
     ///
-    /// Projected along the node's normal alone, neighbours whose planes bend away from each other
-    /// would come apart where they are seen obliquely: each ends where the other does, but above or
-    /// below it. Projected along the disk's normal, which is the surface's, both reach the line in
-    /// which their planes meet.
+    /// With projections along the nodes' normals alone, neighbouring nodes whose planes bend away
+    /// from each other would leave a gap in oblique views: one ends directly above or below the end
+    /// of the other. With projections along the disks' normals too, which are those of the surface,
+    /// both nodes reach the line in which their planes meet.
     fn leaning(&self, own: DVec3) -> DVec2 {
         let up = own.dot(self.normal);
         let beside = (own - up * self.normal) * up.signum();

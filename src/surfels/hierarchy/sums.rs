@@ -28,10 +28,11 @@ const AXIS_ONE: f64 = (1u64 << 30) as f64;
 /// Maps the attributes of surfels to whole numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scales {
-    /// The smallest premultiplied colour, and the difference between the largest and it.
+    /// The smallest premultiplied colour. `span` is the largest minus the smallest.
     low: [f64; 4],
     span: [f64; 4],
-    /// Whether the colours of surfels are 8-bit codes, so that those of nodes are too.
+    /// Whether the colours of surfels are 8-bit codes. The colours of nodes are then rounded to
+    /// such codes too.
     coded: bool,
     /// The longest half-axis, world units.
     longest: f64,
@@ -130,8 +131,8 @@ impl Sums {
         self.moments.covariance() * (step * step)
     }
 
-    /// The covariance of the points of all disks about their mean, square world units: that of the
-    /// centres plus the mean of each disk's own, (s sᵀ + t tᵀ) / 4.
+    /// The covariance of the points of all disks about their mean, square world units: the
+    /// covariance of the centres plus the mean over the disks of (s sᵀ + t tᵀ) / 4.
     pub fn covariance(&self, lattice: &Lattice, scale: &Scales) -> Symmetric3 {
         let unit = scale.longest / AXIS_ONE;
         let mean = unit * unit / (4.0 * self.moments.count as f64);

@@ -77,7 +77,7 @@ fn a_node_has_the_mean_of_what_is_below_it() {
     }
 }
 
-/// Whether a corner certainly lies in a node's ellipse.
+/// Whether the point at `offset` certainly lies in a node's ellipse.
 ///
 /// Products of f32 numbers are exact in f64, and few f64 additions round by at most 2^-49 of the
 /// largest term; the margin of 1e-14 exceeds that.
@@ -136,8 +136,8 @@ fn nodes_hold_what_is_below_them() {
                     on_the_rim |= !shown.iter().all(|point| holds(&smaller, *point));
                 }
             }
-            // Points off the cap double the radius at most; the node of one surfel has the surfel's
-            // own.
+            // Points off the cap double the radius at most; the node of one surfel has the radius
+            // of that surfel.
             let most = if own.len() == 1 { 1.0 } else { 2.0 } * farthest * (1.0 + 1e-5);
             assert!(f64::from(node.radius) <= most, "{index}: {} {most}", node.radius);
             // The ellipse of a flat node over flat disks has no margin: it touches a rim.

@@ -1,5 +1,5 @@
-//! Ellipses with which the disks at its corners cover a triangle, and the lines at which the disks
-//! end.
+//! The ellipses of the disks at a triangle's corners, such that the disks cover the triangle, and
+//! the lines at which the disks end.
 
 use std::f64::consts::PI;
 
@@ -60,11 +60,12 @@ impl Facet {
 }
 
 /// Returns the ellipse `q q^T <= S` around a corner of a triangle, as S, such that these ellipses
-/// at all corners cover the triangle. The two `sides` go from the corner, in its plane.
+/// at all corners cover the triangle. The two `sides` go from the corner to the other corners, in
+/// the triangle's plane.
 ///
-/// An equilateral triangle is covered by disks of its circumradius at its corners. Any other is an
-/// affine image of one, and so covered by the images of those disks: with corners q_i and their
-/// mean m, `S = 2/3 sum (q_i - m)(q_i - m)^T`.
+/// An equilateral triangle is covered by disks of its circumradius at its corners. Any other
+/// triangle is an affine image of an equilateral one, and the images of those disks cover it: with
+/// corners q_i and their mean m, `S = 2/3 sum (q_i - m)(q_i - m)^T`.
 pub(super) fn wanted(facet: &Facet, [p, q]: [DVec2; 2]) -> DMat2 {
     if !facet.long {
         return DMat2::from_diagonal(DVec2::splat(facet.radius * facet.radius));
@@ -122,7 +123,7 @@ pub(super) fn lines(fan: &Fan, sides: &[[DVec2; 2]], reach: f64) -> Vec<Vec<Line
 /// The line through the two corners opposite the vertex.
 fn across([p, q]: [DVec2; 2]) -> Option<Line> {
     let normal = (q - p).perp().try_normalize()?;
-    // Counter-clockwise, the vertex is on the left.
+    // The corners are counter-clockwise, so the vertex is on the left.
     let offset = normal.dot(p);
     (offset < 0.0).then_some(Line { normal, offset, sharp: 1.0 })
 }

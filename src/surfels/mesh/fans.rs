@@ -19,8 +19,8 @@ pub(in crate::low_level::surfels) const TOLERANCE: f64 = 2e-4;
 /// surface ends, then where it continues.
 const WASTE: [f64; 2] = [2.0, 6.0];
 
-/// Fans of more triangles are always halved by angle, as otherwise the middle of a disk of a
-/// million triangles would take too long.
+/// Fans of more triangles are always halved by angle, as otherwise a vertex with a million
+/// triangles would take too long.
 const MANY: usize = 32;
 
 /// A triangle at a vertex, with its two other corners counter-clockwise as seen from outside.
@@ -59,7 +59,7 @@ impl Fan {
     }
 
     /// Returns the ratio of the ellipse's area, within the fan's angle, to the area that it must
-    /// cover, and its longer half-axis.
+    /// cover, and the length of the ellipse's longer half-axis.
     fn waste(&self, facets: &[Option<Facet>]) -> (f64, f64) {
         let facet = |corner: &Corner| Some((facets[corner.triangle as usize].as_ref()?, corner.place));
         let (x, y) = self.normal.any_orthonormal_pair();
@@ -74,8 +74,8 @@ impl Fan {
             .map_or((0.0, 0.0), |ellipse| (0.5 * angle * ellipse.square() / area, ellipse.half_axes()[0].length()))
     }
 
-    /// The mean of the normals that the file gives for its corners, if it is on the plane's side;
-    /// else the plane's normal.
+    /// The mean of the normals that the file gives for the fan's corners, if it points to the same
+    /// side as the plane's normal; else the plane's normal.
     pub fn seen_normal(&self, named: Option<&Vec<[[f32; 3]; 3]>>) -> DVec3 {
         let Some(normals) = named else { return self.normal };
         let named = |corner: &Corner| DVec3::from(normals[corner.triangle as usize][corner.place].map(f64::from));
@@ -90,7 +90,7 @@ pub(super) struct Around {
     /// The triangles of vertex v, in order, are `triangles[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     triangles: Vec<u32>,
-    /// For each side of each triangle, from the corner of the same index: what is beyond it.
+    /// For each triangle, the neighbours beyond its sides. Side k starts at corner k.
     beyond: Vec<[Beyond; 3]>,
 }
 
@@ -107,7 +107,7 @@ enum Beyond {
 
 impl Around {
     /// Finds the triangles around each of the `vertices`. Triangles without an area are ignored.
-    /// Two triangles with a common side look like one surface if they `go_on`.
+    /// `go_on` says whether two triangles with a common side look like one surface there.
     pub fn new(
         vertices: usize,
         triangles: &[[u32; 3]],
@@ -172,7 +172,7 @@ impl Around {
     /// Returns which sides of a triangle, each from the corner of the same index, are borders,
     /// edges or changes of look.
     ///
-    /// With `is_flat`, if all three are, only borders and edges count.
+    /// If `is_flat` is true and all three sides are, changes of look do not count.
     pub fn ends(&self, triangle: u32, is_flat: bool) -> [bool; 3] {
         let beyond = self.beyond[triangle as usize];
         let ends = beyond.map(|beyond| !matches!(beyond, Beyond::Surface(_)));
@@ -218,8 +218,9 @@ impl Around {
     }
 }
 
-/// Cuts a fan into parts that one disk each stands for well. It is cut if its triangles turn away
-/// from its plane, or if one ellipse would be much larger than the area that it must cover.
+/// Cuts a fan into parts, each of which one disk approximates well. A fan is cut if its triangles
+/// turn away from its plane, or if one ellipse would be much larger than the area that it must
+/// cover.
 fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     let count = fan.corners.len();
     if count < 2 {
@@ -258,7 +259,7 @@ fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     if !fan.round {
         return [cut(&fan.corners[..=sides[0]]), cut(&fan.corners[sides[0] + 1..])].concat();
     }
-    // A round fan has two cuts, and so the part between them and the rest.
+    // A round fan needs two cuts: the parts are the triangles between them, and the rest.
     let (low, high) = (sides[0].min(sides[1]) + 1, sides[0].max(sides[1]) + 1);
     let rest = [&fan.corners[high..], &fan.corners[..low]].concat();
     [cut(&fan.corners[low..high]), cut(&rest)].concat()

@@ -1,7 +1,7 @@
 //! Surfels that cover a mesh and end where its surface ends.
 //!
-//! If vertices have no normals of their own, and the colours at the corners of each triangle are
-//! equal, each triangle gets a surfel that is cut along the triangle's sides ([`triangles`]) and
+//! If vertices have no normals of their own, and each triangle has equal colours at its corners,
+//! surfels are made of triangles. Each surfel is cut along its triangle's sides ([`triangles`]) and
 //! has the triangle's look ([`skin`]). Otherwise surfels at the vertices blend their normals and
 //! colours across triangles. The triangles around a vertex form a fan, or several if the surface
 //! has an edge or a border there ([`fans`]). Each fan gets a surfel in its own plane: the smallest

@@ -3,7 +3,7 @@
 //! Surfels end where the look of triangles changes, as they do at edges: at sides between two
 //! colours or images, and at the seams of one image, where the texture coordinates of a corner
 //! differ. Within a piece of an image, a surfel has the texture coordinates of its centre and their
-//! slopes along its plane, which give those of each pixel.
+//! slopes along its plane, which determine the texture coordinates at each pixel.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use crate::surfels::build::LARGEST_PLACE;
 /// The images that surfels are painted with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::low_level::surfels) enum Painting {
-    /// None: a surfel has the mean colour of its triangles' images.
+    /// No image: a surfel has the mean colour of its triangles' images.
     Means,
     /// One image that is given for all triangles.
     Given,
@@ -30,7 +30,7 @@ pub(in crate::low_level::surfels) enum Painting {
 /// The look of a surfel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Look {
-    /// None if the surfel has the colour of its vertex, or only those of its image.
+    /// None if the surfel has the colour of its vertex, or only the colours of its image.
     pub(super) color: Option<[f32; 4]>,
     pub(super) placed: Option<Placed>,
     /// Whether the colour is the mean of an image.
@@ -141,8 +141,8 @@ impl<'a> Skin<'a> {
         }
     }
 
-    /// Whether a triangle is not painted with an image, so that a little of it past its sides is
-    /// hardly visible.
+    /// Whether a triangle is not painted with an image, so that a surfel that reaches slightly past
+    /// the triangle's sides is hardly visible.
     pub(super) fn is_flat(&self, triangle: u32) -> bool {
         self.painted(triangle as usize).is_none()
     }
@@ -222,8 +222,8 @@ fn times(color: [f32; 4], factor: Option<[f32; 4]>) -> [f32; 4] {
     factor.map_or(color, |factor| std::array::from_fn(|k| color[k] * factor[k]))
 }
 
-/// Sets the colours of a mesh's vertices to the mean look of the triangles there, which are not
-/// drawn.
+/// Sets the colour of each vertex of a mesh to the mean colour of the triangles there, because the
+/// triangles are not drawn.
 pub(in crate::low_level::surfels) fn color_vertices(points: &mut Points) {
     let Some((paint, triangles)) =
         points.faces.as_mut().and_then(|faces| Some((faces.paint.take()?, &faces.triangles)))

@@ -1,12 +1,13 @@
 //! Surfels of triangles, cut along their sides, for meshes whose triangles all look flat: nothing
 //! is blended across the sides of a triangle.
 //!
-//! A disk can end at two lines, but a triangle has three sides. The third one is bounded by an arc
-//! of the surfel's ellipse, which is flat there. In the affine image where the triangle is
-//! equilateral, with side 1 and height h, the half-axes are [`LONGER`] along the side and
-//! `h / 2 / sqrt(1 - 1 / (4 LONGER^2))` across, around the middle of the height. The ellipse then
-//! passes through the side's ends, and 0.08 h beyond its middle. The arc lies where the surface
-//! continues. A triangle with an edge or a border on every side is divided at its centroid.
+//! A disk can end at two lines, but a triangle has three sides. In place of the third side, the
+//! surfel is bounded by an arc of its ellipse, which is nearly straight there. In the affine image
+//! where the triangle is equilateral, with side 1 and height h, the half-axes are [`LONGER`] along
+//! the side and `h / 2 / sqrt(1 - 1 / (4 LONGER^2))` across, around the middle of the height. The
+//! ellipse then passes through the side's ends, and 0.08 h beyond its middle. The arc lies where
+//! the surface continues. A triangle with an edge or a border on every side is divided at its
+//! centroid.
 
 use glam::{DVec2, DVec3};
 

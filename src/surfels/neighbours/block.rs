@@ -13,8 +13,8 @@ use super::{FAN, Neighbour, NeighbourSearch, larger, smaller, squared_length};
 const BLOCK: usize = 16;
 
 /// The largest number of candidates of a block. A block with more is halved, down to searches for
-/// single positions: it lies across a jump of the Morton curve, or the guess was made where
-/// positions are farther apart.
+/// single positions. Such a block lies across a jump of the Morton curve, or the guess was made
+/// where positions are farther apart.
 const MOST_CANDIDATES: usize = 256;
 
 /// The guess is the squared distance of the last block's farthest neighbour, times this.
@@ -183,8 +183,9 @@ impl Blocks<'_> {
     }
 
     /// Returns a squared distance within which position `index` has all its nearest neighbours. The
-    /// ball of the previous position, out to its farthest neighbour, holds enough positions;
-    /// widened by the step from there, it also holds them around this one.
+    /// ball around the previous position, out to its farthest neighbour, contains enough positions.
+    /// A ball around position `index` contains them too if its radius is larger by the distance
+    /// between both positions.
     fn reach_of(&self, index: usize) -> f64 {
         /// A margin above the rounding error of the few operations below.
         const SLACK: f64 = 1.0 + 1e-12;

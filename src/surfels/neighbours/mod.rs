@@ -3,10 +3,10 @@
 //!
 //! The search uses a tree of boxes over the Morton order: eight consecutive positions form a leaf,
 //! eight consecutive boxes a node. It is built by the sort alone. Coincident, collinear or coplanar
-//! positions do no harm (a flat scan is not split across its thickness). Its lower bounds hold in
-//! floating point: every operation of [`squared_length`] is monotone, so rounding never makes a box
-//! farther than a position inside it. Equal distances are sorted by the order of the positions. The
-//! result is thus exactly the first `count` by (distance, order).
+//! positions do no harm (a flat scan is not split across its thickness). The lower bounds of
+//! distances to boxes hold in floating point: every operation of [`squared_length`] is monotone, so
+//! rounding never makes a box farther than a position inside it. Equal distances are sorted by the
+//! order of the positions. The result is thus exactly the first `count` by (distance, order).
 
 mod block;
 #[cfg(test)]

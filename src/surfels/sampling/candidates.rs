@@ -62,9 +62,9 @@ pub(super) fn candidates(
     (candidates.into_iter().flatten().collect(), places.into_iter().flatten().collect())
 }
 
-/// Spreads `count` points over a voxel's surface, as triangles and corner weights: equal steps of
-/// area through the list of its patches, and in each patch the plane lattice R2 (Roberts 2018),
-/// shifted by `shift`.
+/// Spreads `count` points over a voxel's surface, and returns their triangles and corner weights.
+/// The points proceed by equal steps of area through the list of the voxel's patches. In a patch,
+/// they follow the plane lattice R2 (Roberts 2018), shifted by `shift`.
 pub(super) fn spread(voxel: &Voxel, count: usize, shift: [f64; 3]) -> impl Iterator<Item = (u32, DVec3)> {
     /// The real root of x^3 = x + 1.
     const PLASTIC: f64 = 1.324_717_957_244_746;

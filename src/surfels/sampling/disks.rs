@@ -28,8 +28,9 @@ const STEEPEST: f64 = 1.732;
 /// and lies in many planes.
 const LONGEST: f64 = 1e12;
 
-/// The shorter half-axis is at least this fraction of the cell's largest reach. A needle-shaped
-/// cell would otherwise depend on the height terms of its neighbours' disks alone.
+/// The shorter half-axis is at least this fraction of the cell's largest reach. Without this limit,
+/// the coverage of a needle-shaped cell in oblique views would depend only on the height terms of
+/// neighbouring disks.
 const THINNEST: f64 = 0.25;
 
 /// The number of directions, evenly over half a turn, in which a cell's reach is measured.
@@ -304,7 +305,7 @@ mod tests {
                 }
             }
         }
-        // A triangle is shared by the samples of all sides if only those of other sides are near
+        // A triangle is shared by the samples of all sides if only samples of other sides are near
         // one of its corners.
         assert!((1..4).contains(&shared), "{shared}");
         assert!(filled.iter().all(|filled| *filled < 1.0 + 1e-6), "{filled:?}");

@@ -34,8 +34,8 @@ impl PartialOrd for Bid {
 /// neighbouring voxels, so the rounding is unbiased. With one u for all, a flat wall of equal
 /// voxels of 4.4 samples each would get 4 everywhere, a tenth too few.
 ///
-/// Voxels whose priority is not positive get no samples, unless there are no others: then all count
-/// as equal.
+/// Voxels whose priority is not positive get no samples. If no priority is positive, all voxels
+/// count as equal.
 pub(super) fn distribute(priorities: &[f64], count: usize) -> Vec<usize> {
     let usable = |priority: f64| if priority.is_finite() && priority > 0.0 { priority } else { 0.0 };
     let none = priorities.iter().all(|priority| usable(*priority) == 0.0);

@@ -31,8 +31,8 @@ const HIGHEST: f64 = 0.5;
 /// The cosine of 20 degrees: the common side of two triangles at a larger angle is an end.
 const EDGE: f64 = 0.939_692_620_785_908_4;
 
-/// The distance of a disk's tip past an end from the whole surface must be at least this fraction
-/// of that predicted from the end's two triangles. Otherwise the end belongs to roughness that
+/// A disk's tip past an end must be far enough from the whole surface: at least this fraction of
+/// the distance that the end's two triangles predict. Otherwise the end belongs to roughness that
 /// disks do not follow, or to a slit narrower than the disk.
 const CONFIRMED: f64 = 0.5;
 
@@ -58,8 +58,8 @@ pub(super) struct Ends {
     /// All triangles; None if there are no ends.
     surface: Option<TriangleTree>,
     ends: Vec<End>,
-    /// The patch number of each triangle; triangles have the same one if the surface continues from
-    /// one to the other without an end between.
+    /// The patch number of each triangle; two triangles have the same number if the surface
+    /// continues from one to the other without an end between them.
     pub patches: Vec<u32>,
     tree: Bvh2,
     padding: f64,
@@ -148,8 +148,7 @@ impl Ends {
         found
     }
 
-    /// The clip lines that remove most of what stands out past ends, and nothing of the disk's
-    /// cell.
+    /// The clip lines that remove most of the disk's area past ends, and nothing of its cell.
     ///
     /// A line runs along an end, or farther out where the cell's corners reach beyond the end.
     /// Where an end bends around the cell, a line along one of its sides would cut off the part of
@@ -206,8 +205,8 @@ impl Side {
 }
 
 /// The distance from the surface that a plane gains per unit of length past these sides of
-/// triangles, which have the same ends; None if there are two sides and the surface continues
-/// between them.
+/// triangles, which have the same end points. None if there are two sides and the surface continues
+/// from one triangle to the other.
 fn leaves(sides: &[Side], normal: impl Fn(&Side) -> DVec3) -> Option<f64> {
     let [one, other] = sides else { return Some(1.0) };
     if one.ends == other.ends {

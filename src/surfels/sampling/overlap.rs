@@ -6,10 +6,10 @@ use crate::scene::Bounds;
 
 /// Returns whether the triangle meets the closed box.
 ///
-/// Two convex bodies are disjoint if and only if they are separated along a face normal of either,
-/// or along the cross product of an edge of one with an edge of the other (the separating axis
-/// theorem): three normals of the box, one of the triangle, nine products. A triangle within
-/// rounding error of the box counts as meeting it.
+/// The separating axis theorem: two convex bodies are disjoint if and only if one of these axes
+/// separates them: a face normal of either body, or the cross product of an edge of one with an
+/// edge of the other. Here these are three normals of the box, one of the triangle, and nine
+/// products. A triangle within rounding error of the box counts as meeting it.
 pub(super) fn overlaps(corners: &[DVec3; 3], bounds: &Bounds) -> bool {
     let (center, half) = (bounds.center(), 0.5 * bounds.extent());
     let corners = corners.map(|corner| corner - center);

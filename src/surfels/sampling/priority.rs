@@ -35,7 +35,7 @@ pub enum Priority {
 /// area alone, as a plane in one colour must be covered too.
 const EVEN: f64 = 0.25;
 
-/// The points of a voxel at which its colour is evaluated.
+/// The number of points of a voxel at which its colour is evaluated.
 const PROBES: usize = 16;
 
 impl Priority {

@@ -23,7 +23,7 @@ pub struct Facet {
 
 /// The triangles of a mesh that can be sampled.
 pub struct MeshSurface<'a> {
-    /// The mesh that they belong to.
+    /// The mesh of the triangles.
     pub mesh: &'a Mesh,
     /// The point that all positions are relative to: the middle of the bounds, world coordinates.
     pub center: DVec3,
@@ -42,7 +42,7 @@ impl<'a> MeshSurface<'a> {
     ///
     /// # Errors
     ///
-    /// [`Error::EmptyScene`] if there is none, and the errors of [`Mesh::check`].
+    /// [`Error::EmptyScene`] if no triangle has an area, and the errors of [`Mesh::check`].
     pub fn new(mesh: &'a Mesh) -> Result<Self> {
         mesh.check()?;
         let corner = |vertex: &u32| DVec3::from(mesh.positions[*vertex as usize]);

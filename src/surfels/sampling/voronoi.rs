@@ -6,10 +6,10 @@
 //! planes to other samples. Starting from one cell, the search continues with the samples across
 //! its cuts.
 //!
-//! At a sharp edge or on a thin surface, the nearest sample may be on another side, and its disk is
-//! edge-on from where the triangle is seen best: however large, it covers nothing there. So a
-//! triangle is divided only among samples on its own side that the surface reaches from it without
-//! an edge, as long as some are near enough.
+//! At a sharp edge or on a thin surface, the nearest sample may be on another side. Its disk is
+//! edge-on in the views that see the triangle best, and covers nothing there, however large it is.
+//! So a triangle is divided only among samples on its own side to which the surface continues
+//! without an edge, as long as some of these are near enough.
 
 use std::collections::HashSet;
 
@@ -50,7 +50,8 @@ pub(super) struct Voronoi<'a> {
     distinct: &'a DistinctPositions,
     /// The triangle that each position lies in.
     triangles: &'a [u32],
-    /// The patch number of each triangle; equal where the surface continues without an end between.
+    /// The patch number of each triangle; equal for triangles between which the surface continues
+    /// without an end.
     patches: &'a [u32],
     graph: NeighbourGraph,
     one: NeighbourSearch<'a>,
@@ -91,8 +92,8 @@ impl<'a> Voronoi<'a> {
         self.surface.triangles[self.triangles[sample as usize] as usize].normal
     }
 
-    /// Returns `measure` of each part of each cell, with the sample whose cell it is, in the order
-    /// of triangles.
+    /// Returns the result of `measure` for each part of each cell, with the cell's sample, in the
+    /// order of triangles.
     ///
     /// A part lies in one triangle. `measure` gets its sample, its triangle, and its corners
     /// relative to the sample in scaled units.
@@ -158,8 +159,8 @@ impl<'a> Voronoi<'a> {
             let mut is_whole = false;
             for &other in self.graph.of(sample) {
                 let position = self.distinct.position(other);
-                // A sample twice as far as the farthest corner, or farther, is nearer to no point
-                // of the cell.
+                // A sample at least twice as far as the farthest corner takes no point from the
+                // cell.
                 is_whole = position.distance(center) >= 2.0 * cell.reach(center);
                 if is_whole || cell.corners.is_empty() {
                     break;
@@ -212,8 +213,8 @@ impl Polygon {
         self.corners.iter().map(|corner| corner.distance(center)).fold(0.0, f64::max)
     }
 
-    /// Removes what is nearer to the sample `other` at `position` than to `center`; returns whether
-    /// it removed anything.
+    /// Removes the part that is nearer to the sample `other` at `position` than to `center`.
+    /// Returns whether there was such a part.
     fn cut(&mut self, center: DVec3, position: DVec3, other: u32) -> bool {
         let (middle, across) = (0.5 * (center + position), position - center);
         let beyond: Vec<f64> = self.corners.iter().map(|corner| (corner - middle).dot(across)).collect();

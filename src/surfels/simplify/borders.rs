@@ -13,8 +13,8 @@ use crate::surfels::neighbours::Neighbour;
 const STEEPEST: f64 = 0.5;
 
 /// A crease and a clip line of the surfel are the same end if the cosine between their directions
-/// exceeds the first value, and the line is farther by at most the second times the crease's
-/// distance plus the third times the surfel's radius.
+/// exceeds the first value, and the line is not much farther than the crease. It may be farther by
+/// the second value times the crease's distance, plus the third value times the surfel's radius.
 const SAME_END: [f64; 3] = [0.9, 0.2, 0.1];
 
 /// Corners of a cell that has no neighbours.
@@ -26,7 +26,7 @@ pub(super) struct Border {
     pub toward: DVec2,
     pub distance: f64,
     pub beyond: Beyond,
-    /// Whether two tangent planes meet there.
+    /// Whether the border is a crease: two tangent planes meet there.
     crease: bool,
 }
 
@@ -103,12 +103,12 @@ impl Border {
     /// The border with a neighbour: halfway to it, at half the distance in space, as if the surface
     /// were unrolled into the plane.
     ///
-    /// Across a crease it is where the two tangent planes meet, however near to one of the points
-    /// that is. A border halfway would take the cell of the nearer point past the crease, and leave
-    /// that of the farther one short of it.
+    /// Across a crease, the border is where the two tangent planes meet, however near that is to
+    /// one of the points. A border halfway would extend the cell of the nearer point past the
+    /// crease, and end the cell of the farther point before the crease.
     ///
-    /// None for a neighbour on another side of the surface, or one above or below rather than
-    /// beside, if there is no crease between: it bounds no cell.
+    /// None if there is no crease between, and the neighbour lies on another side of the surface,
+    /// or above or below the point rather than beside it. Such a neighbour does not bound the cell.
     pub fn new(samples: &Samples, index: u32, neighbour: &Neighbour, tolerance: f64) -> Option<Self> {
         let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
         let [s, t] = tangent_basis(samples.normals[index as usize]);
@@ -188,7 +188,7 @@ impl Polygon {
         polygon
     }
 
-    /// Keeps the part on this side of the border; the origin always is.
+    /// Keeps the part on the origin's side of the border.
     fn clip(&mut self, border: &Border) {
         let beyond = |corner: DVec2| corner.dot(border.toward) - border.distance;
         if self.corners.iter().all(|&corner| beyond(corner) <= 0.0) {
@@ -219,7 +219,7 @@ impl Polygon {
         !self.corners.is_empty() && !self.cut_by.contains(&Beyond::Outline)
     }
 
-    /// The edge from each corner to the next.
+    /// The kind of the edge from each corner to the next.
     pub fn edges(&self) -> Vec<Edge> {
         self.cut_by.iter().map(|beyond| beyond.edge()).collect()
     }

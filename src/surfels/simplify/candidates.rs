@@ -1,9 +1,9 @@
 //! The candidate splats for selection.
 //!
-//! Wu and Kobbelt grow one from every point. Where splats are large, most of them are nearly the
-//! same, and the time to grow all increases with the square of their size. Here points are taken in
-//! rounds, each spread evenly over the surface and with as many points as all earlier rounds
-//! together; a point that enough splats of earlier rounds cover is skipped.
+//! Wu and Kobbelt grow a candidate from every point. Where splats are large, most of these are
+//! nearly the same, and the time to grow all of them increases with the square of their size. Here
+//! points are taken in rounds. Each round is spread evenly over the surface, and has as many points
+//! as all earlier rounds together. A point that enough splats of earlier rounds cover is skipped.
 
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ const FIRST_STRIDE: u32 = 64;
 /// Splats, and the pieces that each covers.
 pub(super) struct Candidates {
     pub splats: Vec<Splat>,
-    /// The index of the first cover of each splat, and the number of covers.
+    /// The index of the first cover of each splat, and a final entry: the number of covers.
     first_cover: Vec<u64>,
     covers: Vec<Cover>,
 }

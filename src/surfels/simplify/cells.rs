@@ -4,9 +4,9 @@
 //! The element of a point is its Voronoi cell in its own tangent plane. The cells tile the surface,
 //! so disks that contain every cell leave no hole; the thesis takes `w = pi d²` (Eq. 1), which is
 //! the size of an element but not its boundary. Points whose cells share an edge are natural
-//! neighbours, which are the edges of the graph along which splats grow. Among the k nearest points
-//! they are those that no other neighbour hides, so the graph has no edge across a gap that points
-//! bridge.
+//! neighbours. They are linked in the graph along which splats grow. Of the k nearest points, only
+//! those are natural neighbours that no other neighbour hides, so no link skips the points between
+//! its ends.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ pub(super) const MOST_PIECES: usize = 16;
 
 /// All cells, and the graph of their neighbours.
 pub(super) struct Cells {
-    /// The index of the first corner of each cell, and the number of corners.
+    /// The index of the first corner of each cell, and a final entry: the number of corners.
     first_corner: Vec<usize>,
     /// The corners relative to the cell's point, in the basis of its tangent plane;
     /// counter-clockwise, scaled units.
@@ -56,7 +56,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Computes all cells. Creases are bends of more than `tolerance` allows, scaled units.
+    /// Computes all cells. Creases are bends that exceed `tolerance`, scaled units.
     pub fn new(samples: &Samples, tolerance: f64, progress: &dyn Progress) -> Self {
         const CHUNK: usize = 2048;
         progress.begin("finding neighbours", samples.len() as u64);
@@ -141,7 +141,7 @@ impl Cells {
         (0..corners.len()).map(move |k| (ends(k), self.edges[first + k]))
     }
 
-    /// The corners of some pieces of a cell, except its point.
+    /// The corners of some pieces of a cell, except the cell's point.
     pub fn corners_of(&self, index: u32, pieces: u16) -> impl Iterator<Item = DVec2> {
         let corners = self.corners(index);
         let edges = (0..corners.len()).filter(move |k| pieces >> piece_of(*k, corners.len()) & 1 == 1);

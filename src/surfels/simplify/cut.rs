@@ -10,8 +10,8 @@ use super::samples::Samples;
 use crate::scene::Clip;
 use crate::surfels::lines::{self, Line, hull, nearest_share};
 
-/// How far a splat extends past its covered pieces, in deviations: splats that end at one edge may
-/// lie so far apart there.
+/// The distance by which a splat extends past its covered pieces, in units of its deviation
+/// ([`clip`]). Splats that end at one edge may lie that far apart there.
 const MARGIN: f64 = 2.0;
 
 /// An additional margin, in radii of the surfel from which the splat grew, where the surface
@@ -20,8 +20,8 @@ const MARGIN: f64 = 2.0;
 /// 0.3.
 const ROUGH_MARGIN: f64 = 0.3;
 
-/// A splat is clipped only where it extends past an end by more than this many deviations: less may
-/// be the roughness of the surface, whose holes are closed by the overlap of disks.
+/// A splat is clipped only where it extends past an end by more than this many deviations. A
+/// smaller overhang may be due to a rough surface, where the overlap of disks closes holes.
 const ROUGH: f64 = 4.0;
 
 /// A splat, mapped to the unit disk.
@@ -59,9 +59,9 @@ impl Disk<'_> {
         hull(covers.iter().flat_map(corners).collect())
     }
 
-    /// The corners of the convex hull of what the disk overlaps of cells to which the surface
-    /// smoothly continues from the covered ones. This overlap closes slits between their splats and
-    /// this one.
+    /// The corners of the convex hull of the disk's overlap with the cells to which the surface
+    /// continues smoothly from the covered cells. This overlap closes slits between the splats of
+    /// those cells and this splat.
     fn beside(&self, covers: &[Cover]) -> Vec<DVec2> {
         let goes_on = |cell: u32| {
             self.cells.neighbours(cell).iter().copied().filter(move |next| self.samples.are_smooth(cell, *next))
@@ -76,7 +76,7 @@ impl Disk<'_> {
 /// sharp edges around it.
 ///
 /// The splat keeps its covered pieces, whose points lie up to `deviation` from its plane. `radius`
-/// is that of the surfel from which it grew. All lengths are in scaled units.
+/// is the radius of the surfel from which the splat grew. All lengths are in scaled units.
 pub(super) fn clip(
     samples: &Samples,
     cells: &Cells,

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-/// The cosine of the angle between two ends up to which one line clips a splat at both: 10 degrees.
+/// One line clips a splat at two ends if the cosine of the angle between them exceeds this: 10
+/// degrees.
 const ONE_LINE: f64 = 0.985;
 
 /// A line in a splat's plane at which the splat will be clipped.
@@ -11,7 +12,7 @@ pub(super) struct Ended {
     pub toward: DVec3,
     /// The distance from the splat's point; the surface ends at the line, or before it.
     pub distance: f64,
-    /// The largest distance from the line of an end that it stands for.
+    /// The line stands for ends whose corners are at most this far from it.
     pub reach: f64,
 }
 

@@ -1,11 +1,11 @@
 //! Splat growing: the largest disk around a point that the tolerance allows.
 //!
 //! A disk grows from its point outward along the graph, in the order of distance in the tangent
-//! plane, until the next point would make the heights of the points inside spread over more than
-//! twice the tolerance. It then moves along its normal to the middle of these heights, so that no
-//! point inside is farther from it than the tolerance. The points inside are the conquered set,
-//! those seen but not yet reached the confront set. (Thesis section 4.2, after Wu and Kobbelt
-//! 2004.)
+//! plane. It ends before the next point would spread the heights of the points inside over more
+//! than twice the tolerance. The disk then moves along its normal to the middle of these heights,
+//! so that no point inside is farther from it than the tolerance. The points inside are the
+//! conquered set; the points seen but not yet reached are the confront set. (Thesis section 4.2,
+//! after Wu and Kobbelt 2004.)
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,12 +18,13 @@ use super::ended::Ended;
 use super::paraboloid::Paraboloid;
 use super::samples::Samples;
 
-/// The largest ratio of the half-axes of an ellipse, and the ratio up to which it stays a disk.
+/// The largest ratio of the half-axes of an ellipse. Up to `SMALLEST_RATIO`, the splat stays a
+/// disk.
 const LARGEST_RATIO: f64 = 4.0;
 const SMALLEST_RATIO: f64 = 1.1;
 
-/// How often a cap is fitted to the points that it holds and grown again: so many times as a
-/// circle, then as many as an ellipse.
+/// How often a cap is fitted to the points that it holds and grown again: this many times as a
+/// circle, then as often as an ellipse.
 const FITS: usize = 3;
 
 /// The cosine of the largest angle between the normals of a cap and of its points: 37 degrees.
@@ -56,7 +57,7 @@ pub(super) struct Cover {
 }
 
 /// The distance of a point in a splat's plane, in units of the half-axes, so that the splat is a
-/// circle. It holds the bits of the f64, which order as numbers that are not negative do.
+/// circle. It is stored as the bits of the f64, which sort as the numbers do if none is negative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Distance(u64);
 
@@ -139,7 +140,8 @@ impl<'a> Grower<'a> {
 
     /// Grows caps around the point of `disk`, whose covers start at index `first`, each from the
     /// points that the last one holds: circles, then ellipses along the principal curvatures.
-    /// Returns the splat that covers most, which may be the disk, and leaves its covers only.
+    /// Returns the splat that covers the largest area, which may be the disk, and leaves only its
+    /// covers in the list.
     fn grow_cap(&mut self, disk: Splat, first: usize, covers: &mut Vec<Cover>) -> Splat {
         let (point, mut best, mut kept) = (disk.point, disk, first);
         for turn in 0..2 * FITS {
@@ -246,8 +248,8 @@ impl<'a> Grower<'a> {
             return None;
         }
         let ratio = (strong / weak).sqrt().min(LARGEST_RATIO);
-        // The direction of the larger curvature is that of the larger eigenvalue if their mean is
-        // positive, else that of the smaller one, perpendicular to it.
+        // The direction of the larger curvature is that of the larger eigenvalue if the mean of
+        // both eigenvalues is positive, else the perpendicular direction of the smaller one.
         let angle = 0.5 * (0.5 * quadric.y).atan2(half_difference);
         let along = s * angle.cos() + t * angle.sin();
         let across = normal.cross(along);
@@ -388,8 +390,8 @@ impl<'a> Grower<'a> {
         least
     }
 
-    /// Whether a conquered point lies past an end, relative to the splat's point. The last of them,
-    /// `next`, lies at `offset`.
+    /// Whether any conquered point lies past an end. The end is given relative to the splat's
+    /// point, and so is `offset`, the position of the conquered point `next`.
     fn is_any_past(&self, next: u32, offset: DVec3, ended: &Ended) -> bool {
         let center = self.samples.positions.position(next) - offset;
         let mut points = self.conquered.iter().map(|conquered| self.samples.positions.position(conquered.point));
@@ -397,8 +399,8 @@ impl<'a> Grower<'a> {
     }
 
     /// The largest radius before `next`, a point at `offset` that faces away from the splat: the
-    /// surface turns in the direction in which that point faces, or against it. None if the point
-    /// faces the opposite way.
+    /// surface turns in the direction in which that point faces, or against it. None if the point's
+    /// normal is parallel to that of the splat.
     fn turn_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2]) -> Option<f64> {
         let (toward, extent) = along(self.samples.normals[next as usize], shape)?;
         Some(offset.dot(toward).abs() / extent)

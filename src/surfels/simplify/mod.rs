@@ -23,10 +23,11 @@
 //! For the Stanford bunny, with 13,152 disks for 57,000 samples at a tolerance of 0.00036
 //! diagonals, one of 3.5 million rays finds a hole.
 //!
-//! **Caps.** A cap grows in rounds. The first is a disk; each further one is grown from the
-//! paraboloid, with its own normal, through the points that the previous one held; the last ones
-//! are ellipses. A cap holds only points whose normals are within 37 degrees of its own, so that
-//! the part of a cell that it covers in its plane is the part of the surface that it covers.
+//! **Caps.** A cap grows in rounds. In the first round, a disk grows. In each further round, a cap
+//! grows over the paraboloid, with a normal of its own, that is fitted to the points inside the
+//! previous splat. The caps of the last rounds are ellipses. A cap holds only points whose normals
+//! are within 37 degrees of its own. So it covers the same part of a cell on the surface as in the
+//! cap's plane.
 //!
 //! **Edges.** Cells end, and the graph has no edge, at the clip lines of the input surfels and at
 //! creases of more than 60 degrees. Disks that stand for several surfels are clipped there, as far
@@ -34,14 +35,14 @@
 //!
 //! **Textures.** If the input surfels have texture coordinates, cells end at seams too: disks do
 //! not cover surface on both sides of a seam. Disks that are clipped on both sides of a seam
-//! overlap little there, so their mean colours hardly show.
+//! overlap little there, so the mean colour of one side hardly shows on the other.
 //!
 //! **Within the tolerance.** A disk covers cells only of points that it grew over, and none of
 //! these is farther from it than the tolerance. Where the surface bends by more than that within a
-//! cell, no such disk covers the whole cell; and at a crease, any disk that does, seen along its
-//! normal, also lies over points of the other side. There the cell's own point gets a disk as large
-//! as the cell ([`Report::beyond_tolerance`] counts them), which covers nothing of the cells beyond
-//! the crease.
+//! cell, no such disk covers the whole cell; and at a crease, any disk that covers the whole cell
+//! also lies over points of the other side, seen along its normal. In both cases, the cell's own
+//! point gets a disk as large as the cell ([`Report::beyond_tolerance`] counts such disks). It
+//! covers nothing of the cells beyond the crease.
 
 mod borders;
 mod candidates;
@@ -134,14 +135,16 @@ pub struct Options {
 
 /// Selects few large surfels that stand for all surfels of `scene`.
 ///
-/// Each selected surfel grows from an input surfel. It has the normal of that surfel, or as a cap a
-/// similar one. Its centre lies on the line through that surfel along the normal, halfway between
-/// the highest and the lowest of the surfels inside, so that all of them are within the tolerance.
-/// Its colour is the mean over the area that it covers (linear light, weighted by alpha).
+/// Each selected surfel grows from an input surfel. It has the normal of that surfel; a cap may
+/// have a similar normal. Its centre lies on the line through that surfel along the normal, halfway
+/// between the highest and the lowest of the surfels inside, so that all of them are within the
+/// tolerance. Its colour is the mean over the area that it covers (linear light, weighted by
+/// alpha).
 ///
-/// The surface is where the surfels are, and between them where they surround a gap of at most a
-/// few spacings; where it ends, it extends as far as its surfels do. Normals that differ by a right
-/// angle or more belong to different surfaces, unless they were estimated and have no side.
+/// The surface consists of the area at the surfels and of the gaps of at most a few spacings that
+/// surfels surround. Where the surface ends, it extends as far as its surfels do. Normals that
+/// differ by a right angle or more belong to different surfaces, unless they were estimated and
+/// have no side.
 ///
 /// # Errors
 ///
@@ -150,12 +153,12 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
     simplify_in_texture(scene, &Coordinates::default(), options, progress).map(|(scene, _, report)| (scene, report))
 }
 
-/// As [`simplify`], for surfels with texture coordinates. Also returns those of the selected
-/// surfels.
+/// As [`simplify`], for surfels with texture coordinates. Also returns the texture coordinates of
+/// the selected surfels.
 ///
 /// The slopes of the coordinates are fitted over the surfels that each selected surfel stands for;
-/// one that stands for itself keeps its own. No selected surfel stands for surfels on both sides of
-/// a seam, where coordinates jump.
+/// a surfel that stands only for itself keeps its slopes. No selected surfel stands for surfels on
+/// both sides of a seam, where coordinates jump.
 ///
 /// # Errors
 ///

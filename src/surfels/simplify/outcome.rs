@@ -24,15 +24,15 @@ const SMALLEST_OVERLAP: f64 = 0.02;
 /// Within these limits, a half-axis is written longer than it grew by this many tolerances.
 const OVERLAP_IN_TOLERANCES: f64 = 8.0;
 
-/// The smallest half-axis with which a surfel is written whose half-axis grew to `grown`, in the
-/// unit of the tolerance.
+/// Returns the smallest half-axis with which a surfel is written if its half-axis grew to `grown`.
+/// All lengths are in one unit.
 ///
 /// Disks that just cover the surface together leave slits in oblique views, because they lie at
 /// different heights. Two disks within a tolerance E of the surface are at most 2 E apart where
 /// they meet; an overlap of 8 E each closes the slit for views up to atan 8, 83 degrees, from the
-/// normal. More would only show past sharp edges. Between points a rough surface may exceed the
-/// tolerance. The input surfels cover it there, so no surfel is written smaller than the one from
-/// which it grew.
+/// normal. A larger overlap would only show past sharp edges. Between points a rough surface may
+/// exceed the tolerance. The input surfels cover it there, so no surfel is written smaller than the
+/// one from which it grew.
 pub fn written(grown: f64, tolerance: f64) -> f64 {
     let overlap = (OVERLAP_IN_TOLERANCES * tolerance).max(SMALLEST_OVERLAP * grown);
     grown + overlap.min(LARGEST_OVERLAP * grown)
@@ -65,7 +65,7 @@ pub struct Report {
     pub mean_deviation: f64,
     /// Selected surfels at creases, where the surface bends by more than the tolerance within the
     /// cell of their own point, which they cover. Some points over or under them are beyond the
-    /// tolerance, but they cover nothing of the cells of such points.
+    /// tolerance, but these surfels cover nothing of the cells of such points.
     pub beyond_tolerance: u64,
 }
 
@@ -186,7 +186,8 @@ impl Chosen {
         );
         let Cap(heights) = splat.bend.cap(axes.map(|axis| DVec2::new(axis.dot(basis[0]), axis.dot(basis[1]))));
         let [s, t] = axes.map(world);
-        // Limited as when the file is read: a tiny patch may be written as large as its sample.
+        // The cap is limited as when the file is read, because the splat of a tiny patch may be
+        // written as large as its sample.
         let longer = axes[0].length().max(axes[1].length()) / scale;
         let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32)).usable(longer);
         let color = mean_color(color, sums[1]);

@@ -5,8 +5,8 @@ use glam::{DMat2, DMat4, DVec2, DVec3, DVec4};
 use crate::scene::Cap;
 
 /// Points on a strip do not determine the curvature across it. The determinant of the normal
-/// equations must be at least this part of the fourth power of their trace: it is 5e-5 of it for a
-/// disk, and falls with the sixth power of a strip's width.
+/// equations must be at least this fraction of the fourth power of their trace. For points on a
+/// disk the fraction is 5e-5; for a strip it falls with the sixth power of the strip's width.
 const LEAST_SPREAD: f64 = 1e-8;
 
 /// Heights over the tangent plane of a splat's point, `x u² + y u v + z v²` at (u, v) in the basis
@@ -17,8 +17,8 @@ pub(super) struct Paraboloid(DVec3);
 impl Paraboloid {
     pub const FLAT: Self = Self(DVec3::ZERO);
 
-    /// Fits a paraboloid to points (u, v, height) by least squares, up to a height that all have in
-    /// common. None if the points do not determine it.
+    /// Fits a paraboloid to points (u, v, height) by least squares, up to a constant that is added
+    /// to all heights. None if the points do not determine it.
     pub fn through(points: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
         let reach = points.clone().map(|point| point.length()).fold(0.0, f64::max);
         let (mut matrix, mut right) = (DMat4::ZERO, DVec4::ZERO);

@@ -5,8 +5,8 @@ use crate::io::Points;
 use crate::scene::{Atlas, Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 
-/// The surfels of `scene`, which is simplified to this shape, as points with these texture
-/// coordinates.
+/// Returns the surfels of `scene` as points with these texture coordinates. `scene` is the result
+/// of a simplification with splats of this shape.
 pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
     let Coordinates { centers, slopes, atlas } = coordinates;

@@ -1,5 +1,5 @@
-//! Relaxation: replaces selected splats by others that cover what only they cover, until some are
-//! superfluous.
+//! Relaxation: replaces a selected splat by another candidate that also covers the pieces that no
+//! other selected splat covers, until some splats are superfluous.
 //!
 //! Greedy selection never removes a splat, so late ones fill gaps between early ones and overlap
 //! them. Wu and Kobbelt move selected splats in rounds, to where they overlap less. Here the aim is
@@ -49,11 +49,11 @@ struct State<'a> {
     /// The candidates that cover some of each cell.
     covering: Inverse,
     selected: Vec<bool>,
-    /// For each piece, the number of selected splats that cover it, and the exclusive or of their
-    /// indices: the index itself if there is one.
+    /// For each piece, the number of selected splats that cover it. `joined` is the exclusive or of
+    /// their indices: the index itself if there is only one.
     count: Vec<u32>,
     joined: Vec<u32>,
-    /// For each splat, the number of pieces that it alone covers, and their area.
+    /// For each splat, the number of pieces that it alone covers. `own_area` is their area.
     own_pieces: Vec<u32>,
     own_area: Vec<f64>,
     /// The pieces of each cell that a replacement must cover; zero between moves.
@@ -173,7 +173,7 @@ impl<'a> State<'a> {
     }
 
     /// Replaces a selected splat by the candidate that lowers the sum most, if one does, and
-    /// removes splats that become superfluous. Returns whether it did.
+    /// removes splats that become superfluous. Returns whether the splat was replaced.
     fn improve(&mut self, splat: u32) -> bool {
         let mut needed: Vec<Cover> = Vec::new();
         for cover in self.candidates.covers(splat) {

@@ -125,7 +125,7 @@ impl Samples {
 
     /// Whether two points may lie on the same side of one surface. Points on opposite sides of a
     /// thin body, or on faces that meet at a right angle or a sharper one, do not, however close
-    /// they are. Normals without a side allow all.
+    /// they are. If normals have no side, any two points may.
     pub fn same_side(&self, a: u32, b: u32) -> bool {
         !self.oriented || self.normals[a as usize].dot(self.normals[b as usize]) > 0.0
     }
@@ -165,7 +165,7 @@ fn ends(surfel: &Surfel, clip: &Clip, scale: f64) -> Vec<End> {
     clip.0.iter().filter_map(end).collect()
 }
 
-/// The unit normal, in f64, where the cross product of half-axes does not underflow.
+/// The unit normal, computed in f64 so that the cross product of half-axes does not underflow.
 fn unit_normal(surfel: &Surfel) -> DVec3 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     s.cross(t).try_normalize().unwrap_or(DVec3::Z)

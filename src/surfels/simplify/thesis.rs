@@ -30,8 +30,8 @@ use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 /// The number of neighbours of a point, K in the thesis.
 const NEIGHBOURS: usize = 10;
 
-/// A point that a growing splat will visit, or a splat with its contribution; the greatest comes
-/// first, and of equals the lower index.
+/// A point that a growing splat will visit, or a splat with its contribution; the greatest value
+/// comes first, and among equal values the lower index.
 #[derive(PartialEq)]
 struct Next(f64, u32);
 
@@ -77,7 +77,7 @@ struct Growth {
     /// For each point, one plus the index of the last splat that met it.
     met: Vec<u32>,
     front: BinaryHeap<Next>,
-    /// The points that it reached, nearest first, and their distances, scaled units.
+    /// The points that the last growth reached, nearest first, and their distances, scaled units.
     reached: Vec<(u32, f64)>,
 }
 
@@ -198,7 +198,7 @@ pub fn as_in_the_thesis(
     let Selection { splats: selected, largest, sums: [off, area] } =
         select(&samples, tolerance * scale, ratio, progress);
     let disk = |&(point, radius): &(u32, f64)| {
-        // A point that conquers no other is as large as its surfel.
+        // The disk of a point that conquers no other point is as large as that point's surfel.
         let radius = if radius > 0.0 { radius } else { samples.radii[point as usize] } / scale;
         let center = samples.positions.position(point) / scale;
         Surfel::disk(center.as_vec3(), samples.normals[point as usize].as_vec3(), radius as f32)

@@ -1,19 +1,20 @@
 //! Sizes from clusters of three points, by binary space partition along principal axes.
 //!
-//! The source is "a simple scheme to render point-sampled surfaces", section 3.3. A plane across
-//! the eigenvector of the largest eigenvalue of its covariance splits a set of points, then its
-//! halves, until a cluster holds exactly three points that are not collinear. The triangle that
-//! they span gives the size of all three. The paper finds such clusters by their eigenvalues
-//! l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 + l1 + l2) = 0, and are
-//! collinear if l1 is zero as well.
+//! The source is "a simple scheme to render point-sampled surfaces", section 3.3. A set of points
+//! is split by a plane perpendicular to the eigenvector of the largest eigenvalue of the set's
+//! covariance. Its parts are split in the same way, until a cluster holds exactly three points that
+//! are not collinear. The triangle that they span gives the size of all three. The paper finds such
+//! clusters by their eigenvalues l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 +
+//! l1 + l2) = 0, and are collinear if l1 is zero as well.
 //!
 //! The paper does not say where the plane lies. In [`bsp_radii`] it splits off a multiple of three
 //! points, as near to the middle as possible, so that all clusters but the last have three points,
 //! and the last one up to five.
 //!
-//! In [`common_radius`] all surfels have one radius, as in the section to the letter. Planes go
+//! In [`common_radius`] all surfels have one radius, as the section says literally. Planes go
 //! through centroids, as in the clustering that it is based on (Pauly et al. 2002), so clusters end
-//! with one to three points. The radius is the mean over those of three that are not collinear.
+//! with one to three points. The radius is the mean over the clusters of three points that are not
+//! collinear.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -23,7 +24,8 @@ use crate::Progress;
 use crate::surfels::eigen::Symmetric3;
 use crate::surfels::positions::DistinctPositions;
 
-/// A position in a cluster, with its coordinate along the axis of the split, and finally its size.
+/// A position in a cluster. `value` is its coordinate along the axis of the split, and finally its
+/// size.
 #[derive(Clone, Copy)]
 struct Member {
     value: f64,

@@ -16,17 +16,17 @@ const LEAST: f64 = 0.6;
 /// on a square grid.
 const LEAST_OPEN: f64 = 1.0;
 
-/// The least factor by which a disk reaches past the corners of its cell: for neighbours in its
-/// plane, and none missing.
+/// The least factor by which a disk reaches past the corners of its cell: it applies if all
+/// neighbours lie in the disk's plane and none is missing.
 const PAST_CORNER: f64 = 1.1;
 
 /// The factor grows by this much times the mean squared sine of the neighbours' elevations over the
 /// plane. Where a surface is curved, gaps open between its disks, seen from the side.
 const PER_BEND: f64 = 3.0;
 
-/// The factor grows by this much per mean distance by which the farthest corner is farther than
-/// one: where points are random, several cells are ragged at once. Beyond 1.5 mean distances,
-/// [`LARGEST`] limits the disk.
+/// The factor grows by this times the distance of the farthest corner beyond one mean distance, in
+/// mean distances. Where points are random, several neighbouring cells are ragged at once. Beyond
+/// 1.5 mean distances, [`LARGEST`] limits the disk.
 const PER_GAP: f64 = 0.3;
 
 /// The largest factor. Used everywhere, it would cost 0.4 dB on the vertices of eleven models:
@@ -41,9 +41,9 @@ const CELL_REACH: f64 = 1.5;
 /// boundary, corners lie outside the surface.
 const LARGEST: f64 = 1.8;
 
-/// A mean distance is at most this many times the neighbours' mean distance from their centroid.
-/// Where points surround a point, that is about the same as its own mean distance; for an outlier
-/// beside a far surface it stays small.
+/// A point's mean distance to its neighbours is limited to this many times their mean distance from
+/// their centroid. Where points surround the point, both means are about equal. For an outlier
+/// beside a far surface, the latter mean stays small.
 const LARGEST_LOCAL_RATIO: f64 = 2.0;
 
 /// The limit reduces a mean distance to no less than this fraction of itself.
@@ -57,7 +57,7 @@ pub(crate) fn open_radius(near: impl Iterator<Item = DVec3>) -> f64 {
 }
 
 /// Returns the half-axes s, the longer one, and t of the smallest ellipse that holds a point's
-/// [cell](Cell) in the plane across the unit vector `normal`; s x t is along `normal`.
+/// [cell](Cell) in the plane perpendicular to the unit vector `normal`; s x t is along `normal`.
 ///
 /// The `offsets` are those of the nearest neighbours, at least one, the nearest first. The
 /// half-axes are in their unit.

@@ -9,11 +9,11 @@ pub(crate) const ELLIPSE_NEIGHBOURS: usize = 8;
 /// a scan line may all lie on that line, which does not tell how far away the next line is.
 const SLIMMEST: f64 = 0.2;
 
-/// Returns the half-axes s (the longer one) and t, with s x t along the unit vector `normal`, of
-/// the ellipse around the origin that bounds the projections of `offsets` onto the plane across
-/// `normal`.
+/// Returns the half-axes s (the longer one) and t of an ellipse around the origin. It bounds the
+/// projections of `offsets` onto the plane perpendicular to the unit vector `normal`, and s x t is
+/// along `normal`.
 ///
-/// They are in the unit of the offsets, and zero if all projections are.
+/// The half-axes are in the unit of the offsets, and zero if all projections are.
 ///
 /// The source is Pajarola et al. 2003, section 3.4, but around the point itself instead of the mean
 /// (their Eq. 2 allows any centre). The covariance in the plane has the eigenvalues of Eq. 5, whose
@@ -42,8 +42,9 @@ pub(crate) fn bounding_ellipse(offsets: impl Iterator<Item = DVec3> + Clone, nor
     [s, normal.cross(s) * slimness]
 }
 
-/// Returns the unit direction of the longer half-axis, and the ratio of the shorter half-axis to
-/// it, of the ellipse of a covariance matrix [xx, xy, yy]; None if that is zero.
+/// Returns the unit direction of the longer half-axis and the ratio of the shorter to the longer
+/// half-axis, for the ellipse of a covariance matrix [xx, xy, yy]. The ratio is at least
+/// [`SLIMMEST`]. None if the matrix is zero.
 pub(crate) fn shape([xx, xy, yy]: [f64; 3]) -> Option<([f64; 2], f64)> {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let root = (half * half + xy * xy).sqrt();

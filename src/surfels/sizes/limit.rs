@@ -9,12 +9,13 @@ use crate::surfels::graph::NeighbourGraph;
 /// Returns the largest radius of each position's disk, in the unit of `radii`.
 ///
 /// It is `factor` times the median of the neighbours' radii and, unless `factor` is infinite, at
-/// most [`LARGEST_MEDIAN_RATIO`] times the median of all radii, and at most `lone` of the position.
-/// A position whose radius is zero has no limit from its neighbours and is left out of all medians.
+/// most [`LARGEST_MEDIAN_RATIO`] times the median of all radii, and at most the result of `lone`
+/// for the position. A position whose radius is zero has no limit from its neighbours and is left
+/// out of all medians.
 ///
-/// At a boundary and around an outlier, points have neighbours on one side only, or far away, and
-/// therefore large radii. Their neighbours do not, if they are surrounded by points. Densities that
-/// vary from place to place do not matter.
+/// Points at a boundary and outliers have neighbours only on one side or far away, and therefore
+/// large radii. Their neighbours, if surrounded by points, have smaller radii, which limit them.
+/// The limit is local, so density may vary from place to place.
 pub(crate) fn local_limits(
     graph: &NeighbourGraph,
     radii: &[f64],

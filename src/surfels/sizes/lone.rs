@@ -15,21 +15,23 @@ const MOST_BESIDE: usize = 4;
 /// The cosine of 45 degrees: the planes of two points of one surface differ by a smaller angle.
 const ONE_SURFACE: f64 = 0.7;
 
-/// The sine of 30 degrees: a point is at a lower elevation over the plane of another one of its
-/// surface.
+/// The sine of 30 degrees: the elevation of a point over the plane of another point of the same
+/// surface is lower.
 const LOWEST: f64 = 0.5;
 
-/// The disk of a lone point has this fraction of its mean distance to [`RADIUS_NEIGHBOURS`]
-/// neighbours as its radius: about the distance of the nearest one among random points.
+/// The largest radius of a lone point's disk, as a fraction of the point's mean distance to
+/// [`RADIUS_NEIGHBOURS`] neighbours. Among random points, it is about the distance of the nearest
+/// one.
 const PART: f64 = 0.5;
 
-/// A point lies on a line with its neighbours if none is farther from the line to the farthest one
-/// than this fraction of that one's distance. With 16 neighbours on a surface this does not occur,
-/// unless its scan lines are as far apart as eight of their points.
+/// A point lies on a line with its neighbours if they all are near the line to the farthest
+/// neighbour: within this fraction of the farthest neighbour's distance. With 16 neighbours on a
+/// surface this does not occur, unless scan lines are as far apart as eight points on one of them.
 const LINE: f64 = 0.12;
 
-/// The disk of a point on a line has this fraction of its mean distance to [`RADIUS_NEIGHBOURS`]
-/// neighbours as its radius: three quarters of the spacing, if that is even.
+/// The largest radius of the disk of a point on a line, as a fraction of the point's mean distance
+/// to [`RADIUS_NEIGHBOURS`] neighbours. For evenly spaced points, it is three quarters of the
+/// spacing.
 const PART_OF_LINE: f64 = 0.3;
 
 /// Returns the largest radius of the disk of a lone position, in the unit of positions.

@@ -99,9 +99,9 @@ pub(crate) fn offsets<'a>(
     graph.of(index).iter().take(count).map(move |&other| distinct.position(other) - center)
 }
 
-/// Returns the half-axes at position `index` across `normal` from its neighbours, scaled units: s,
-/// the longer one, and t. Zero if the neighbours do not determine them, and for sizes from clusters
-/// or triangles.
+/// Returns the half-axes s, the longer one, and t at position `index`, computed from its
+/// neighbours, perpendicular to `normal`, scaled units. They are zero if the neighbours do not
+/// determine them, and for sizes from clusters or triangles.
 pub(crate) fn half_axes_at(
     size: Size,
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),

@@ -2,7 +2,7 @@
 //! section 3.1).
 //!
 //! The sphere around each vertex is as large as the largest bounding circle of the triangles that
-//! touch it, so that neighbours cover each triangle.
+//! touch it, so that the spheres at its corners cover each triangle.
 
 use glam::DVec3;
 

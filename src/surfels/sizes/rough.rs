@@ -43,8 +43,8 @@ pub(crate) struct Rough {
 }
 
 impl Rough {
-    /// Measures the offsets of a point's neighbours, the nearest first, over the plane across the
-    /// unit vector `normal`.
+    /// Measures the offsets of a point's neighbours, the nearest first, over the plane with the
+    /// unit normal `normal`.
     pub(crate) fn of(offsets: &[DVec3], normal: DVec3) -> Self {
         let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
         let mean = near.iter().map(|offset| offset.length()).sum::<f64>() / near.len().max(1) as f64;
@@ -79,9 +79,9 @@ impl Rough {
     /// Returns the length by which the half-axes of position `index` should grow, in the unit of
     /// offsets.
     ///
-    /// It depends on the position's own heights and on the roughness around it. That is a median
-    /// over its neighbours, so that an edge does not count as roughness. `at` returns the roughness
-    /// of a position.
+    /// It depends on the heights at the position itself and on the roughness around it. The
+    /// roughness is a median over the neighbours, so that an edge does not count as roughness. `at`
+    /// returns the roughness of a position.
     pub(crate) fn growth(graph: &NeighbourGraph, index: u32, at: impl Fn(u32) -> Self) -> f64 {
         let own = at(index);
         let around = || std::iter::once(index).chain(graph.of(index).iter().copied().take(RADIUS_NEIGHBOURS)).map(&at);

@@ -1,4 +1,4 @@
-//! Small files as other programs write them that epsplat once drew wrong or refused for the wrong
+//! Small files, as other programs write them, that epsplat once drew wrong or refused for the wrong
 //! reason.
 //!
 //! Each stands for its kind and is tested for the right value. `tests/readers` generates the other

@@ -9,7 +9,7 @@ use epsplat::low_level::plan::SceneNeeds;
 use epsplat::low_level::scene::Surfel;
 use naga::{AddressSpace, ArraySize, Module, ScalarKind, TypeInner};
 
-/// A type in a form that host and device share: a number of scalars of one kind.
+/// The layout of a type that host and device share: a number of scalars of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
     kind: ScalarKind,
@@ -120,8 +120,8 @@ pub enum Element {
     Plain(&'static [Shape]),
 }
 
-/// The types of an accumulator's sums, and the number of elements per sum, times two (a packed
-/// element holds two sums).
+/// Returns the element types of an accumulator's sum buffer, and twice the number of elements per
+/// sum. (A packed element holds two sums, so that number can be one half.)
 pub fn sums_of(accumulator: &str) -> (&'static [Shape], u32) {
     match accumulator {
         "fixed" => (&[u32::SHAPE], 4),
@@ -229,7 +229,8 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
     }
 }
 
-/// The accumulator with the same layout of sums: `fixed` with 64-bit atomics has that of `fixed64`.
+/// Returns the accumulator whose layout of sums `needs` has: with 64-bit atomics, `fixed` stores
+/// sums as `fixed64` does.
 pub fn kept_as(needs: &SceneNeeds) -> &'static str {
     if needs.atomics_u64 { "fixed64" } else { needs.accumulator.name() }
 }

@@ -88,7 +88,7 @@ fn a_changed_layout_is_noticed() {
     assert!(longer.contains("Band"), "{longer}");
     let retyped = broken("    middle: f32,\n", "    middle: u32,\n");
     assert!(retyped.contains("middle") && retyped.contains("Uint"), "{retyped}");
-    // The sums are of another type than the accumulator's.
+    // The sums have another element type than the named accumulator's.
     let wide = SceneNeeds { accumulator: Accumulator::Fixed64, ..needs };
     let other = &first_of(&Sources::default(), &wide);
     assert_eq!(differences(other, "packed64"), Vec::<String>::new());
@@ -185,12 +185,13 @@ fn constants_agree() {
     // The least weights are whole numbers of units; constants derived from them match.
     assert_eq!((f64::from(ONE) * LEAST_AT_RIM).fract(), 0.0);
     const { assert!(LEAST_WEIGHT * (1u64 << 40) as f64 == 65_536.0) };
-    // A pixel's column is in the low 16 bits, its row above, below the flag.
+    // A word packs a pixel's column (low 16 bits), its row (above) and the flag `AWAY` (above the
+    // row).
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
     const { assert!(MAX_SIDE - 1 <= 0xffff) };
     // A batch number fits in the spare bits of anchors (cull.wgsl).
     const { assert!(MOST_GROUPS < 1 << 18) };
-    // The scale is defined once; no kernel repeats its value.
+    // The fixed-point scale `ONE` is defined once; no kernel repeats its value.
     let repeated = FILES.iter().map(|(_, text)| text.matches(&ONE.to_string()).count()).sum::<usize>();
     assert_eq!(repeated, 1);
 }

@@ -5,7 +5,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::AccumulatorRow;
 use epsplat::low_level::scene::Map;
 
-/// The decision margin below which a pixel is left to rounding.
+/// The decision margin below which rounding decides a pixel, so that it is not compared.
 const DECIDED: f32 = 1e-4;
 
 /// The largest difference of values, as a fraction of the larger of 1 and the reference's value.
@@ -13,12 +13,12 @@ const APART: f32 = 3e-4;
 
 /// The largest difference for textured surfels.
 ///
-/// Their texture coordinates err with the inverse square of the cosine at which a surfel is seen.
-/// Where they err much, a pixel changes from the texture to blended colours;
-/// `tests/pictures/texture` bounds that, and here a share of [`STRAYING`] pixels may differ more.
+/// Texture coordinates err with the inverse square of the cosine at which a surfel is seen. A large
+/// error changes a pixel from the texture to blended colours. `tests/pictures/texture` bounds that
+/// change; here a share of [`STRAYING`] pixels may differ by more.
 const APART_OF_TEXTURES: f32 = 3e-3;
 
-/// The share of decided pixels of textured surfels that may differ more.
+/// The share of decided pixels of textured surfels that may differ by more than that.
 const STRAYING: f64 = 0.03;
 
 /// All bits of a frame's colours and maps, by name, without the map `but`.
@@ -74,8 +74,7 @@ pub fn of_sums(
 
 /// Describes the decided pixels whose colour or maps differ from the `reference`; empty if none.
 ///
-/// `digits` is the extra error allowed at each pixel because of the digits of its sums
-/// ([`of_sums`]).
+/// `digits` is the extra error allowed at each pixel because sums have few digits ([`of_sums`]).
 pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) -> String {
     let decision = reference.map(Map::Decision).unwrap();
     let limit = if painted { APART_OF_TEXTURES } else { APART };
@@ -101,7 +100,8 @@ pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) ->
     };
     let pixels = (0..decision.len()).filter(decided);
     tell("color", pixels.clone().filter(differs).collect(), &|pixel| format!("{:?}", colors(pixel)));
-    // Which of two surfels weighs more is not among the decisions that the margin covers.
+    // The decision margin does not cover which of two surfels weighs more, so the index map is left
+    // out.
     for map in frame.maps().iter().filter(|map| *map != Map::Index) {
         let width = map.width();
         let of = |frame: &Frame, pixel: usize| frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec();

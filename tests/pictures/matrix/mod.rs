@@ -13,7 +13,7 @@
 //!   cargo test --release --test pictures matrix::every -- --nocapture
 //! ```
 //!
-//! Refused options are counted by their error, and others are drawn instead.
+//! Options that the checks refuse are counted by their error, and other options are chosen instead.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -43,7 +43,7 @@ const AT_ONCE: u64 = 8;
 /// Threads that draw.
 const WORKERS: usize = 2;
 
-/// Attempts to draw options that go together; one in a few succeeds.
+/// Attempts to choose options that the checks accept; one in a few succeeds.
 const DRAWS: usize = 400;
 
 /// Two devices: one with all features of the adapter, one with core WebGPU only.
@@ -52,7 +52,7 @@ struct Devices {
     core: Gpu,
 }
 
-/// A scene, a view, and options that go together.
+/// A scene, a view, and options that the checks accept.
 struct Combination {
     seed: u64,
     sampled: Sampled,
@@ -67,7 +67,7 @@ struct Tally {
     frames: usize,
     pixels: usize,
     undecided: usize,
-    /// Options drawn; `refused` counts those that the checks refused, by error.
+    /// Sets of options chosen; `refused` counts those that the checks refused, by error.
     drawn: usize,
     refused: BTreeMap<String, usize>,
     failures: Vec<String>,
@@ -85,7 +85,7 @@ impl Tally {
         self
     }
 
-    /// Prints the counts, and each refusal with its share of the options drawn.
+    /// Prints the counts, and each refusal with its share of the chosen sets of options.
     fn print(&self) {
         let refused: usize = self.refused.values().sum();
         eprintln!(
@@ -109,7 +109,7 @@ fn checked(scene: &Scene, options: &Settings) -> epsplat::Result<()> {
     check::scene(&Facts::of(scene), options, false)
 }
 
-/// Returns the combination of a seed: draws options until some are accepted.
+/// Returns the combination of a seed: chooses options until the checks accept some.
 fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
     let mut random = Random(seed);
     let sampled = any_scene::sampled(&mut random);
@@ -163,7 +163,7 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
         if !wrong.is_empty() {
             let size = (camera.width, camera.height, camera.projection);
             let failure = format!("seed {seed}: {about:?}, {size:?}, {options:?}:\n    {}", wrong.join("\n    "));
-            // Printed at once, because a run can be long.
+            // Failures are printed at once, because the test can take long.
             eprintln!("{failure}");
             tally.failures.push(failure);
             return;
@@ -171,7 +171,8 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
     }
 }
 
-/// The combination's view, and others that are shifted by up to 3 pixels and scaled by up to 10 %.
+/// The combination's view, and copies of it that are shifted by up to 3 pixels and scaled by up to
+/// 10 %.
 ///
 /// Kernels are compiled once for all of them.
 fn views(combination: &mut Combination) -> Vec<Camera> {
@@ -184,7 +185,7 @@ fn views(combination: &mut Combination) -> Vec<Camera> {
     std::iter::once(camera.clone()).chain(others).collect()
 }
 
-/// The faults of one picture: against the reference, and of its other forms.
+/// Describes the faults of one view: differences from the reference, and between its forms.
 fn wrong(
     (scene, camera, options): (&Scene, &Camera, &Settings),
     forms: &[(&'static str, Scene, Settings, Gpu)],
@@ -281,7 +282,7 @@ fn every_combination_is_drawn_alike_and_right() {
     let (mut tally, devices) = (Tally::default(), &devices);
     while tally.frames < frames {
         let seeds: Vec<u64> = (seed..seed + AT_ONCE).collect();
-        // Plain threads: a waiting thread of a pool would start another render.
+        // Threads without a pool: a waiting thread of a pool would start another render.
         let workers = seeds.chunks(AT_ONCE as usize / WORKERS).map(|seeds| move || of_seeds(seeds, devices));
         let tallies = std::thread::scope(|scope| {
             let running: Vec<_> = workers.map(|worker| scope.spawn(worker)).collect();
@@ -298,7 +299,7 @@ fn every_combination_is_drawn_alike_and_right() {
     assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
 }
 
-/// Faults of the kind that the matrix is for are found in 24 combinations that could show them.
+/// A fault in one organisation is found within 24 combinations that it can affect.
 #[test]
 fn a_fault_in_one_organisation_is_found() {
     let Some(devices) = devices() else { return };

@@ -108,20 +108,20 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
         }
         let [u, v, squared, reach_2, _] = sum.place.map(|total| total / sum.weight);
         let variance = squared - u * u - v * v;
-        // The error of a mean as a fraction of its range, and of a fragment's f32 weight and place
-        // on the disk.
+        // `mean` is the error of a mean as a fraction of its range, `fragment` that of a fragment's
+        // f32 weight and place on the disk.
         let mean = 3.0 * (row.error_bound)(sum.count.max(1).into(), sum.weight, fraction_bits);
         let fragment = 2e-6;
         let apart = variance.max(0.0).sqrt() + reach_2.sqrt();
-        // A fragment's point errs by a few roundings of its distance, about 3, and by more along a
-        // tilted surface. Its texture coordinates change by less than 0.4 per unit.
+        // A fragment's point errs by a few roundings of its distance, which is about 3, and on a
+        // tilted surface by more. Texture coordinates change by less than 0.4 per unit.
         let normal = Vec3::from_array(twin.normals().unwrap()[pixel]).as_dvec3();
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
         let cosine = normal.dot(camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize()).abs();
         let of_point = 4.0 * (-24f64).exp2() * 3.0 * 0.4 / (cosine * cosine).max(1e-4);
         let of_lookup = slope * f64::from(range.span) * (mean + fragment * apart + of_point);
         // The variance is a difference of means of at most 1/2. Far from the transition, the
-        // texture's share is 0 or 1 in both.
+        // texture's share is 0 or 1 on the device and in the twin.
         let of_ratio = 3.0 * mean / reach_2 + fragment * (1.0 + variance / reach_2);
         let ratio = variance / reach_2;
         let in_passage = ratio > 1.0 - of_ratio && ratio < 2.0 + of_ratio;
@@ -325,7 +325,7 @@ fn a_texture_shows_what_is_finer_than_surfels() {
     let painted = globe(count, 0.9, texture.clone());
     let at_centers = textured(&painted).places().iter().map(|place| texture.at(place.center[0], place.center[1]));
     let colored = Scene { colors: Colors::Linear(at_centers.collect()), ..painted.clone() };
-    // As in the paper's TexZ map, all of a splat has the coordinates of its centre.
+    // As in the paper's TexZ map, the whole splat has the coordinates of its centre.
     let of_centers = with_places(&painted, |place| Place { slopes: [[0.0; 3]; 2], ..*place });
     // A large reach blends across seams too.
     let across_seams = with_places(&painted, |place| Place { reach: 10.0, ..*place });
@@ -341,8 +341,8 @@ fn within(tolerance: f64, shape: SplatShape) -> Options {
     Options { tolerance: Tolerance::Absolute(tolerance), shape, relaxations: 0 }
 }
 
-/// After simplification surfels keep their texture coordinates, and none shows past a seam; also
-/// after PLY. The coordinates of the plane jump at the seam.
+/// After simplification, and after PLY, surfels keep their texture coordinates and hardly reach
+/// past a seam. The coordinates of the plane jump at the seam.
 #[test]
 fn simplified_surfels_keep_their_place_in_a_texture() {
     let across = |x: f64| if x > 0.0 { 0.5 } else { 0.0 };
@@ -398,8 +398,8 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
     }
 }
 
-/// A third of a globe's surfels paint it nearly as well; with slopes fitted to the few alone they
-/// do not.
+/// After simplification, a third of a globe's surfels paint it nearly as well. With slopes fitted
+/// to this third alone they do not.
 #[test]
 fn a_texture_survives_simplification() {
     let texture = waves(true);

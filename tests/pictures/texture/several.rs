@@ -77,8 +77,8 @@ fn each_texture_shows_as_if_it_were_alone() {
         let off = (camera.eye.length_squared() - along * along).min(1.0);
         let point = camera.eye + ray * (along - (1.0 - off).sqrt());
         let height = point.y;
-        // Two radii from where the parts meet, and away from each texture's seam, which is found
-        // less sharply in a wider atlas.
+        // Compares pixels two radii from the borders of the parts and away from the textures' seam,
+        // which is found less sharply in a wider atlas.
         let part =
             [(0.35, 0.9), (-0.15, 0.05), (-0.9, -0.45)].iter().position(|(low, high)| height > *low && height < *high);
         let Some(part) = part.filter(|_| off < 0.9 && point.z.abs() > 0.2) else { continue };
@@ -122,8 +122,8 @@ fn numbers_survive_files_and_simplification() {
     assert!(seen.iter().all(|count| *count > 50), "{seen:?}");
 }
 
-/// Textures number one for all inputs, one per input, or as many as the points' texture numbers
-/// need.
+/// One texture serves all inputs, or each input has one, or there are as many as the points'
+/// texture numbers need.
 #[test]
 fn textures_are_as_many_as_are_named() {
     let plain = || belt(300, 1.5);
@@ -134,7 +134,7 @@ fn textures_are_as_many_as_are_named() {
     assert_eq!(count(made(vec![plain(), plain()], vec![waves(true)]).unwrap()), 1);
     assert_eq!(count(made(vec![plain(), plain()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![several()], both()).unwrap()), 2);
-    // A last image that no point uses, and an input that needs none.
+    // Also accepted: a last image that no point uses, and an input that needs none.
     assert_eq!(count(made(vec![plain()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), Points::default()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), several()], [both(), both()[..1].to_vec()].concat()).unwrap()), 3);
@@ -215,8 +215,8 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
 
 /// Slopes of coordinates come only from neighbours in the same texture.
 ///
-/// Surfels of two textures lie among each other. If both were in one texture, some coordinates
-/// would seem to change as fast as they jump from one place to the other.
+/// Surfels of two textures lie among each other. If all were in one texture, the jump from one
+/// texture's coordinates to the other's would look like a steep slope.
 #[test]
 fn neighbours_in_another_texture_tell_nothing() {
     let first = belt(2000, 1.5);
@@ -242,8 +242,8 @@ fn neighbours_in_another_texture_tell_nothing() {
     assert!(two < 2.0 * alone && one > 10.0 * alone, "{alone} {two} {one}");
 }
 
-/// Past the edges of its image a surfel shows that image, on every side, and also where all its
-/// coordinates are one point.
+/// A surfel past the edges of its image shows that image, not its neighbour in the atlas, on every
+/// side. This holds even if all its texture coordinates are one point.
 #[test]
 fn no_texture_shows_past_the_edges_of_another() {
     let Some(gpu) = common::gpu() else { return };

@@ -50,19 +50,20 @@ pub(super) enum Part {
     },
 }
 
-/// All that is finished.
+/// All finished parts of the tree.
 pub(super) struct Kept<'a> {
     survey: &'a Survey,
     /// The surfels, in the order of the tree.
     pub surfels: Rows,
     pub nodes: KeptNodes,
-    /// In depth-first order, children before parents: among the parts with nodes on a level, this
-    /// is the order of that level.
+    /// The finished parts in depth-first order, children before parents. Parts that have nodes on
+    /// the same level are in the order of that level.
     pub parts: Vec<Part>,
     /// The format of nodes in the file.
     pub kind: Nodes,
     pub levels: LevelFacts,
-    /// Samples of centres: for the body of the scene, and for its core.
+    /// A sample of centres, from which the body of the scene is found. `sampled` holds the centres
+    /// from which its core is found.
     pub sample: Sample,
     pub sampled: Vec<[f32; 3]>,
     /// Caches of surfels and of nodes.
@@ -73,7 +74,7 @@ pub(super) struct Kept<'a> {
 }
 
 impl<'a> Kept<'a> {
-    /// Starts with nothing.
+    /// Creates temporary files in `folder`, without surfels and nodes.
     pub fn new(survey: &'a Survey, folder: &Path, path: &Path) -> Result<Self> {
         let surfels = Rows::temporary(folder, properties(survey), path)?;
         let nodes = KeptNodes::new(folder, path)?;
@@ -85,7 +86,7 @@ impl<'a> Kept<'a> {
         Ok(Self { survey, surfels, nodes, parts, kind, levels, sample, sampled, surfel_pages, node_pages, failed })
     }
 
-    /// Stores a subtree, whose surfels are in its order.
+    /// Stores a subtree. `scene` has its surfels in the order of the tree.
     pub fn subtree(&mut self, depth: usize, tree: &Octree, scene: &Scene, mut nodes: Vec<Made>) -> Result<Branch> {
         let (surfels, first) = (self.surfels.count(), self.nodes.count());
         let pieces: Vec<Range<usize>> = (0..scene.surfels.len())
@@ -112,8 +113,8 @@ impl<'a> Kept<'a> {
         Ok(Branch { key, made: nodes[0], surfels: scene.surfels.len() as u64 })
     }
 
-    /// Adds a node above some branches. `make` computes it, from its key and from what is stored
-    /// below it.
+    /// Adds a node above some branches. `make` computes it, from its key and from the stored nodes
+    /// and surfels below it.
     pub fn above(
         &mut self,
         depth: usize,

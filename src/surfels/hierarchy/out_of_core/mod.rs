@@ -2,10 +2,10 @@
 //! to that of [`build`](super::build()) and [`write_scene`](crate::io::ply::write_scene).
 //!
 //! A first pass collects facts about all points (`survey`). The points are then copied into a file
-//! and divided at their means into files of fewer points, until a set fits in memory (`runs`).
-//! There its subtree is built, and stored in files (`kept`). Nodes above subtrees are computed from
-//! what is stored. In the end everything is written level by level (`write`). A tree depends on the
-//! set of points alone, so it does not matter where it was built.
+//! and divided at their means into files of fewer points, until a set fits in memory (`runs`). The
+//! subtree of such a set is built in memory and stored in files (`kept`). Nodes above subtrees are
+//! computed from what is stored. In the end everything is written level by level (`write`). A tree
+//! depends on the set of points alone, so it does not matter where it was built.
 
 mod kept;
 mod pages;
@@ -37,18 +37,19 @@ use crate::scene::hierarchy::{DEEPEST, Node};
 use crate::surfels::{Preparation, complete};
 use crate::{Error, Progress, Result};
 
-/// Memory of the program and its file buffers, and memory of each thread for its pieces, bytes.
+/// Memory of the program and its file buffers, bytes. `OF_THREAD` is the memory of each thread for
+/// the pieces that it reads.
 const PROGRAM: u64 = 96 << 20;
 const OF_THREAD: u64 = 48 << 20;
 
-/// Memory for each surfel of a subtree, beside that of the scene, bytes: its place, and its share
-/// of the nodes and their sums.
+/// Memory for each surfel of a subtree, beside that of the scene, bytes: its lattice coordinates,
+/// and its share of the nodes and their sums.
 const OF_SURFEL: u64 = 150;
 
-/// The most memory that a scene has for each surfel, bytes ([`Survey::surfel_bytes`]).
+/// The most memory that a scene uses for each surfel, bytes ([`Survey::surfel_bytes`]).
 const LARGEST_SURFEL: u64 = 112;
 
-/// The number of points that must fit in memory.
+/// At least this many points must fit in memory.
 const FEWEST: u64 = 1 << 16;
 
 /// The outcome of [`write_levels`].
@@ -98,7 +99,7 @@ pub fn write_levels(
     made(&sources, runs, (fits, of_surfel))
 }
 
-/// Memory that is used however few points there are, bytes.
+/// Memory that does not depend on the number of points, bytes.
 fn fixed() -> u64 {
     PROGRAM + OF_THREAD * rayon::current_num_threads() as u64
 }
@@ -108,7 +109,8 @@ fn too_little(least: u64) -> Error {
     Error::Usage(format!("--memory is less than the {least}MiB that levels of detail of these points take at least"))
 }
 
-/// Writes the file if trees of `fits` surfels, with `of_surfel` bytes each, fit in memory.
+/// Writes the file. Subtrees of up to `fits` surfels, at `of_surfel` bytes each, are built in
+/// memory.
 fn made(sources: &Sources<'_>, runs: Runs<'_>, (fits, of_surfel): (u64, u64)) -> Result<Report> {
     let Runs { survey, folder, path, progress } = runs;
     let root = Lattice::over(&survey.bounds);
@@ -127,7 +129,7 @@ fn made(sources: &Sources<'_>, runs: Runs<'_>, (fits, of_surfel): (u64, u64)) ->
 /// Makes a part of a scene from points.
 type MadeOf = fn(&Survey, Points) -> Option<Scene>;
 
-/// A branch, and the sums from which those of its parent are computed.
+/// A branch, and the sums from which its parent's sums are computed.
 struct Summed {
     branch: Branch,
     sums: Sums,
@@ -143,8 +145,8 @@ struct Divider<'a> {
     fits: u64,
     /// Memory for each surfel, bytes.
     of_surfel: u64,
-    /// The lattices of the current set and of those that contain it, from the root's on; the
-    /// current set's places are on the last.
+    /// The lattices from the root down to the current set, without repetitions. The places of the
+    /// current set are on the last one.
     lattices: Vec<Lattice>,
 }
 
@@ -175,7 +177,7 @@ impl Divider<'_> {
         summed.map(|summed| Summed { moments: summed.moments[..known].to_vec(), ..summed })
     }
 
-    /// Computes the node above some branches, whose set has this lattice.
+    /// Computes the node above some branches. `lattice` is that of the node's set.
     fn above(&mut self, children: Vec<Summed>, (depth, lattice): (usize, &Lattice)) -> Result<Summed> {
         let mut moments = vec![Moments::default(); self.lattices.len()];
         let mut sums = Sums::default();
@@ -214,8 +216,8 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// Reads `count` surfels from pieces of files, and makes parts of the scene from their points
-    /// by `made`.
+    /// Reads `count` surfels from pieces of files, and joins the parts that `made` makes of their
+    /// points to one scene.
     fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)], made: MadeOf) -> Result<Scene> {
         let survey = self.runs.survey;
         let mut scene = survey.empty.clone();

@@ -1,4 +1,5 @@
-//! A cache of pages of a file. Nodes above many subtrees read few of their rows, or all in order.
+//! A cache of pages of a file. Computing a node above many subtrees reads either few of the rows
+//! below it, or all of them in order.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,5 +1,5 @@
-//! Sets of points that do not fit in memory: rows of an unnamed file, which are divided into the
-//! files of their child sets.
+//! Runs: sets of points that do not fit in memory. The rows of a run lie in an unnamed file, from
+//! which they are divided into the files of the child sets.
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +16,7 @@ use crate::io::ply::{ColorProperties, Properties, Rows, position};
 use crate::scene::{Bounds, Colors};
 use crate::{Error, Progress, Result};
 
-/// A set of points.
+/// A set of points in an unnamed file.
 pub(super) struct Run {
     pub rows: Rows,
     spread: Spread,
@@ -112,7 +112,7 @@ impl Runs<'_> {
         Ok(run.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The centre in a row, exactly as in the part of the scene that is made from it.
+    /// The centre in a row, equal to the bit to that of the surfel that is later made from the row.
     fn center(&self, row: &[u8]) -> DVec3 {
         let origin = self.survey.known.origin;
         let [short, rest] = split(DVec3::from_array(position(row)) - origin);
@@ -142,7 +142,7 @@ impl Runs<'_> {
         run.rows.pieces(PIECE).into_par_iter().map(piece).try_reduce(&nothing, |one, other| Ok(join(one, other)))
     }
 
-    /// Gives a set that spans few steps of its lattice a finer one, under the same condition as
+    /// Gives a set that spans few steps of its lattice a finer lattice, under the same condition as
     /// sets in memory.
     pub fn refined(&self, run: &mut Run) -> Result<Option<Lattice>> {
         if run.spread.extent() >= FEWEST_STEPS {

@@ -18,12 +18,12 @@ use crate::surfels::complete::{self, Added};
 use crate::surfels::{Preparation, guess_up, origin_for, usable_axes};
 use crate::{Error, Result};
 
-/// The facts, and a scene without surfels.
+/// Facts about all points of the inputs.
 pub(super) struct Survey {
     /// The scene without surfels from which each part starts.
     pub empty: Scene,
-    /// An input without points. It is joined with each part, which so has the attributes that any
-    /// file has.
+    /// An input without points, with each attribute that any of the files has. It is joined with
+    /// each part, so that all parts have the same attributes.
     others: Points,
     pub has: Has,
     pub known: Known,
@@ -87,7 +87,7 @@ impl Survey {
         Ok(look.finish(looks, places?))
     }
 
-    /// The memory that the scene has for each surfel, bytes.
+    /// The memory that the scene uses for each surfel, bytes.
     pub fn surfel_bytes(&self) -> u64 {
         let Has { low, clips, caps, normals } = self.has;
         let lists = [(low, 12), (clips, 24), (caps, 12), (normals, 12)];
@@ -123,8 +123,8 @@ impl Survey {
         Some(scene)
     }
 
-    /// As [`Self::part`], for points that were written from a part: its normals are taken over, bit
-    /// for bit.
+    /// As [`Self::part`], for points that were written from a part: the normals of that part are
+    /// restored bit for bit.
     pub fn part_again(&self, mut points: Points) -> Option<Scene> {
         let normals = if self.has.normals { points.normals.take() } else { None };
         let part = self.part(points)?;
@@ -288,7 +288,7 @@ impl Placed {
 }
 
 impl Look {
-    /// Collects what the files have, by reading no points from each.
+    /// Collects the facts in the headers of all files. No point is read.
     fn new(sources: &Sources<'_>) -> Result<Self> {
         let mut all = Self { empty: Scene::default(), others: Points::default(), up: None };
         for file in sources.files {

@@ -26,7 +26,7 @@ fn sphere(count: usize, center: [f64; 3], radius: f64) -> Points {
     }
 }
 
-/// The same as ellipses, some of which have a clip line, a cap or a normal of their own.
+/// Ellipses on a sphere. Some have a clip line, a cap or a shading normal.
 fn ellipses(count: usize) -> Points {
     let points = sphere(count, [6.1e6, -2.5, 40.25], 3.0);
     let normals = points.normals.clone().unwrap();
@@ -49,7 +49,7 @@ fn ellipses(count: usize) -> Points {
     }
 }
 
-/// Points followed by `other`; attributes that `one` lacks are left out.
+/// The points of `one`, followed by those of `other` without the attributes that `one` lacks.
 fn and(mut one: Points, other: &Points) -> Points {
     one.positions.extend(&other.positions);
     one.normals.iter_mut().for_each(|all| all.extend(other.normals.iter().flatten()));

@@ -1,4 +1,5 @@
-//! Writes the file from what is stored: surfels in their order, and nodes level by level.
+//! Writes the output file: the stored surfels in the order of the tree, and the nodes level by
+//! level.
 
 use std::ops::Range;
 use std::path::Path;
@@ -14,7 +15,7 @@ use crate::scene::{Whole, framed_within};
 use crate::surfels::Preparation;
 use crate::{Error, Progress, Result};
 
-/// Writes the file `path` from all that is stored.
+/// Writes the finished tree to the file `path`.
 pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn Progress) -> Result<Report> {
     let above = kept.parts.iter().filter(|part| matches!(part, Part::Above { .. })).count();
     let nodes = kept.nodes.count() + above as u64;
@@ -57,7 +58,7 @@ enum Piece<'a> {
 }
 
 impl Part {
-    /// The level after its deepest one.
+    /// The level after the deepest level of the part.
     fn end(&self) -> usize {
         match self {
             Self::Above { depth, .. } => depth + 1,
@@ -65,7 +66,7 @@ impl Part {
         }
     }
 
-    /// Its nodes on a level of the tree.
+    /// The nodes of the part on a level of the tree.
     fn pieces(&self, level: usize) -> Vec<Piece<'_>> {
         match self {
             Self::Above { depth, made, .. } if *depth == level => vec![Piece::One(made)],

@@ -7,13 +7,13 @@
 //!
 //! 1. A **counter** starts anywhere and grows by 1, or by a constant step of at most 256, in every
 //!    round. The loop ends once the counter passes a limit that no round changes. The loop ends if
-//!    the counter cannot wrap before it passes the limit, that is, if the limit is at most 2^32 - 1
-//!    - 256. The limits are: constants; sides of the image, which have 15 bits
-//!      ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
-//!      and lengths of lists. A list is a range within a binding, so it is shorter than 2^30 words:
-//!      `column_of` keeps its start below `arrayLength`, and its end is its start plus the number
-//!      of entries that were placed. A tile has two lists. If the counter grows by 1 while it is
-//!      below its limit, any limit will do: the counter reaches it before it wraps.
+//!    the counter cannot wrap before it passes the limit, that is, if the limit is at most
+//!    `2^32 - 1 - 256`. The limits are: constants; sides of the image, which have 15 bits
+//!    ([`Camera`](crate::scene::Camera) refuses larger ones), and numbers of its cells and tiles;
+//!    and lengths of lists. A list is a range within a binding, so it is shorter than 2^30 words:
+//!    `column_of` keeps its start below `arrayLength`, and its end is its start plus the number of
+//!    entries that were placed. A tile has two lists. If the counter grows by 1 while it is below
+//!    its limit, any limit will do: the counter reaches it before it wraps.
 //! 2. A **rectangle** is traversed row by row by a pixel that moves by a step in every round:
 //!    `at.x` grows, and past the last column it restarts and `at.y` grows. Columns and rows come
 //!    from a splat's bounds, whose numbers have 15 and 16 bits, so each of at most 2^16 rows has at

@@ -21,8 +21,8 @@ pub struct CameraOptions {
     pub eye: Option<DVec3>,
     /// Side from which the whole scene is in view: north, east, south, west, above or X,Y,Z
     ///
-    /// Compass directions are those of maps (north is +y, or -z where y is up), seen from 30 degrees
-    /// above the horizon. X,Y,Z points from the scene to the camera.
+    /// Compass directions are those of maps (north is +y, or -z where y is up), seen from 30
+    /// degrees above the horizon. X,Y,Z points from the scene to the camera
     #[cfg_attr(feature = "cli", arg(long, value_name = "SIDE", allow_hyphen_values = true, conflicts_with = "eye"))]
     pub from: Option<Side>,
     /// Point that the camera looks at [default: the scene's centre]

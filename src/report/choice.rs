@@ -115,8 +115,8 @@ pub(super) fn section(cases: &[Case<'_>]) -> String {
     )
 }
 
-/// Names, for each case with a true surface, the configuration whose picture is nearest to it: errors
-/// against the f64 reference of the same configuration do not tell.
+/// Names the configuration whose picture is nearest to the true surface, for each case that has
+/// one. Errors against the f64 reference of the same configuration do not tell which one is.
 fn nearest_to_truth(cases: &[Case<'_>]) -> String {
     let item = |case: &Case<'_>| {
         let known = case.measurements.iter().filter_map(|m| Some((m.reconstruction_error()?, m)));

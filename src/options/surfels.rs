@@ -42,7 +42,7 @@ pub struct SurfelOptions {
     /// Outliers, and the size and shape of estimated surfels.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub limits: LimitOptions,
-    /// Estimate sizes anew, as `epsplat surfels --size` does: knn, ellipse, bsp[:RULE] or qsplat
+    /// Estimate sizes anew, as `epsplat surfels --size`: knn, ellipse, bsp, bsp:RULE or qsplat
     ///
     /// RULE is circumsphere, global or global-circumsphere
     #[cfg_attr(feature = "cli", arg(long = "surfel-size", id = "surfel_size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true))]

@@ -1,9 +1,9 @@
-//! Stages 2 to 4 of [`Composite::Layers`] by the rasteriser: depth peeling (Everitt 2001), the
-//! baseline for the lists of [`fragments`](super::fragments).
+//! Stages 2 to 4 of [`Composite::Layers`](crate::scene::Composite::Layers) by the rasteriser: depth
+//! peeling (Everitt 2001), the baseline for the lists of [`fragments`](super::fragments).
 //!
-//! `render/sequence.rs` takes these steps for `Rasterised::Layers`. The visibility and the attribute
-//! pass are drawn once per layer, each time without the fragments of the layers before, and the
-//! result is composited behind those layers.
+//! `render/sequence.rs` takes these steps for `Rasterised::Layers`. The visibility and the
+//! attribute pass are drawn once per layer, each time without the fragments of the layers before,
+//! and the result is composited behind those layers.
 //!
 //! A layer ends one epsilon behind its nearest fragment
 //! ([`Parting::Window`](super::layers::Parting::Window)) and not at the first gap between

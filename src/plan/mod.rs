@@ -32,7 +32,7 @@ pub use mesh::{MeshFacts, MeshNeeds, texture_words};
 pub(crate) use mesh::{bounds_of, in_view};
 pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, culls_back};
 pub use optimisation::Optimisation;
-pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
+pub use pixel::{COLOR_CHANNEL, NO_MAP, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use settings::{BackendName, Organisation, Settings};
 pub use surface::{Rasterised, Splats, Surface, Winner};

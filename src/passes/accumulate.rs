@@ -64,9 +64,9 @@ use crate::scene::{Camera, Colors, Fade, Map, Scene};
 /// The file that stores the sums of `fixed`.
 ///
 /// It depends on whether terms may exceed a word, because weights may be small
-/// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`Splats::Copies`](crate::plan::Splats::Copies)), and on
-/// whether the adapter adds 64 bits at once ([`SceneNeeds::atomics_u64`]), which makes the same
-/// sums in half the additions.
+/// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies
+/// ([`Splats::Copies`](crate::plan::Splats::Copies)), and on whether the adapter adds 64 bits at
+/// once ([`SceneNeeds::atomics_u64`]), which makes the same sums in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
     match (needs.wide_sums || needs.surface.copies(), needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",

@@ -22,6 +22,10 @@
 //! 4. Every kernel has an f64 twin. Error figures are measured against the twins, which also
 //!    render where there is no adapter.
 //!
+//! An option goes from a group in [`options`] through its `settle`, which decides what is left
+//! open, to [`low_level::plan::Settings`]. `plan/view.rs` makes numbers of it for the kernels'
+//! uniform `View`, and [`low_level::plan::SceneNeeds`] chooses WGSL files by it.
+//!
 //! ```
 //! use epsplat::{DeviceOptions, Map, Points, Renderer, RenderOptions, Scene, SceneOptions, View};
 //!

@@ -240,7 +240,7 @@ impl FromStr for Beside {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Rims {
-    /// Both.
+    /// Clip lines and curvature.
     #[default]
     Curved,
     /// Clip lines only.

@@ -41,7 +41,7 @@ pub struct Arguments {
     /// Write a cut of the tree in place of the tree: nodes of up to this radius, world units
     ///
     /// A node replaces the surfels below it if all of them fit into a ball of this radius. A node
-    /// whose surfels deviate from its cap counts as larger, up to twice as large
+    /// counts as up to twice as large if its surfels deviate from its curved disk
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
     /// Limit the memory to a size such as 4GiB, by sorting the points in temporary files

@@ -65,8 +65,8 @@ impl Compiled {
     }
 }
 
-/// Key of a program: its source; its constants, by name, as bits; and a text of its entry points,
-/// draws and whether its loops are proven to end.
+/// Key of a program: its source; its constants, by name, as bits; and a text that lists its entry
+/// points and draws and says whether its loops are proven to end.
 pub(super) type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 /// Key of a pipeline: its SPIR-V and the layout of its bindings.

@@ -1,7 +1,7 @@
 //! Bounds on each pixel's error, derived from the pixel's own fragments. No number is fitted to a
 //! result.
 //!
-//! The bounds cover all fragments that the device may accept by
+//! The bounds cover all fragments that the device may accept within the errors of
 //! [`Precision`](super::precision::Precision). With u = 2^-24:
 //!
 //! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls

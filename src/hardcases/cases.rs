@@ -10,7 +10,7 @@ use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
 use crate::scene::Projection;
 
-/// The parts of a case's bound if nothing else dominates.
+/// The sentence about the bound of a case that says nothing else: these errors dominate it.
 pub const FRAGMENTS: &str =
     "the roundings of rho and depth over the cosine between view ray and normal, pixel by pixel";
 

@@ -18,7 +18,7 @@ pub(super) struct Fragment {
     pub(super) depth_error: f64,
     rho: f64,
     rho_error: f64,
-    /// Distance inside the lines at which the disk ends; negative outside.
+    /// Signed distance to the lines that clip the disk: positive inside.
     inside: f64,
     inside_error: f64,
     /// Whether it shows the back of a surface that has sides.

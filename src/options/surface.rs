@@ -24,10 +24,10 @@ group! {
         /// nearest (the nearest fragment alone, as with a depth test; unlit) [default: weighted]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", hide_short_help = true))]
         pub blend: Option<Blend>,
-        /// Filter for splats near a pixel in size: none (a disk covers a pixel only if it contains
-        /// the pixel's centre), max (every splat covers a pixel; gaps between splats stay), ewa
-        /// (splats are convolved with the pixel, which avoids aliasing) or gaussians (the filter of
-        /// 2D Gaussian splatting) [default: none; gaussians for Gaussians]
+        /// Filter for splats about as small as a pixel: none (a disk covers a pixel only if it
+        /// contains the pixel's centre), max (every splat covers a pixel; gaps between splats
+        /// stay), ewa (splats are convolved with the pixel, which avoids aliasing) or gaussians
+        /// (the filter of 2D Gaussian splatting) [default: none; gaussians for Gaussians]
         #[cfg_attr(feature = "cli", arg(long, value_name = "FILTER", hide_short_help = true))]
         pub lowpass: Option<LowPass>,
         /// Surfels to leave out: auto (those that face away, if a closed mesh hides them), back

@@ -100,7 +100,7 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     let pairs = fixed_file(needs) == PAIRS;
     [
         terms_file(needs),
-        if needs.wide_sums { "tile_add_wide.wgsl" } else { "tile_add.wgsl" },
+        "tile_add.wgsl",
         "tile_sums.wgsl",
         if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
     ]
@@ -187,7 +187,7 @@ impl PixelSums {
 /// ensures that every covered pixel has a depth.
 pub const LEAST_MIDDLE: f64 = 1.0 / 256.0;
 
-/// A fragment that a decision rejects by at most this relative distance still records the distance.
+/// A fragment that a test rejects by at most this relative margin still records the margin.
 const NEARBY: f64 = 1e-3;
 
 /// The f64 twin, over the rows of `nearest`, the result of the visibility pass's twin.

@@ -26,8 +26,8 @@
 //! [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the
-//! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. [`shared`] holds the
-//! files of every kernel.
+//! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. It also chooses the file
+//! of epsilon (`wgsl/visibility/epsilon_*.wgsl`). [`shared`] holds the files of every kernel.
 //!
 //! # How to add
 //!

@@ -168,7 +168,7 @@ pub enum Sides {
 }
 
 impl Sides {
-    /// Returns the visible sides in a picture.
+    /// Returns which sides of surfels a picture can show.
     pub fn of(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
         let both = options.facing.is_none() && !culls_back(facts, camera, options);

@@ -35,11 +35,11 @@ pub enum Surface {
     OrderFree(Oit),
     /// The rasteriser and its blender draw the splats.
     Raster {
-        /// The format of its sums, and its depth test.
+        /// The format of the rasteriser's sums, and its depth test.
         raster: Raster,
-        /// How its fragments are shown.
+        /// How the rasteriser's fragments are shown.
         shown: Rasterised,
-        /// It draws a triangle per splat instead of a quad
+        /// The rasteriser draws a triangle per splat instead of a quad
         /// ([`tuning::PIXELS_A_TRIANGLE`](super::tuning::PIXELS_A_TRIANGLE)).
         triangles: bool,
     },

@@ -36,7 +36,7 @@ impl SurfelLayout {
             ColorNeed::Srgb8 => 1,
             ColorNeed::Linear => 4,
             ColorNeed::Harmonics(degree) => 4 + 3 * terms_of(degree) as u32,
-            // A colour, a place in the texture, and the two slopes of that place.
+            // A colour, texture coordinates, and their two derivatives.
             ColorNeed::Textured => 16,
         };
         let low = copies + u32::from(needs.surface.copies());

@@ -56,7 +56,7 @@ fn is_none(count: &u64) -> bool {
     *count == 0
 }
 
-/// The weight in the picture of all that lies behind the last layer.
+/// How much everything behind the last layer contributes to the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tail {
     /// The mean weight over all pixels; at 1 the picture would show nothing else.

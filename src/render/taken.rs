@@ -1,4 +1,4 @@
-//! Reads the part of a file with levels of detail that given views need.
+//! Reads from a file with levels of detail only what given views need.
 
 use super::encoded;
 use super::parts::parts;

@@ -11,8 +11,8 @@ use crate::io::png;
 /// Longest side on the page, pixels. Larger pictures are shrunk by a whole factor.
 const LARGEST_SIDE: u32 = 512;
 
-/// Most pictures that may have sides of [`LARGEST_SIDE`]. If there are more, they are smaller, down
-/// to a quarter: a sweep has hundreds, and the page is one file.
+/// Up to this many pictures have sides of [`LARGEST_SIDE`]. If there are more, all are smaller,
+/// down to a quarter: a sweep has hundreds, and the page is one file.
 const MANY: usize = 32;
 
 /// Returns the longest side of each of `pictures` pictures.

@@ -268,7 +268,8 @@ impl<'a> Framing<'a> {
         let mut eye = DVec3::new(0.0, 0.0, -2.0 * self.radius);
         if self.pinhole {
             // The eye must keep every point between four planes, X - x <= (mid + half) (Z - z) and
-            // so on. This is the foremost eye for the pair of planes that is more restrictive.
+            // so on. The more restrictive
+            // pair of planes decides how far forward the eye may stand.
             let planes = [
                 DVec3::new(1.0, 0.0, -(mid_x + half_x)),
                 DVec3::new(-1.0, 0.0, mid_x - half_x),

@@ -33,7 +33,7 @@ pub(super) struct Part {
 pub struct ReadReport {
     /// Nodes of the levels of detail.
     pub nodes: [u64; 2],
-    /// Points, or surfels.
+    /// Points of a COPC file, or surfels of a file of `epsplat lod`.
     pub points: [u64; 2],
     /// Bytes of nodes and points in the files.
     pub bytes: [u64; 2],

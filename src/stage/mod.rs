@@ -121,7 +121,7 @@ struct Request<'a> {
     scene: &'a Inputs,
     options: &'a RenderOptions,
     device: &'a DeviceOptions,
-    /// The picture is one of many views, between which cuts of levels of detail fade.
+    /// The picture is one of many views, from one to the next of which levels of detail fade.
     views: bool,
 }
 

@@ -353,7 +353,6 @@ fn absent_parts_have_their_partners_signatures() {
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);
     alike("words", &["words", "each_word", "surfel_at", "surfels_held"]);
     alike("image_", &["write_color"]);
-    alike("tile_add", &["add"]);
     alike("tile_deposit", &["deposit_sums"]);
     alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);
     alike("tile_filter", &["handed_filter", "filter_misses"]);

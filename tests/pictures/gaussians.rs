@@ -187,8 +187,8 @@ fn a_large_file_is_what_the_published_formulas_say() {
     }
 }
 
-/// Device and twin agree to 1e-6 where rounding decides nothing, for every degree and in other
-/// composites.
+/// Device and twin agree to 1e-6 at pixels where rounding changes no decision, for every degree and
+/// each composite.
 #[test]
 fn device_and_twin_agree_in_every_degree_and_composite() {
     let Some(backend) = gpu() else { return };

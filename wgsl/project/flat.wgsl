@@ -58,8 +58,8 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
     return (splat.bounds_last & AWAY) != 0u;
 }
 
-// A depth in front of every fragment of the disk itself between the pixels `first` and `last`,
-// relative to the anchor.
+// A depth in front of every fragment of the disk between the pixels `first` and `last`, which are
+// relative to the anchor. The low-pass is not included.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let c = vec2<f32>(splat.c[0], splat.c[1]);
     let low = min(c * first, c * last);

@@ -1,6 +1,6 @@
-// The sums of accumulator_fixed.wgsl, bit for bit, in the registers of a tile (tile.wgsl). They are
-// added to the sums in storage at the end, if those exist. `pixel` is the pixel's slot in the
-// column.
+// The sums of accumulator_fixed.wgsl or accumulator_fixed_wide.wgsl, bit for bit, in the registers
+// of a tile (tile.wgsl). They are added to the sums in storage at the end, if those exist. `pixel`
+// is the pixel's slot in the column.
 // #import *::{Term}
 // #import terms|terms_wide::{term_words}
 // #import tile_sums::{add_words}

@@ -82,7 +82,8 @@ fn is_hit(sides: vec3<f32>, depth: f32) -> bool {
     return sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z && depth >= held.near;
 }
 
-// In f32, for triangles whose corners are all plain and that are not ill-formed (is_ill_formed()).
+// The crossing in f32, for triangles that are not ill-formed (is_ill_formed()) and whose corners
+// are all plain.
 fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let a = plain_spoke(triangle.a, p);
     let b = plain_spoke(triangle.b, p);
@@ -107,8 +108,8 @@ fn spoke(corner: Corner, p: f32, image: Double) -> Double {
     return sum(image, product(corner.w, single(-p)));
 }
 
-// An edge in doubled arithmetic. It is evaluated from the corner of the lower index on, so both of
-// its triangles get the same numbers; `turned` is -1 for the triangle that has it the other way
+// An edge in doubled arithmetic. The evaluation starts at the corner with the lower index, so both
+// triangles of the edge get the same numbers; `turned` is -1 for the triangle that has it the other way
 // round.
 fn doubled_edge(from_: Corner, to: Corner, p: vec2<f32>, turned: f32) -> Edge {
     let a_x = spoke(from_, p.x, from_.x);

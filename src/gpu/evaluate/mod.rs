@@ -22,7 +22,7 @@ use arithmetic::{binary, converted, math, of_literal, recast, unary};
 /// Limit of loop rounds and function calls, counted together.
 const MOST_ROUNDS: u32 = 10_000;
 
-/// Limit of nested calls. WGSL has no recursion, so this bounds only the stack.
+/// Limit of nested calls, which protects the evaluator's stack: WGSL has no recursion, so calls end.
 const DEEPEST: u32 = 64;
 
 /// The reason why an evaluation gave no number.
@@ -401,7 +401,7 @@ mod tests {
         assert!(at("return pow(x, 2.0);", -1.0).unwrap().is_nan());
     }
 
-    /// The built-in kernels evaluate to their hand-written twins.
+    /// The evaluator gives built-in kernels the values of their hand-written twins.
     #[test]
     fn built_in_kernels_have_the_values_of_their_twins() {
         for text in

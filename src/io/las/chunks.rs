@@ -90,7 +90,7 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
             ));
         }
         // Without chunks, the chunk size may be 0. The decoder would take that for chunks of
-        // variable size and read their table, so it is shown 1.
+        // variable size and read their table, so it gets a 1 to read.
         file.get_mut().show(at + CHUNK_SIZE as u64, &u32::to_le_bytes(1));
         return Ok(Decoding::Sequential);
     }

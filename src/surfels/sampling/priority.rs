@@ -61,8 +61,8 @@ impl Priority {
     }
 }
 
-/// The area times `quantity`, plus a multiple of the area that attracts the fraction [`EVEN`] of
-/// the samples.
+/// The area of each voxel times `quantity`, plus a multiple of the area. The multiple is chosen so
+/// that the second term attracts the fraction [`EVEN`] of the samples.
 fn blended(voxels: &[Voxel], quantity: impl Fn(&Voxel) -> f64 + Sync) -> Vec<f64> {
     let weighted: Vec<f64> = voxels.par_iter().map(|voxel| voxel.area * quantity(voxel)).collect();
     let (sum, area) = (weighted.iter().sum::<f64>(), voxels.iter().map(|voxel| voxel.area).sum::<f64>());

@@ -38,8 +38,8 @@ const SEQUENTIAL: usize = 4096;
 /// A cluster of fewer points than this is not split.
 const TWO_TRIANGLES: usize = 6;
 
-/// Three points are collinear if the ratio of l1 to l2 is below this, within the rounding of
-/// coordinates.
+/// Below this ratio of the eigenvalues l1 and l2, the rounding of coordinates leaves open whether
+/// three points lie on a line, and they count as collinear.
 const COLLINEAR: f64 = 1e-12;
 
 /// Returns the radius of each position's disk, scaled units, and the number of positions whose

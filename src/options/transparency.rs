@@ -12,9 +12,9 @@ group! {
         /// opaque hides them. layers composites all surfaces from front to back, each with its own
         /// alpha; layers:L composites the nearest L. sorted composites all fragments in order of
         /// depth, each with its alpha times its weight. gaussians does the same by the rules of 2D
-        /// Gaussian splatting. weighted and moments, for comparison, come near the result of sorted
-        /// by sums that need no order; they shade splats instead of pixels [default: opaque; gaussians for
-        /// Gaussians]
+        /// Gaussian splatting. weighted and moments, for comparison, come near the result of
+        /// sorted by sums that need no order; they shade splats instead of pixels [default:
+        /// opaque; gaussians for Gaussians]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW"))]
         pub composite: Option<Composite>,
         /// Factor on all alphas, 0 to 1 [default: 1]

@@ -41,9 +41,9 @@ const STEP: f64 = 2.0;
 /// of a ray is *covered* if the ray meets a disk within [`REACH`] of it.
 ///
 /// An uncovered hit is an *edge* if the surface ends or steps back within half the radius of the
-/// nearest disk, and a *hole* if the surface continues around it. Along an outline,
-/// flat disks end slightly inside the true silhouette: an error of shape, not a gap between disks. A gap at the outline of one view is not at the outline of another, which sees it
-/// from the front.
+/// nearest disk, and a *hole* if the surface continues around it. Along an outline, flat disks end
+/// slightly inside the true silhouette: an error of shape, not a gap between disks. A gap at the
+/// outline of one view is not at the outline of another, which sees it from the front.
 ///
 /// Shares are of rays, so of the visible surface as seen: parts that face a view count by their
 /// area, oblique parts by less, and hidden parts not at all. If there are no holes, none of these

@@ -25,12 +25,13 @@ pub struct Joint {
 /// Measures, pixel by pixel, whether `first_shows` agrees with the rays of `camera` to the first
 /// and the second surface. None if the surfaces meet nowhere in the image.
 ///
-/// The true curve, where the two surfaces meet, runs between neighbouring pixels whose rays hit the two surfaces in opposite
-/// order, at the point where the difference of the two depths, linearly interpolated, is 0. The
-/// visible curve separates pixels that show either surface. Let it have the length L and lie at the distance d(s) from the true curve. The wrong pixels lie
-/// between the two curves. Their distances from the true curve add up to the integral of `d^2/2`
-/// over s, so `rms^2 = 2 / L * sum of distances`. L is the area of the pixels within [`BESIDE`] of
-/// the curve, divided by the width of that strip.
+/// The true curve, where the two surfaces meet, runs between neighbouring pixels whose rays hit the
+/// two surfaces in opposite order, at the point where the difference of the two depths, linearly
+/// interpolated, is 0. The visible curve separates pixels that show either surface. Let it have the
+/// length L and lie at the distance d(s) from the true curve. The wrong pixels lie between the two
+/// curves. Their distances from the true curve add up to the integral of `d^2/2` over s, so
+/// `rms^2 = 2 / L * sum of distances`. L is the area of the pixels within [`BESIDE`] of the curve,
+/// divided by the width of that strip.
 pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> Option<Joint> {
     let difference = |pixel: usize| {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);

@@ -86,8 +86,8 @@ impl Seen {
     ///
     /// They bound the intersection of two boxes around the cap, each sheared along a ray. The box
     /// along the ray through the centre is tight, except beside the eye, where that ray is nearly
-    /// perpendicular to the optical axis and the box fills the image. The box along the optical axis
-    /// is small there.
+    /// perpendicular to the optical axis and the box fills the image. The box along the optical
+    /// axis is small there.
     pub fn extent(&self, camera: &Camera) -> [DVec2; 2] {
         let focal = DVec2::new(camera.fx, camera.fy);
         let image = |point: DVec2| point * focal + DVec2::new(camera.cx, camera.cy);

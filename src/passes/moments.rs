@@ -149,8 +149,8 @@ mod tests {
             let shown = two.let_through(place, -1.0);
             assert!((shown - (-mass).exp()).abs() < 0.01, "{place}: {shown}");
         }
-        // At its own depth a surface counts with a quarter of its mass. The nearest surface gets all
-        // light.
+        // At its own depth a surface counts with a quarter of its mass. The nearest surface gets
+        // all light.
         assert!((two.let_through(-0.4, -1.0) - (-0.25f64 * 0.7).exp()).abs() < 0.01);
         assert_eq!(two.let_through(-0.4, -0.4), 1.0);
         // However dense the pixel is, the nearest fragment has weight 1, and one far behind has

@@ -109,8 +109,8 @@ fn spoke(corner: Corner, p: f32, image: Double) -> Double {
 }
 
 // An edge in doubled arithmetic. The evaluation starts at the corner with the lower index, so both
-// triangles of the edge get the same numbers; `turned` is -1 for the triangle that has it the other way
-// round.
+// triangles of the edge get the same numbers; `turned` is -1 for the triangle that has it the other
+// way round.
 fn doubled_edge(from_: Corner, to: Corner, p: vec2<f32>, turned: f32) -> Edge {
     let a_x = spoke(from_, p.x, from_.x);
     let a_y = spoke(from_, p.y, from_.y);

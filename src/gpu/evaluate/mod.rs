@@ -22,7 +22,8 @@ use arithmetic::{binary, converted, math, of_literal, recast, unary};
 /// Limit of loop rounds and function calls, counted together.
 const MOST_ROUNDS: u32 = 10_000;
 
-/// Limit of nested calls, which protects the evaluator's stack: WGSL has no recursion, so calls end.
+/// Limit of nested calls, which protects the evaluator's stack: WGSL has no recursion, so calls
+/// end.
 const DEEPEST: u32 = 64;
 
 /// The reason why an evaluation gave no number.

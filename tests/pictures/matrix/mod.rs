@@ -299,6 +299,17 @@ fn every_combination_is_drawn_alike_and_right() {
     assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
 }
 
+/// The checks refuse less than three quarters of the options that are drawn. Each refusal is printed
+/// with its share.
+#[test]
+fn refusals_are_counted() {
+    let mut tally = Tally::default();
+    (0..2000).for_each(|seed| drop(combination(seed, &mut tally)));
+    tally.print();
+    let refused: usize = tally.refused.values().sum();
+    assert!(tally.failures.is_empty() && 4 * refused < 3 * tally.drawn, "{refused} of {}", tally.drawn);
+}
+
 /// A fault in one organisation is found within 24 combinations that it can affect.
 #[test]
 fn a_fault_in_one_organisation_is_found() {

@@ -223,7 +223,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         ("shade_lambert.wgsl", "max(0.0, dot3(normal, light.xyz))", "abs(dot3(normal, light.xyz))", 0),
         ("resolve.wgsl", "back.a * (1.0 - front.a)", "back.a * (1.0001 - front.a)", 0),
         ("color_sums.wgsl", "held.color_low + held", "held.color_low * 1.0001 + held", 0),
-        ("depth_map.wgsl", "* held.world", "* (held.world * 1.00001)", 2),
+        ("maps.wgsl", "DEPTH_IMAGE, 0u, depth", "DEPTH_IMAGE, 0u, 1.00001 * depth", 2),
         ("accumulator_fixed.wgsl", "WEIGHT_CHANNEL) / ONE", "WEIGHT_CHANNEL) / (ONE - 6400.0)", 3),
     ] {
         let Some(gpu) = common::gpu_for(file) else { return };

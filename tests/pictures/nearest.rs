@@ -140,7 +140,7 @@ fn broken_kernels_are_noticed() {
         (None, "nearest_color.wgsl", "atomicMax(&winners", "atomicMin(&winners"),
         (None, "nearest_color.wgsl", "attribute_word(surfel, 0u)", "attribute_word(surfel / 2u, 0u)"),
         (Some(Optimisation::Pairs), "winner_second.wgsl", "attributes.word", "~attributes.word"),
-        (None, "depth_map.wgsl", "depth * held.world", "depth * held.world * 1.0001"),
+        (None, "maps.wgsl", "DEPTH_IMAGE, 0u, depth", "DEPTH_IMAGE, 0u, 1.0001 * depth"),
     ] {
         let Some(gpu) = common::gpu() else { return };
         let options = Settings { without: without.into_iter().collect(), ..options(Some(PointShape::Sphere)) };

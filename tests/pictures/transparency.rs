@@ -501,7 +501,7 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
     }
     assert!(seen > 3000 && none_seen > 1000, "{seen} {none_seen}");
     // Control: a kernel that writes wrong depths is noticed.
-    let wrong = Sources::default().replace("surfaces_map.wgsl", "2u * number] = depth", "2u * number] = 1.001 * depth");
+    let wrong = Sources::default().replace("maps.wgsl", "2u * number, depth", "2u * number, 1.001 * depth");
     let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: wrong.unwrap() };
     assert!(pixels(&frame(&scene, &camera, &own, &wrong)) != pixels(&device));
     let refused = |of: Settings| match render(&scene, &camera, &of, &backend, &()) {

@@ -77,7 +77,8 @@ fn a_changed_layout_is_noticed() {
     assert!(renamed.contains("View.center exists in WGSL only"), "{renamed}");
     assert!(renamed.contains("View.middle exists in Rust only"), "{renamed}");
     let exchanged = broken(
-        "    farthest: f32,\n    // Depth of the middle of the scene's core, device units.\n    middle: f32,\n",
+        "    farthest: f32,\n    // Depth of the centre of the scene's core (the box of nearly all points), device \
+         units.\n    middle: f32,\n",
         "    middle: f32,\n    farthest: f32,\n",
     );
     assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");

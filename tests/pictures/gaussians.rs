@@ -419,7 +419,7 @@ fn a_file_is_drawn_as_it_was_trained() {
     fails(
         &["render", text(&path), "-o", text(&output), "--lowpass", "gaussians", "--kernel", "hat"],
         2,
-        &["beside a kernel gaussian"],
+        &["needs a Gaussian kernel"],
     );
     for other in [&["--facing", "circle"][..], &["--backend", "raster"], &["--composite", "layers"]] {
         assert!(render(other).0.color.iter().any(|color| color[3] > 0.5), "{other:?}");

@@ -252,7 +252,7 @@ fn defaults_that_are_given_and_choices_of_one_file_are_no_fault() {
     let (apart, told) = draw("d.png", &[plain, "--lod", "2px", "--separate"]);
     assert!(levels == apart && told.contains("changes nothing"), "{told}");
     let two = ["render", plain, text(&painted), "-o", "x.png", "--lod", "2px", "--separate"];
-    fails(&two, 2, &["of all inputs together", "depth map"]);
+    fails(&two, 2, &["blend all inputs", "depth map"]);
     // A texture with layers: its blue half is translucent.
     let texture = [text(&painted), "--texture", text(&image), "--composite", "layers:2"];
     let (_, told) = draw("e.png", &texture);

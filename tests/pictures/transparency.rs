@@ -509,6 +509,6 @@ fn maps_tell_of_each_surface_and_of_the_tail() {
         Ok(_) => panic!("{of:?} is not refused"),
     };
     assert!(refused(of(ALL, &[Map::Tail])).contains("layers:L"));
-    assert!(refused(of(Composite::Opaque, &[Map::Surfaces])).contains("told apart"));
-    assert!(refused(of(Composite::Moments, &[Map::Surfaces])).contains("told apart"));
+    assert!(refused(of(Composite::Opaque, &[Map::Surfaces])).contains("surfaces behind each other"));
+    assert!(refused(of(Composite::Moments, &[Map::Surfaces])).contains("surfaces behind each other"));
 }

@@ -99,13 +99,17 @@ impl CameraFile {
 }
 
 fn parse(text: &str) -> std::result::Result<CameraFile, String> {
-    let value = serde_json::from_str(text).map_err(|e| format!("not a camera: {}", one_line(&e.to_string())))?;
-    of_value(value)
+    let raw: Raw = serde_json::from_str(text).map_err(|e| format!("not a camera: {}", one_line(&e.to_string())))?;
+    of_raw(raw)
 }
 
 /// The camera that a JSON object describes.
 pub(super) fn of_value(value: serde_json::Value) -> std::result::Result<CameraFile, String> {
     let raw: Raw = serde_json::from_value(value).map_err(|e| format!("not a camera: {}", one_line(&e.to_string())))?;
+    of_raw(raw)
+}
+
+fn of_raw(raw: Raw) -> std::result::Result<CameraFile, String> {
     let size = match (raw.width, raw.height) {
         (Some(width), Some(height)) => Some((width, height)),
         (None, None) => None,

@@ -25,7 +25,7 @@ pub enum Side {
     /// A compass direction, seen from [`ELEVATION`] above the horizon: of 0 for north, 90 degrees
     /// for east and so on. North is +y where z is up, and -z where y is up.
     Compass(u32),
-    /// Straight from above, with north at the top.
+    /// Straight from above, with +y at the top, or +z where y is up.
     Above,
     /// From this direction, world coordinates of any length.
     Toward(DVec3),

@@ -82,6 +82,9 @@ impl Frame<'_> {
 
     /// The camera of a frame that has the keys of a camera file; `None` for other frames.
     fn of_camera_file(&self) -> Option<Result<CameraFile, String>> {
+        if self.own.get("transform_matrix").is_some() {
+            return None;
+        }
         let keys = ["eye", "target", "camera_to_world", "world_to_camera"];
         let mut object = self.own.as_object().filter(|own| keys.iter().any(|key| own.contains_key(*key)))?.clone();
         object.remove("file_path");

@@ -299,8 +299,8 @@ fn every_combination_is_drawn_alike_and_right() {
     assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
 }
 
-/// The checks refuse less than three quarters of the options that are drawn. Each refusal is printed
-/// with its share.
+/// The checks refuse less than three quarters of the options that are drawn. Each refusal is
+/// printed with its share.
 #[test]
 fn refusals_are_counted() {
     let mut tally = Tally::default();

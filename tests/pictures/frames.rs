@@ -226,7 +226,7 @@ fn frames_of_the_reference_are_what_they_were() {
 }
 
 /// A second render of each frame has the same bits, and so has a render by a core WebGPU device.
-/// That device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB, and
+/// A core device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB, and
 /// no optional feature.
 #[test]
 fn frames_repeat_and_core_webgpu_makes_the_same_ones() {

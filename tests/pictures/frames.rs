@@ -226,8 +226,8 @@ fn frames_of_the_reference_are_what_they_were() {
 }
 
 /// A second render of each frame has the same bits, and so has a render by a core WebGPU device.
-/// A core device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB, and
-/// no optional feature.
+/// A core device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB,
+/// and no optional feature.
 #[test]
 fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
     let (Some(gpu), Some(core)) = (common::gpu(), common::core_gpu()) else { return };

@@ -309,7 +309,18 @@ pub(super) fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D
 
 impl Definition {
     /// Returns the study with its quick settings, without entries that have `quick = false`.
-    pub fn quick_form(mut self) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if no setting of the study makes a quick run shorter.
+    pub fn quick_form(mut self) -> Result<Self> {
+        let shorter =
+            |scene: &SceneEntry| !scene.quick || scene.quick_count.is_some() || scene.quick_footprint_px.is_some();
+        let whole = self.quick.runs.is_none() && self.quick.size.is_none();
+        if whole && !self.scenes.iter().any(shorter) && self.configs.iter().all(|config| config.quick) {
+            return Err(Error::Usage(
+                "this study has no quick form: leave --quick out, or give it [quick] with runs or size".into(),
+            ));
+        }
         self.runs = self.quick.runs.unwrap_or(self.runs);
         self.size = self.quick.size.unwrap_or(self.size);
         self.scenes.retain(|scene| scene.quick);
@@ -318,7 +329,7 @@ impl Definition {
             scene.count = scene.quick_count.clone().or(scene.count.take());
             scene.footprint_px = scene.quick_footprint_px.clone().or(scene.footprint_px.take());
         }
-        self
+        Ok(self)
     }
 
     /// Returns the configurations that render the scene of `entry`.

@@ -320,9 +320,12 @@ mod tests {
         assert_eq!(study.configs[1].sums(), "rgba32float");
         assert!(study.configs[1].settings(None).raster.is_some() && options.raster.is_none());
         assert_eq!(study.scenes[0].count.as_ref().unwrap().values(), [10, 20]);
-        let quick = study.quick_form();
+        let quick = study.quick_form().unwrap();
         assert_eq!((quick.runs, quick.size, quick.scenes.len(), quick.configs.len()), (2, [8, 8], 1, 1));
         assert_eq!(quick.scenes[0].count, Some(OneOrMany::One(5)));
+        let whole = text.replace("[quick]\nruns = 2\nsize = [8, 8]\n", "").replace("quick = false\n", "");
+        let whole = parse(&whole.replace("quick_count = 5\n", "")).unwrap();
+        assert!(whole.quick_form().unwrap_err().to_string().contains("no quick form"));
     }
 
     /// Each error names the file and the key.

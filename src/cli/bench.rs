@@ -47,7 +47,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let mut definition = Definition::read(&arguments.definition)?;
     if arguments.quick {
-        definition = definition.quick_form();
+        definition = definition.quick_form()?;
     }
     definition.runs = arguments.runs.unwrap_or(definition.runs);
     if arguments.table && definition.baseline.is_none() {

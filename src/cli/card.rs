@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     card::check_names(&studies)?;
     check_outputs(&arguments.out, &files, &studies)?;
     if arguments.quick {
-        studies = studies.into_iter().map(Definition::quick_form).collect();
+        studies = studies.into_iter().map(Definition::quick_form).collect::<Result<_>>()?;
     }
     let asked = Asked {
         adapter: arguments.adapter.clone(),

@@ -119,10 +119,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Returns a path, in quotes if it has characters that a shell interprets.
+/// Returns a path as an argument of a shell: in quotes, unless no character has a meaning there.
 fn quoted(path: &Path) -> String {
     let path = path.display().to_string();
-    if path.contains([' ', '(', ')', '&', '$']) { format!("'{path}'") } else { path }
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%=".contains(c);
+    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 /// Returns the image files of a mesh's textures, in the order of the textures' numbers.

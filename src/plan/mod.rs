@@ -206,16 +206,13 @@ impl Plan {
 
     /// Plans the frame of the f64 reference, in strips of sample rows; nothing is culled.
     pub fn of_reference(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
-        let needs = SceneNeeds::of_picture(facts, camera, options);
+        // The twins have one path where a device has several ways to draw.
+        let scattered = Settings { raster: None, organisation: Organisation::Scatter, ..options.clone() };
+        let needs = SceneNeeds::of_picture(facts, camera, &scattered);
         let individuals = if needs.surface.separate() { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
-            // The twins have one path where a device has several ways to draw.
-            needs: SceneNeeds {
-                surface: Surface::by_compute(facts, options),
-                // The reference gets a scene that holds only the cut.
-                levels: false,
-                ..needs
-            },
+            // The reference gets a scene that holds only the cut.
+            needs: SceneNeeds { levels: false, ..needs },
             pixel: PixelLayout::of(&needs),
             sum_words: 0,
             one: 1,

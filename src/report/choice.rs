@@ -93,8 +93,10 @@ fn overall<'a>(cases: &[Case<'a>]) -> Vec<(Limit, Overall<'a>)> {
 pub(super) fn section(cases: &[Case<'_>]) -> String {
     let rows: String = cases.iter().map(rows).collect();
     if rows.is_empty() {
-        return "<section><h2>Which to use</h2><p>No configuration was compared with the reference.</p></section>"
-            .into();
+        return format!(
+            "<section><h2>Which to use</h2>{}<p>No configuration was compared with the reference.</p></section>",
+            nearest_to_truth(cases)
+        );
     }
     let sentence = match cases {
         [case] => sentence(

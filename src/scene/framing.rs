@@ -4,8 +4,9 @@ use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::camera::check_size;
+use super::side::unit;
 use super::{Bounds, Camera, Lens, Projection, Scene, Side, Surfel};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
 const FILL: f64 = 0.95;
@@ -36,7 +37,8 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// As [`Camera::framing`], and [`Error::Usage`] if `up` or the side has no direction.
+    /// As [`Camera::framing`], and [`Error::Usage`] if `up` or the side has no direction, or if both
+    /// have the same.
     pub fn framing_from(
         size: (u32, u32),
         lens: Lens,
@@ -72,22 +74,14 @@ impl Camera {
             [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
         };
         let image = [interval(width, cx, fx), interval(height, cy, fy)];
-        let unit = |direction: DVec3| (direction / direction.abs().max_element()).try_normalize();
-        let (given, mut up) = (up.is_some(), up.unwrap_or(scene.up.axis()));
-        let Some(mut vertical) = unit(up) else {
-            return Err(Error::Usage("the direction of up has no length".into()));
+        let (forward, up) = match side {
+            Some(side) => side.view(up, scene.up)?,
+            None => {
+                let given = up.unwrap_or(scene.up.axis());
+                (forward(unit(given, "up")?), given)
+            }
         };
-        let forward = match side {
-            None => forward(vertical),
-            Some(side) => match unit(side.direction(scene.up)) {
-                Some(toward) => -toward,
-                None => return Err(Error::Usage("the direction of --from has no length".into())),
-            },
-        };
-        if !given && forward.cross(vertical).length() <= 1e-3 {
-            (up, vertical) = (scene.up.other(), scene.up.other());
-        }
-        let framing = Framing::new(scene, projection == Projection::Pinhole, image, (forward, vertical));
+        let framing = Framing::new(scene, projection == Projection::Pinhole, image, (forward, unit(up, "up")?));
         let mut eye = framing.eye(FILL, Of::Centers);
         if of == Of::Disks && framing.cuts(eye) {
             eye = framing.eye(FILL_OF_DISKS, Of::Disks);
@@ -340,8 +334,20 @@ mod tests {
                 }));
             }
             let top = -view("above").rotation.row(1);
-            assert!((top.dot(up.other()) - 1.0).abs() < 1e-9, "{top}");
+            assert!((top.dot(north) - 1.0).abs() < 1e-9, "{top}");
             assert!((view("1,0,0").rotation.row(2) + DVec3::X).length() < 1e-9);
+            // The user's up decides where north is, whatever the scene's is.
+            let given = |text: &str, up| {
+                let side = Some(text.parse::<Side>().unwrap());
+                Camera::framing_from((64, 64), Lens::Fov(45.0), &scene, 1e-3, (side, Some(up)))
+            };
+            for (up, north) in [(DVec3::Z * 7.0, DVec3::Y), (DVec3::Y, DVec3::NEG_Z)] {
+                let rotation = given("north", up).unwrap().0.rotation;
+                assert!((rotation.row(2).dot(-north) - elevation.cos()).abs() < 1e-9, "{rotation}");
+                let rotation = given("above", up).unwrap().0.rotation;
+                assert!((rotation.row(1) + north).length() < 1e-9, "{rotation}");
+            }
+            assert!(given("1,0,0", -DVec3::X).unwrap_err().to_string().contains("give another --up"));
         }
         assert!("up".parse::<Side>().is_err() && "1,2".parse::<Side>().is_err() && "nan,0,0".parse::<Side>().is_err());
     }

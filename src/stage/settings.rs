@@ -3,8 +3,9 @@
 use super::Request;
 use crate::error::{Error, Result};
 use crate::options::Suggested;
-use crate::plan::{Settings, check};
+use crate::plan::{Facts, Settings, check};
 use crate::progress::Progress;
+use crate::scene::composite::ALL_LAYERS;
 use crate::scene::{Blend, Colors, Composite, Scene};
 
 impl Request<'_> {
@@ -61,8 +62,13 @@ impl Request<'_> {
     /// Whether surfaces are translucent and nobody said how they are composited.
     fn hides_what_lies_behind(&self, settings: &Settings, scene: &Scene) -> bool {
         let chosen = self.options.transparency.composite.is_some() || settings.composite != Composite::Opaque;
-        let able = settings.blend != Blend::Nearest && settings.raster.is_none() && scene.triangles.is_empty();
-        !chosen && able && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0)
+        let layers_can_be_drawn = || {
+            let layered = Settings { composite: Composite::Layers(ALL_LAYERS), ..settings.clone() };
+            check::options(&layered, self.is_reference())
+                .and_then(|()| check::scene(&Facts::of(scene), &layered, self.is_reference()))
+                .is_ok()
+        };
+        !chosen && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0) && layers_can_be_drawn()
     }
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {

@@ -143,7 +143,10 @@ impl Given {
     fn checked(self) -> Result<View> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
-            Place::Framed(_, up) => {
+            Place::Framed(side, up) => {
+                if let (Some(side), Some(_)) = (side, up) {
+                    side.view(*up, Up::Z)?;
+                }
                 let across = up.filter(|up| *up != DVec3::ZERO).map_or(DVec3::X, |up| up.any_orthogonal_vector());
                 Pose::LookAt(DVec3::ZERO, across, *up)
             }
@@ -168,7 +171,11 @@ impl Given {
         let (pose, up, by) = match &self.place {
             Place::Framed(side, up) => {
                 let (camera, target) = Camera::framing_from(self.size, self.lens, scene, near, (*side, *up))?;
-                return Ok((camera, Seen { target, up: *up, by: By::Choice }));
+                let up = match side {
+                    Some(Side::Above) => Some(Side::Above.view(*up, scene.up)?.1),
+                    _ => *up,
+                };
+                return Ok((camera, Seen { target, up, by: By::Choice }));
             }
             Place::Eye(eye, up) => {
                 let center = scene.origin + scene.framed().0.center();

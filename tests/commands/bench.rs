@@ -45,7 +45,7 @@ fn every_shipped_study_is_one_and_has_a_quick_form() {
         let study = Definition::read(&path).unwrap();
         assert_eq!(path.file_stem().unwrap().to_str().unwrap(), study.name);
         let (scenes, configs) = (study.scenes.len(), study.configs.len());
-        let quick = study.quick_form();
+        let quick = study.quick_form().unwrap();
         assert!(!quick.scenes.is_empty() && !quick.configs.is_empty());
         assert!(quick.scenes.len() <= scenes && quick.configs.len() <= configs && quick.runs <= 2);
         assert!(quick.baseline.iter().all(|name| quick.configs.iter().any(|config| config.name == *name)));

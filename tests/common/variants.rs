@@ -40,7 +40,7 @@ pub fn all_needs() -> &'static [SceneNeeds] {
                 let values = values(&needs);
                 let mut news = 0;
                 for (k, a) in values.iter().enumerate() {
-                    news += values[..k].iter().filter(|b| pairs.insert((*a, **b))).count();
+                    news += values[..k].iter().filter(|b| pairs.insert((a.clone(), (*b).clone()))).count();
                 }
                 if (news > 0 || drawn % REGULAR == 0) && known.insert(needs) {
                     kept.push(needs);
@@ -64,10 +64,20 @@ pub fn plain() -> SceneNeeds {
 
 /// The value of each need: the names of the chosen alternatives, and whether each optional need is
 /// set.
-fn values(needs: &SceneNeeds) -> Vec<(&'static str, bool)> {
-    let set = needs.names().into_iter().map(|name| (name, true));
-    let left_out = needs.flags().into_iter().filter(|(on, _)| !on).map(|(_, name)| (name, false));
-    set.chain(left_out).chain([(needs.accumulator.name(), true)]).collect()
+fn values(needs: &SceneNeeds) -> Vec<String> {
+    let surface = &needs.surface;
+    let set = needs.names().into_iter().map(String::from);
+    let left_out = needs.flags().into_iter().filter(|(on, _)| !on).map(|(_, name)| format!("no {name}"));
+    let alternatives = [
+        needs.accumulator.name().to_string(),
+        format!("epsilon {:?}", needs.epsilon),
+        format!("sides {:?}", needs.sides),
+        format!("winner {:?}", surface.winner()),
+        format!("subgroups {}", surface.subgroups()),
+        format!("triangle per splat {}", surface.by_triangles()),
+        format!("once {:?}", needs.mesh.map(|mesh| mesh.once)),
+    ];
+    set.chain(left_out).chain(alternatives).collect()
 }
 
 /// The needs of a random render of a scene; `None` if its options are refused.

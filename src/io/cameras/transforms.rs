@@ -20,6 +20,18 @@ const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADI
 
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
+/// Keys of a pose in a camera file.
+const POSES: [&str; 4] = ["eye", "target", "camera_to_world", "world_to_camera"];
+
+/// Groups of a camera file's keys that may stand beside `frames` for all of them. A frame that has
+/// one key of a group has the group for itself.
+const SHARED: [&[&str]; 4] =
+    [&["width", "height"], &["model", "fx", "fy", "cx", "cy", "fov", "height_world"], &["up"], &["near"]];
+
+/// Keys of a lens that only frames with a `transform_matrix` use.
+const OF_TRANSFORMS: [&str; 8] =
+    ["w", "h", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye"];
+
 pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
     let text = text(path)?;
     parse(&text, size).map_err(|what| Fault::Malformed(what).of(path))
@@ -85,9 +97,26 @@ impl Frame<'_> {
         if self.own.get("transform_matrix").is_some() {
             return None;
         }
-        let keys = ["eye", "target", "camera_to_world", "world_to_camera"];
-        let mut object = self.own.as_object().filter(|own| keys.iter().any(|key| own.contains_key(*key)))?.clone();
+        let own = self.own.as_object().filter(|own| POSES.iter().any(|key| own.contains_key(*key)))?;
+        let mut object = own.clone();
         object.remove("file_path");
+        for (key, value) in self.shared.as_object().into_iter().flatten() {
+            let Some(group) = SHARED.iter().find(|group| group.contains(&key.as_str())) else {
+                if OF_TRANSFORMS.contains(&key.as_str()) || DISTORTIONS.contains(&key.as_str()) {
+                    return Some(Err(format!(
+                        "'{key}' is for frames with a transform_matrix: a frame with {} takes width, height, fx, fy, \
+                         cx, cy or fov",
+                        POSES.iter().find(|pose| own.contains_key(**pose)).copied().unwrap_or_default()
+                    )));
+                }
+                continue;
+            };
+            // A matrix contains up.
+            let has_use = key != "up" || own.contains_key("eye");
+            if has_use && !group.iter().any(|key| own.contains_key(*key)) {
+                object.insert(key.clone(), value.clone());
+            }
+        }
         Some(of_value(Value::Object(object)))
     }
 
@@ -192,6 +221,23 @@ mod tests {
             let CameraFile { size, lens, pose, .. } = &cameras[1].camera;
             assert_eq!((cameras[1].name.as_str(), *size, *lens), ("0001", Some((64, 48)), Lens::Fov(40.0)));
             assert_eq!(*pose, Pose::LookAt(DVec3::new(0.0, -5.0, 2.0), DVec3::ZERO, Some(DVec3::Z)));
+        }
+    }
+
+    #[test]
+    fn cameras_of_a_camera_file_share_what_stands_beside_frames() {
+        let frames = r#""frames": [{"eye": [0,-5,2], "target": [0,0,0]},
+                                   {"eye": [0,-5,2], "target": [0,0,0], "fx": 9, "cx": 1, "cy": 2, "up": [1,0,0]}]"#;
+        let shared = r#""width": 64, "height": 48, "fov": 40, "up": [0,0,1], "near": 0.5"#;
+        let cameras = parse(&format!("{{{shared}, {frames}}}"), (8, 8)).unwrap();
+        let [first, second] = [0, 1].map(|k| cameras[k].camera.clone());
+        assert_eq!((first.size, first.lens, first.near), (Some((64, 48)), Lens::Fov(40.0), Some(0.5)));
+        assert!(matches!(first.pose, Pose::LookAt(_, _, Some(DVec3::Z))));
+        assert_eq!((second.size, second.lens), (Some((64, 48)), Lens::Intrinsics([9.0, 9.0, 1.0, 2.0])));
+        assert!(matches!(second.pose, Pose::LookAt(_, _, Some(DVec3::X))));
+        for unused in [r#""fl_x": 5"#, r#""k1": 0.1"#] {
+            let message = parse(&format!("{{{unused}, {frames}}}"), (8, 8)).unwrap_err();
+            assert!(message.starts_with("frame 1: '") && message.contains("with eye takes"), "{message}");
         }
     }
 

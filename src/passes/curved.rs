@@ -199,7 +199,8 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
         Projection::Pinhole => (1.0 / depth, inside),
         Projection::Orthographic => (depth, inside),
     };
-    let Way { first, second } = Way::of(curve, splat, (start, step));
+    let way = Way::of(curve, splat, (start, step));
+    let [(first, steepness), (second, steepness_of_second)] = way.hits;
     let [out, out_of_second] = [&first, &second].map(|at| outside(curve, camera, at));
     let met = if out <= 0.0 {
         first
@@ -208,16 +209,26 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
         Intersection { inside: second.inside.min(out), ..second }
     } else {
         // Both roots miss. The root that misses by less says by how much the ray misses.
-        let (nearer, missed) = if out_of_second < out { (second, out_of_second) } else { (first, out) };
+        let (nearer, missed) = if out_of_second < out {
+            (second, way.margin(out_of_second, steepness_of_second))
+        } else {
+            (first, way.margin(out, steepness))
+        };
         Intersection { rho2: (1.0 + missed).powi(2), inside: f64::INFINITY, ..nearer }
     };
     (met, plane)
 }
 
-/// The two intersections of a ray with the paraboloid of a cap, the nearer one first.
+/// The two intersections of a ray with the paraboloid of a cap.
 struct Way {
-    first: Intersection,
-    second: Intersection,
+    /// The nearer one first. The number beside each says how far it moves on the unit disk per unit
+    /// of [`Self::root`].
+    hits: [(Intersection, f64); 2],
+    discriminant: f64,
+    /// The square root of the discriminant; 0 if that is negative.
+    root: f64,
+    /// The sum of the discriminant's terms, each taken as positive.
+    terms: f64,
 }
 
 impl Way {
@@ -228,19 +239,31 @@ impl Way {
         let discriminant = b * b - 4.0 * a * c;
         // The distance of the discriminant from 0, relative to its terms: near an outline, rounding
         // decides.
-        let margin = discriminant / (b * b + (4.0 * a * c).abs());
+        let terms = b * b + (4.0 * a * c).abs();
+        let margin = discriminant / terms;
         let root = discriminant.max(0.0).sqrt();
         let far = -0.5 * (b + if b >= 0.0 { root } else { -root });
         // The root at which the slope has the sign of b, and the one at which it has the opposite
         // sign.
         let roots = [(c / far, b < 0.0), (far / a, b >= 0.0)];
-        let [first, second] = roots.map(|(sigma, away)| {
+        let [one, other] = roots.map(|(sigma, away)| {
             let (u, v) = (start.x + sigma * step.x, start.y + sigma * step.y);
             let depth = curve.depth + curve.radius * sigma;
             let inside = splat.inside(u, v).min(margin);
-            Intersection { depth, rho2: u * u + v * v, inside, uv: DVec2::new(u, v), away }
+            let steepness = (0.5 * sigma / far).abs() * step.truncate().length();
+            (Intersection { depth, rho2: u * u + v * v, inside, uv: DVec2::new(u, v), away }, steepness)
         });
-        if second.depth < first.depth { Self { first: second, second: first } } else { Self { first, second } }
+        let hits = if other.0.depth < one.0.depth { [other, one] } else { [one, other] };
+        Self { hits, discriminant, root, terms }
+    }
+
+    /// The relative distance to a decision of a root that misses by `missed`.
+    ///
+    /// Near an outline a small change of the discriminant moves a root far, so that rounding decides
+    /// about roots that seem to miss by more.
+    fn margin(&self, missed: f64, steepness: f64) -> f64 {
+        let grown = self.root + missed / steepness;
+        missed.min((grown * grown - self.discriminant) / self.terms)
     }
 }
 

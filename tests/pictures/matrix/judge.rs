@@ -3,7 +3,9 @@
 
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::AccumulatorRow;
-use epsplat::low_level::scene::Map;
+use epsplat::low_level::scene::{Camera, Map, Scene};
+
+use crate::common::Random;
 
 /// The decision margin below which rounding decides a pixel, so that it is not compared.
 const DECIDED: f32 = 1e-4;
@@ -20,6 +22,47 @@ const APART_OF_TEXTURES: f32 = 3e-3;
 
 /// The share of decided pixels of textured surfels that may differ by more than that.
 const STRAYING: f64 = 0.03;
+
+/// Copies of a scene and of its view that [`moved`] makes.
+const MOVED: usize = 8;
+
+/// The largest relative change of a number that [`moved`] makes: a few roundings of f32.
+const MOVE: f64 = 4.0 / 16_777_216.0;
+
+/// The largest ratio of a difference from the reference to the reference's own change between
+/// moved copies.
+const BEYOND_MOVED: f32 = 4.0;
+
+/// The error allowed in the colours and in the maps of each pixel because sums have few digits
+/// ([`of_sums`]).
+pub struct Digits {
+    pub color: Vec<f32>,
+    pub maps: Vec<f32>,
+}
+
+/// Copies of a scene and of its view whose numbers differ by up to [`MOVE`].
+///
+/// Where the reference draws these copies differently, f32 cannot know the pixel: a cap seen at its
+/// outline, two normals that nearly cancel. A fault of a kernel is larger than this change.
+pub fn moved(scene: &Scene, camera: &Camera) -> Vec<(Scene, Camera)> {
+    let random = &mut Random(1);
+    let of = |random: &mut Random| {
+        let (mut scene, mut camera) = (scene.clone(), camera.clone());
+        let mut factor = || 1.0 + random.between(-MOVE, MOVE);
+        let mut numbers: Vec<&mut f32> = scene
+            .surfels
+            .iter_mut()
+            .flat_map(|surfel| [&mut surfel.center, &mut surfel.s, &mut surfel.t])
+            .flatten()
+            .collect();
+        numbers.extend(scene.caps.iter_mut().flat_map(|cap| &mut cap.0));
+        numbers.into_iter().for_each(|number| *number = (f64::from(*number) * factor()) as f32);
+        let Camera { fx, fy, cx, cy, .. } = &mut camera;
+        [fx, fy, cx, cy].into_iter().for_each(|number| *number *= factor());
+        (scene, camera)
+    };
+    (0..MOVED).map(|_| of(random)).collect()
+}
 
 /// All bits of a frame's colours and maps, by name, without the map `but`.
 fn parts(frame: &Frame, but: Option<Map>) -> Vec<(&'static str, Vec<u32>)> {
@@ -74,43 +117,39 @@ pub fn of_sums(
 
 /// Describes the decided pixels whose colour or maps differ from the `reference`; empty if none.
 ///
-/// `digits` is the extra error allowed at each pixel because sums have few digits ([`of_sums`]).
-pub fn wrong(frame: &Frame, reference: &Frame, digits: &[f32], painted: bool) -> String {
+/// A pixel may differ as far as `digits` say, and [`BEYOND_MOVED`] times as far as the reference's
+/// frames of [`moved`] scenes differ.
+pub fn wrong(frame: &Frame, reference: &Frame, moved: &[Frame], digits: &Digits, painted: bool) -> String {
     let decision = reference.map(Map::Decision).unwrap();
     let limit = if painted { APART_OF_TEXTURES } else { APART };
-    let near = |pixel: usize, a: f32, b: f32| {
-        a == b || (b.is_finite() && (a - b).abs() <= limit * b.abs().max(1.0) + digits[pixel])
-    };
-    let shown = |[r, g, b, a]: [f32; 4]| [r * a, g * a, b * a, a];
+    let decided: Vec<usize> = (0..decision.len()).filter(|pixel| decision[*pixel] >= DECIDED).collect();
+    let straying = if painted { (STRAYING * decided.len() as f64).ceil() as usize } else { 0 };
     let mut told = Vec::new();
-    let decided = |pixel: &usize| decision[*pixel] >= DECIDED;
-    let straying = match painted {
-        true => (STRAYING * (0..decision.len()).filter(decided).count() as f64).ceil() as usize,
-        false => 0,
-    };
-    let mut tell = |name: &str, pixels: Vec<usize>, values: &dyn Fn(usize) -> String| {
+    let mut tell = |name: &str, digits: &[f32], of: &dyn Fn(&Frame, usize) -> Vec<f32>| {
+        let near = |pixel: usize, k: usize| {
+            let (ours, theirs) = (of(frame, pixel)[k], of(reference, pixel)[k]);
+            let change = moved.iter().map(|moved| (of(moved, pixel)[k] - theirs).abs()).fold(0.0, f32::max);
+            let most = limit * theirs.abs().max(1.0) + digits[pixel] + BEYOND_MOVED * change;
+            ours == theirs || (theirs.is_finite() && (ours - theirs).abs() <= most)
+        };
+        let differs = |pixel: &usize| (0..of(frame, *pixel).len()).any(|k| !near(*pixel, k));
+        let pixels: Vec<usize> = decided.iter().copied().filter(differs).collect();
         let Some(first) = pixels.first().filter(|_| pixels.len() > straying) else { return };
         let place = (first % frame.width as usize, first / frame.width as usize);
-        told.push(format!("{} pixels of {name} ({} at {place:?})", pixels.len(), values(*first)));
+        let values = (of(frame, *first), of(reference, *first));
+        told.push(format!("{} pixels of {name} ({values:?} at {place:?})", pixels.len()));
     };
-    let colors = |pixel: usize| (shown(frame.color[pixel]), shown(reference.color[pixel]));
-    let differs = |pixel: &usize| {
-        let (ours, theirs) = colors(*pixel);
-        ours.into_iter().zip(theirs).any(|(a, b)| !near(*pixel, a, b))
-    };
-    let pixels = (0..decision.len()).filter(decided);
-    tell("color", pixels.clone().filter(differs).collect(), &|pixel| format!("{:?}", colors(pixel)));
+    tell("color", &digits.color, &|frame, pixel| {
+        let [r, g, b, a] = frame.color[pixel];
+        vec![r * a, g * a, b * a, a]
+    });
     // The decision margin does not cover which of two surfels weighs more, so the index map is left
     // out.
     for map in frame.maps().iter().filter(|map| *map != Map::Index) {
         let width = map.width();
-        let of = |frame: &Frame, pixel: usize| frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec();
-        let differs = |pixel: &usize| {
-            let (ours, theirs) = (of(frame, *pixel), of(reference, *pixel));
-            ours.into_iter().zip(theirs).any(|(a, b)| !near(*pixel, a, b))
-        };
-        let values = |pixel: usize| format!("{:?}", (of(frame, pixel), of(reference, pixel)));
-        tell(map.row().name, pixels.clone().filter(differs).collect(), &values);
+        tell(map.row().name, &digits.maps, &|frame, pixel| {
+            frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec()
+        });
     }
     told.join(", ")
 }

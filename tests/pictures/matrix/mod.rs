@@ -27,6 +27,8 @@ use epsplat::low_level::plan::{Accumulator, Facts, Organisation, Settings, check
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Map, Maps, Samples, Scene, Shading};
 
+use judge::Digits;
+
 use crate::common;
 use common::any_scene::{self, Sampled};
 use common::{Random, any_options};
@@ -67,6 +69,8 @@ struct Tally {
     frames: usize,
     pixels: usize,
     undecided: usize,
+    /// Frames of which some pixel is compared with moved scenes ([`judge::moved`]).
+    moved: usize,
     /// Sets of options chosen; `refused` counts those that the checks refused, by error.
     drawn: usize,
     refused: BTreeMap<String, usize>,
@@ -79,6 +83,7 @@ impl Tally {
         self.frames += other.frames;
         self.pixels += other.pixels;
         self.undecided += other.undecided;
+        self.moved += other.moved;
         self.drawn += other.drawn;
         other.refused.into_iter().for_each(|(why, count)| *self.refused.entry(why).or_default() += count);
         self.failures.extend(other.failures);
@@ -89,9 +94,11 @@ impl Tally {
     fn print(&self) {
         let refused: usize = self.refused.values().sum();
         eprintln!(
-            "{} combinations, {} frames, {:.1} % of {} pixels left to rounding; {refused} of {} drawn options refused",
+            "{} combinations, {} frames, {} judged by moved scenes, {:.1} % of {} pixels left to rounding; {refused} \
+             of {} drawn options refused",
             self.combinations,
             self.frames,
+            self.moved,
             100.0 * self.undecided as f64 / self.pixels.max(1) as f64,
             self.pixels,
             self.drawn,
@@ -196,9 +203,8 @@ fn wrong(
     let frame = |scene: &Scene, options: &Settings, backend: &Backend| -> Result<Frame, String> {
         render(scene, camera, options, backend, &()).map(|(frame, _)| frame).map_err(|error| error.to_string())
     };
-    let reference = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
     let own = frame(scene, options, &on(whole));
-    let (own, reference) = match own.and_then(|own| Ok((own, frame(scene, &reference, &Backend::Reference)?))) {
+    let (own, reference) = match own.and_then(|own| Ok((own, of_reference(scene, camera, options)?))) {
         Ok(both) => both,
         Err(why) => return vec![why],
     };
@@ -209,7 +215,17 @@ fn wrong(
         Ok(digits) => digits,
         Err(why) => return vec![why],
     };
-    let apart = judge::wrong(&own, &reference, &digits, matches!(scene.colors, Colors::Textured(_)));
+    let painted = matches!(scene.colors, Colors::Textured(_));
+    let mut apart = judge::wrong(&own, &reference, &[], &digits, painted);
+    if !apart.is_empty() {
+        tally.moved += 1;
+        let moved: Result<Vec<Frame>, String> =
+            judge::moved(scene, camera).iter().map(|(scene, camera)| of_reference(scene, camera, options)).collect();
+        match moved {
+            Ok(moved) => apart = judge::wrong(&own, &reference, &moved, &digits, painted),
+            Err(why) => return vec![why],
+        }
+    }
     let mut wrong = Vec::new();
     wrong.extend((!apart.is_empty()).then(|| format!("reference: {apart}")));
     for (name, scene, options, gpu) in forms {
@@ -231,16 +247,18 @@ fn wrong(
     wrong
 }
 
-/// The error per pixel that a sum's few digits explain: 0 where sums have many digits.
-fn digits(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Vec<f32>, String> {
+/// The reference's frame with the map of decisions.
+fn of_reference(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Frame, String> {
+    let options = Settings { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let drawn = render(scene, camera, &options, &Backend::Reference, &());
+    drawn.map(|(frame, _)| frame).map_err(|error| error.to_string())
+}
+
+/// The errors that a sum's few digits explain: 0 where sums have many digits.
+fn digits(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Digits, String> {
     if !any_options::has_few_digits(options.accumulator) {
-        return Ok(vec![0.0; camera.pixels()]);
+        return Ok(Digits { color: vec![0.0; camera.pixels()], maps: vec![0.0; camera.pixels()] });
     }
-    let Samples { across, down } = options.samples;
-    let maps = Maps::of(&[Map::Count, Map::Weight]);
-    let one = Settings { samples: Samples::ONE, maps, accumulator: Accumulator::Fixed, ..options.clone() };
-    let sampled = camera.sampled(options.samples).map_err(|error| error.to_string())?;
-    let frame = render(scene, &sampled, &one, &Backend::Reference, &()).map_err(|error| error.to_string())?.0;
     let (low, high) = scene.color_range();
     let span = (0..4).map(|k| f64::from(high[k].max(0.0) - low[k].min(0.0))).fold(1.0, f64::max);
     // Light multiplies colours. A highlight changes `shininess` times as fast as the normal, whose
@@ -252,7 +270,15 @@ fn digits(scene: &Scene, camera: &Camera, options: &Settings) -> Result<Vec<f32>
         Shading::Phong => span * (1.0 + 3.0 * light) + 2.0 * light * f64::from(options.shininess),
     };
     let of_scene = (options.accumulator.row(), scene.surfels.len() as u64, lit.max(2.0));
-    Ok(judge::of_sums(&frame, [across as usize, down as usize], of_scene))
+    let maps = Maps::of(&[Map::Count, Map::Weight]);
+    let one = Settings { samples: Samples::ONE, maps, accumulator: Accumulator::Fixed, ..options.clone() };
+    let of = |Samples { across, down }: Samples| -> Result<Vec<f32>, String> {
+        let sampled = camera.sampled(Samples { across, down }).map_err(|error| error.to_string())?;
+        let frame = render(scene, &sampled, &one, &Backend::Reference, &()).map_err(|error| error.to_string())?.0;
+        Ok(judge::of_sums(&frame, [across as usize, down as usize], of_scene))
+    };
+    // Maps are taken at the pixel's centre.
+    Ok(Digits { color: of(options.samples)?, maps: of(Samples::ONE)? })
 }
 
 fn devices() -> Option<Devices> {
@@ -299,6 +325,15 @@ fn every_combination_is_drawn_alike_and_right() {
     assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
 }
 
+/// Pixels that once strayed from the reference: sums of few digits, normals that nearly cancel, and
+/// caps at their outlines.
+#[test]
+fn what_once_strayed_is_judged_right() {
+    let Some(devices) = devices() else { return };
+    let tally = of_seeds(&[12059, 10889, 11473, 13033, 14012], &devices);
+    assert!(tally.failures.is_empty() && tally.combinations == 5, "{}", tally.failures.join("\n"));
+}
+
 /// The checks refuse less than three quarters of the options that are drawn. Each refusal is
 /// printed with its share.
 #[test]
@@ -310,18 +345,24 @@ fn refusals_are_counted() {
     assert!(tally.failures.is_empty() && 4 * refused < 3 * tally.drawn, "{refused} of {}", tally.drawn);
 }
 
-/// A fault in one organisation is found within 24 combinations that it can affect.
+/// A fault in one organisation, or of 2 % in a formula that all share, is found within 24
+/// combinations that it can affect.
 #[test]
-fn a_fault_in_one_organisation_is_found() {
+fn a_fault_is_found() {
     let Some(devices) = devices() else { return };
     let curved = |of: &Combination| {
         let filtered = of.options.low_pass == epsplat::low_level::scene::LowPass::Max && of.options.maps != Maps::NONE;
         filtered && of.sampled.about.contains(&"caps") && of.sampled.scene.oriented
     };
     type Fits<'a> = &'a dyn Fn(&Combination) -> bool;
-    let faults: [(&str, &str, &str, Fits<'_>); 2] = [
+    let blended = |of: &Combination| {
+        of.options.join == epsplat::low_level::scene::Join::Blended && of.sampled.about.contains(&"triangles")
+    };
+    let faults: [(&str, &str, &str, Fits<'_>); 4] = [
         ("tile_curved.wgsl", "if (FILTERED)", "if (false)", &curved),
         ("covered.wgsl", "LIST_EMPTY != 0u ||", "false ||", &|of| of.options.maps.has(Map::TexZ)),
+        ("curved.wgsl", "let a = 0.5 * bent", "let a = 0.51 * bent", &|of| of.sampled.about.contains(&"caps")),
+        ("join_blended.wgsl", "clamp(0.5 +", "clamp(0.51 +", &blended),
     ];
     for (file, from, to, fits) in faults {
         let sources = Sources::default().replace(file, from, to).unwrap();

@@ -259,8 +259,8 @@ impl Way {
 
     /// The relative distance to a decision of a root that misses by `missed`.
     ///
-    /// Near an outline a small change of the discriminant moves a root far, so that rounding decides
-    /// about roots that seem to miss by more.
+    /// Near an outline a small change of the discriminant moves a root far, so that rounding
+    /// decides about roots that seem to miss by more.
     fn margin(&self, missed: f64, steepness: f64) -> f64 {
         let grown = self.root + missed / steepness;
         missed.min((grown * grown - self.discriminant) / self.terms)

@@ -33,11 +33,14 @@ use super::{Strip, attributes};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage};
 use crate::plan::{Oit, SceneNeeds, Settings};
-use crate::scene::Composite;
 use crate::scene::kernel::LEAST_WEIGHT;
+use crate::scene::{Composite, Map};
 
 /// The smallest depth weight v_i of `weighted`.
 const LEAST_OF_DEPTH: f64 = 1.0 / 300_000.0;
+
+/// The largest error of a fragment's visibility with which the pixel still counts as decided.
+const UNSURE: f64 = 3e-4;
 
 /// The smallest transmittance of a single fragment, so that its optical depth stays finite.
 const LEAST_LEFT: f64 = 1.0 / (1u64 << 40) as f64;
@@ -101,6 +104,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
     };
     let mut decisions = vec![f64::INFINITY; camera.width as usize * rows as usize];
     let mut sums = vec![PixelSums::ZERO; decisions.len()];
+    let mut unsure = vec![false; sums.len()];
     let near = |pixel: usize, at| decisions[pixel] = decision(at, f64::INFINITY, camera.near).min(decisions[pixel]);
     visit(strip, near, |f| {
         let (sum, weight) = (&mut sums[f.pixel], f.weight * before(&f));
@@ -109,7 +113,13 @@ pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
         sum.color.iter_mut().zip(f.color).for_each(|(total, value)| *total += weight * value);
         sum.held_back += held_back(f.alpha(options));
         sum.count += 1;
+        if let Some(moments) = moments.as_ref().filter(|_| options.maps.has(Map::Decision)) {
+            let (moments, first) = &moments[f.pixel];
+            unsure[f.pixel] |= moments.unsure(moments::place(f.depth, depths), *first) > UNSURE;
+        }
     });
+    // Rounding decides a pixel whose moments do not tell how much its fragments show.
+    let decisions = decisions.into_iter().zip(unsure).map(|(decision, unsure)| if unsure { 0.0 } else { decision });
     sums.into_iter().zip(decisions).map(|(sum, decision)| PixelSums { decision, ..sum }).collect()
 }
 

@@ -39,7 +39,8 @@ pub struct Arguments {
     /// Print a Markdown table instead: times relative to the baseline, errors, equal bits, adapters
     #[arg(long)]
     table: bool,
-    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists
+    /// them; twin: the kernels on the processor, without a driver, slowly
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }

@@ -38,7 +38,8 @@ pub struct Arguments {
     /// Time limit in minutes; a frame or scene that has started is finished
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     minutes: u32,
-    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists
+    /// them; twin: the kernels on the processor, without a driver, slowly
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }

@@ -29,7 +29,8 @@ pub struct Arguments {
     /// Only this accumulator [default: all that the adapter supports]
     #[arg(long, value_name = "NAME")]
     accumulator: Option<Accumulator>,
-    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists
+    /// them; twin: the kernels on the processor, without a driver, slowly
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Only cases whose name contains this

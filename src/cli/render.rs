@@ -4,6 +4,8 @@ mod arguments;
 mod output;
 mod views;
 
+use std::collections::BTreeMap;
+
 use epsplat::{Error, Files, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
 use serde::Serialize;
 
@@ -37,7 +39,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     unseen.iter().for_each(|unseen| note(&unseen.sentence()));
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
-        Some(path) => write_json(path, &Outcome { report: &report, view, read }),
+        Some(path) => write_json(path, &Outcome { report: &report, view, read, bits: frame.hashes() }),
         None => {
             note(&summary(&report, &arguments.output));
             Ok(())
@@ -54,6 +56,8 @@ struct Outcome<'a> {
     /// Numbers of nodes, points and bytes that were read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<ReadReport>,
+    /// A hash of the colour's and of each map's bits ([`Frame::hashes`]).
+    bits: BTreeMap<&'static str, String>,
 }
 
 /// Fails if the arguments ask for maps that the format cannot store.

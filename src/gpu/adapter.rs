@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::layout::{TILE, TILE_WIDTH, WORKGROUP};
+use super::twin;
 use crate::error::Error;
 
 /// Invocations of the largest workgroup, which is in `bin.wgsl`.
@@ -131,6 +132,12 @@ impl AdapterDescription {
     /// Whether it renders on the CPU.
     pub fn is_software(&self) -> bool {
         self.kind == "software"
+    }
+
+    /// Whether its quotients and roots are rounded to nearest: processors' instructions are, if a
+    /// driver uses them (Mesa's llvmpipe and SwiftShader do, and so does the f32 twin).
+    pub fn rounds_division(&self) -> bool {
+        self.is_software() && matches!(self.api.as_str(), "vulkan" | "gl" | twin::API)
     }
 
     /// Returns an error that names this adapter.

@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use super::adapter::AdapterDescription;
 use super::program::Compiled;
+use super::twin;
 use crate::error::{Error, Result};
 
 /// Features that are enabled where an adapter has them: timestamps; 64-bit integers, f32 atomics
@@ -26,7 +27,7 @@ const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFE
 
 /// Advice for a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
-    apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
+    apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference, or with --adapter twin for the bits of an adapter";
 
 /// Whether wgpu validates the workgroup counts of indirect dispatches.
 ///
@@ -105,13 +106,18 @@ pub struct Gpu {
 
 impl Gpu {
     /// Opens the best adapter, or the best among those that `name` selects. The name of an API
-    /// (vulkan, gl or opengl, metal, dx12) selects its adapters. Any other name selects adapters
-    /// whose names contain it. Case does not matter.
+    /// (vulkan, gl or opengl, metal, dx12) selects its adapters, and `twin` selects the f32 twin,
+    /// which needs no driver (`src/gpu/twin`). Any other name selects adapters whose names contain
+    /// it. Case does not matter.
     ///
     /// # Errors
     /// [`Error::NoAdapter`] if no usable adapter matches, or [`Error::Gpu`] if the device cannot be
     /// opened.
     pub fn open(name: Option<&str>) -> Result<Self> {
+        if name.is_some_and(|name| name.eq_ignore_ascii_case(twin::API)) {
+            let (device, queue) = twin::open();
+            return Ok(Self::watching(twin::adapter(), device, queue));
+        }
         let (adapter, handle) = best(name)?;
         let software = if adapter.is_software() { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
         let wanted = OPTIONAL_FEATURES | software | of_spirv(&adapter);
@@ -151,6 +157,11 @@ impl Gpu {
         let (device, queue) = pollster::block_on(handle.request_device(&descriptor))
             .map_err(|e| Error::Gpu { adapter: adapter.name.clone(), what: format!("cannot open the device: {e}") })?;
         drop(opening);
+        Ok(Self::watching(adapter, device, queue))
+    }
+
+    /// Keeps the first error that the device reports, such as its loss.
+    fn watching(adapter: AdapterDescription, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let failure = Arc::new(Mutex::new(None));
         let slot = Arc::clone(&failure);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
@@ -166,7 +177,7 @@ impl Gpu {
                 slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
             }
         });
-        Ok(Self { adapter, device, queue, compiled: Arc::default(), failure })
+        Self { adapter, device, queue, compiled: Arc::default(), failure }
     }
 
     /// Limits the buffers of this device to `bytes` each, so that scenes and images are cut into

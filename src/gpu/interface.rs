@@ -1,9 +1,12 @@
 //! Reflection of WGSL modules: the variables that each entry point binds, and their wgpu layout.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess, TypeInner};
+use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
+use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess, TypeInner, WithSpan};
+
+use super::exact::{self, Needs};
 
 /// The bindings of each entry point: the names of its variables and their numbers. The numbers are
 /// those of the WGSL source, or, in a compiled [`Program`](super::program::Program), those of its
@@ -36,6 +39,12 @@ impl Invalid {
     }
 }
 
+/// Returns an error's message and those of its causes.
+fn sentence(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}
+
 /// A parsed and validated module.
 pub(super) struct Interface {
     pub module: Module,
@@ -53,14 +62,56 @@ impl Interface {
             let sentence = [error.message().to_owned()].into_iter().chain(labels).collect::<Vec<_>>().join(": ");
             Invalid { sentence, at: error.location(text) }
         })?;
-        let validated = Validator::new(ValidationFlags::all(), capabilities).validate(&module);
-        let info = validated.map_err(|error| {
-            let causes =
-                std::iter::successors(Some(error.as_inner() as &dyn std::error::Error), |error| error.source());
-            let sentence = causes.map(ToString::to_string).collect::<Vec<_>>().join(": ");
-            Invalid { sentence, at: error.location(text) }
-        })?;
-        Ok(Self { module, info })
+        Self::validated(module, capabilities)
+            .map_err(|(sentence, error)| Invalid { sentence, at: error.location(text) })
+    }
+
+    /// Validates a module, which may use `capabilities`.
+    ///
+    /// # Errors
+    /// The validator's error, and its causes in a sentence.
+    pub fn validated(
+        module: Module,
+        capabilities: Capabilities,
+    ) -> Result<Self, (String, Box<WithSpan<ValidationError>>)> {
+        match Validator::new(ValidationFlags::all(), capabilities).validate(&module) {
+            Ok(info) => Ok(Self { module, info }),
+            Err(error) => Err((sentence(error.as_inner()), Box::new(error))),
+        }
+    }
+
+    /// Returns the module with the operations that `needs` say replaced by functions whose bits
+    /// every adapter shares.
+    ///
+    /// # Errors
+    /// A message if the module cannot be rewritten.
+    pub fn settled(&self, capabilities: Capabilities, needs: Needs) -> Result<Self, String> {
+        let module = exact::settle(&self.module, &self.info, needs)?;
+        Self::validated(module, capabilities).map_err(|(sentence, _)| sentence)
+    }
+
+    /// Returns WGSL of one entry point, with `constants` set.
+    ///
+    /// # Errors
+    /// A message if a constant has no value or does not fit.
+    pub fn text_of(&self, entry: (naga::ShaderStage, &str), constants: &[(&str, f64)]) -> Result<String, String> {
+        let (module, info) = self.resolved(entry, constants)?;
+        naga::back::wgsl::write_string(&module, &info, naga::back::wgsl::WriterFlags::empty())
+            .map_err(|e| e.to_string())
+    }
+
+    /// Returns the part of the module that one entry point uses, with `constants` set.
+    ///
+    /// # Errors
+    /// A message if a constant has no value or does not fit.
+    pub fn resolved(
+        &self,
+        entry: (naga::ShaderStage, &str),
+        constants: &[(&str, f64)],
+    ) -> Result<(Cow<'_, Module>, Cow<'_, ModuleInfo>), String> {
+        let constants = constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
+        naga::back::pipeline_constants::process_overrides(&self.module, &self.info, Some(entry), &constants)
+            .map_err(|e| sentence(&e))
     }
 
     /// Returns the names of the module's overrides.

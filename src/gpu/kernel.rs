@@ -25,7 +25,8 @@ impl Compiled {
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let key = (sources.join(files), bits, format!("{stages:?} {draws:?} {}", sources.all_end(files)));
+        let text = sources.text(files);
+        let key = (text.joined.clone(), bits, format!("{stages:?} {draws:?} {} {}", text.counts_loops, text.divides));
         // A poisoned lock means that another thread panicked while it held the lock. The cache is
         // intact.
         let programs = || self.programs.lock().unwrap_or_else(PoisonError::into_inner);
@@ -33,7 +34,7 @@ impl Compiled {
             return Ok(program);
         }
         // Other threads can compile meanwhile; at worst, two threads compile the same program.
-        let program = Arc::new(Program::compile(gpu, sources.text(files), stages, draws, constants)?);
+        let program = Arc::new(Program::compile(gpu, text, stages, draws, constants)?);
         programs().insert(key, Arc::clone(&program));
         Ok(program)
     }
@@ -131,7 +132,7 @@ impl Draw {
             vertex: wgpu::VertexState {
                 module: &vertex.module(gpu),
                 entry_point: Some(self.vertex),
-                compilation_options: vertex.options(),
+                compilation_options: Default::default(),
                 buffers: &[],
             },
             primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleList, ..Default::default() },
@@ -140,7 +141,7 @@ impl Draw {
             fragment: Some(wgpu::FragmentState {
                 module: &fragment.module(gpu),
                 entry_point: Some(self.fragment),
-                compilation_options: fragment.options(),
+                compilation_options: Default::default(),
                 targets: &targets,
             }),
             multiview_mask: None,
@@ -179,7 +180,7 @@ fn compute(
             layout: Some(&bound.layout),
             module: &entry.module(gpu),
             entry_point: Some(stage),
-            compilation_options: entry.options(),
+            compilation_options: Default::default(),
             cache: None,
         }))
     };

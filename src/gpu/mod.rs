@@ -5,6 +5,7 @@ pub mod adapter;
 pub mod buffers;
 pub mod device;
 pub(crate) mod evaluate;
+pub mod exact;
 pub mod interface;
 pub mod kernel;
 pub mod layout;
@@ -16,6 +17,7 @@ mod replacement;
 pub mod sources;
 mod spirv;
 pub mod timing;
+mod twin;
 
 pub use adapter::AdapterDescription;
 pub use device::{Gpu, adapters};

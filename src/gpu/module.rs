@@ -3,18 +3,18 @@
 use naga::valid::Capabilities;
 
 use super::device::Gpu;
+use super::exact::Needs;
 use super::interface::Interface;
 use super::program::PipelineKey;
 use super::sources::Text;
 use super::spirv;
+use super::twin;
 use crate::error::Result;
 
 /// A parsed module of kernels.
 pub(super) struct Module {
     interface: Interface,
     counts_loops: bool,
-    /// The module for wgpu to translate, if the device does not take SPIR-V.
-    text: Option<wgpu::ShaderModule>,
 }
 
 /// The bindings of a pipeline.
@@ -31,7 +31,6 @@ pub(super) struct Bound {
 pub(super) struct Entry<'a> {
     name: &'a str,
     told: Told,
-    constants: Vec<(&'a str, f64)>,
 }
 
 /// The shader code that the device gets.
@@ -56,11 +55,6 @@ impl Entry<'_> {
             Told::Text(text) => text.clone(),
         }
     }
-
-    /// Returns the override constants that remain to be set.
-    pub fn options(&self) -> wgpu::PipelineCompilationOptions<'_> {
-        wgpu::PipelineCompilationOptions { constants: &self.constants, ..Default::default() }
-    }
 }
 
 impl Module {
@@ -73,8 +67,14 @@ impl Module {
             let told = invalid.told(|line| text.place_of(line));
             gpu.error(format!("a kernel is not valid WGSL: {told}"))
         })?;
-        let text = (!spirv).then(|| translated_by_wgpu(gpu, text.joined, counts_loops));
-        Ok(Self { interface, counts_loops, text })
+        let needs = Needs {
+            division: text.divides || !gpu.adapter.rounds_division(),
+            barriers: !spirv && gpu.adapter.api != twin::API,
+        };
+        let interface = interface
+            .settled(capabilities, needs)
+            .map_err(|e| gpu.error(format!("the arithmetic of a kernel cannot be settled: {e}")))?;
+        Ok(Self { interface, counts_loops })
     }
 
     /// Checks that a draw's two stages and its targets match.
@@ -89,7 +89,7 @@ impl Module {
         let of_text = layout.iter().map(|(_, entry)| entry.binding).collect();
         let (mut variables, mut entries) = (Vec::new(), Vec::new());
         for (place, (name, mut entry)) in layout.into_iter().enumerate() {
-            if self.text.is_none() {
+            if gpu.takes_spirv() {
                 // Numbers bindings without gaps: then they are the same whether or not wgpu
                 // renumbers them.
                 entry.binding = place as u32;
@@ -119,14 +119,16 @@ impl Module {
         let declared = self.interface.overrides();
         let constants: Vec<_> =
             constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
-        if let Some(text) = &self.text {
-            return Ok(Entry { name, told: Told::Text(text.clone()), constants });
+        let failed = |e: String| gpu.error(format!("the kernel {name} cannot be translated: {e}"));
+        if !gpu.takes_spirv() {
+            let text = self.interface.text_of((stage, name), &constants).map_err(failed)?;
+            return Ok(Entry { name, told: Told::Text(translated_by_wgpu(gpu, text, self.counts_loops)) });
         }
         let numbers = bound.of_text.iter().zip(&bound.entries).map(|(&of_text, entry)| (of_text, entry.binding));
         let options = spirv::options(gpu.device.features(), numbers, self.counts_loops);
         let words = spirv::translate(&self.interface, (stage, name), &constants, (&options, &gpu.device.limits()))
-            .map_err(|e| gpu.error(format!("the kernel {name} cannot be translated: {e}")))?;
-        Ok(Entry { name, told: Told::Words(words), constants: Vec::new() })
+            .map_err(failed)?;
+        Ok(Entry { name, told: Told::Words(words) })
     }
 }
 

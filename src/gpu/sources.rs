@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use super::exact::ARITHMETIC;
 use super::{Replacement, loops};
 use crate::error::{Error, Result};
 
@@ -14,6 +15,8 @@ pub(crate) struct Text {
     pub joined: String,
     /// Whether every loop gets a counter that ends it.
     pub counts_loops: bool,
+    /// Whether kernels divide and take roots by functions of their own on every device.
+    pub divides: bool,
     /// The name of each joined file in messages, and its number of lines.
     files: Vec<(String, u32)>,
 }
@@ -21,7 +24,8 @@ pub(crate) struct Text {
 impl Text {
     /// Creates a module of one text, in which every loop gets a counter.
     pub fn alone(text: &str) -> Self {
-        Self { joined: text.to_owned(), counts_loops: true, files: Vec::new() }
+        let joined = format!("{text}\n{}", Sources::default().join(&[ARITHMETIC]));
+        Self { joined, counts_loops: true, divides: false, files: Vec::new() }
     }
 
     /// Maps a line of the joined text to its file and the line in that file. Both line numbers
@@ -44,6 +48,7 @@ pub struct Sources {
     /// Names in messages of the files that a user wrote.
     shown: BTreeMap<&'static str, String>,
     counts_loops: bool,
+    divides: bool,
 }
 
 impl Default for Sources {
@@ -52,6 +57,7 @@ impl Default for Sources {
             texts: FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect(),
             shown: BTreeMap::new(),
             counts_loops: false,
+            divides: false,
         }
     }
 }
@@ -101,7 +107,13 @@ impl Sources {
         Self { counts_loops: true, ..self }
     }
 
-    /// Returns the source of the module of `files`.
+    /// Returns these sources with division and roots by functions of their own, even on devices
+    /// whose instructions round to nearest.
+    pub(crate) fn with_own_division(self) -> Self {
+        Self { divides: true, ..self }
+    }
+
+    /// Returns the source of the module of `files`, and of the arithmetic.
     pub(super) fn text(&self, files: &[&str]) -> Text {
         let shown = |file: &&str| {
             let text = self.texts.get(file).map_or("", |text| text);
@@ -109,7 +121,13 @@ impl Sources {
             let lines = text.matches('\n').count() as u32 + 1;
             (self.shown.get(file).map_or_else(|| (*file).to_owned(), String::clone), lines)
         };
-        Text { joined: self.join(files), counts_loops: !self.all_end(files), files: files.iter().map(shown).collect() }
+        let files = [files, &[ARITHMETIC]].concat();
+        Text {
+            joined: self.join(&files),
+            counts_loops: !self.all_end(&files),
+            divides: self.divides,
+            files: files.iter().map(shown).collect(),
+        }
     }
 
     /// Whether all loops of `files` are proven to end and so need no counters.

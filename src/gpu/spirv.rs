@@ -6,8 +6,7 @@
 //! The decoration `NoContraction` forbids both, but WGSL has no word for it. So kernels are
 //! translated here, by the translator that wgpu itself uses, and decorated. Sums, differences and
 //! products are then those of IEEE 754 on every Vulkan adapter that rounds to nearest, except that
-//! subnormal numbers may become 0. Quotients, roots, powers and exponentials are as exact as the
-//! driver makes them.
+//! subnormal numbers may become 0. Other operations are built from these (`src/gpu/exact`).
 
 use std::ops::RangeInclusive;
 
@@ -46,10 +45,7 @@ pub(super) fn translate(
     constants: &[(&str, f64)],
     (options, limits): (&spv::Options<'_>, &wgpu::Limits),
 ) -> Result<Vec<u32>, String> {
-    let constants = constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
-    let (module, info) =
-        naga::back::pipeline_constants::process_overrides(&interface.module, &interface.info, Some(entry), &constants)
-            .map_err(|e| e.to_string())?;
+    let (module, info) = interface.resolved(entry, constants)?;
     let (shader_stage, name) = entry;
     check_workgroup(&module, limits)?;
     let pipeline = spv::PipelineOptions { shader_stage, entry_point: name.to_owned() };

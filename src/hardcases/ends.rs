@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::HardCase;
 use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
-use crate::scene::{Clip, Projection, Samples, Surfel};
+use crate::scene::{Clip, Samples, Surfel};
 
 /// Builds the cases.
 pub fn cases() -> Result<Vec<HardCase>> {
@@ -204,7 +204,7 @@ fn thin_parts(stage: &Stage) -> Filling {
     }
     let colors = (0..surfels.len()).map(|k| [2, 3, 4, 5].map(|axis| 0.1 + 0.9 * fraction(k, axis) as f32)).collect();
     let filling = Filling { colors: Some(colors), excused: 0.04, ..Filling::of(surfels, (0.02, 0.9)) };
-    samples(4, 4, stage.rims_in(Projection::Pinhole, filling))
+    samples(4, 4, filling.with_lone_rims())
 }
 
 fn cut_and_crossing(stage: &Stage) -> Filling {

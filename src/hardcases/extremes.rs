@@ -204,7 +204,7 @@ const LIST: &[Entry] = &[
         thin_alpha
     ),
     entry!("one pixel", "An image of one pixel.", FRAGMENTS, (1, 1), Stage::askew, without_rims),
-    entry!("17 by 3 pixels", "An image that fills no workgroup.", FRAGMENTS, (17, 3), Stage::askew, without_rims),
+    entry!("17 by 3 pixels", "An image that fills no workgroup.", FRAGMENTS, (17, 3), Stage::askew, rough),
     entry!(
         "4097 by 1 pixels",
         "One row, wider than a power of two; a pinhole sees its ends at a slant of 1:2000.",

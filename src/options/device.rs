@@ -32,7 +32,8 @@ pub struct DeviceOptions {
     /// adapter, or reference if there is none
     #[cfg_attr(feature = "cli", arg(long, value_parser = backends(), default_value = "auto", hide_default_value = true, hide_possible_values = true))]
     pub backend: Chosen,
-    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    /// API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists
+    /// them; twin: the kernels on the processor, without a driver, slowly
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME", hide_short_help = true))]
     pub adapter: Option<String>,
     /// Limit the memory of host and device together, such as 2GiB

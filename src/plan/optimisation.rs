@@ -31,11 +31,14 @@ pub enum Optimisation {
     Sharing,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,
+    /// Processors divide and take roots by their own instructions, which round to nearest as the
+    /// functions of `wgsl/common/arithmetic.wgsl` do (`gpu/exact`).
+    Division,
 }
 
 impl Optimisation {
     /// Every optimisation and its name.
-    pub const ALL: [(Self, &'static str); 9] = [
+    pub const ALL: [(Self, &'static str); 10] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
@@ -45,6 +48,7 @@ impl Optimisation {
         (Self::Gathering, "gathering"),
         (Self::Sharing, "sharing"),
         (Self::UncountedLoops, "uncounted-loops"),
+        (Self::Division, "division"),
     ];
 }
 

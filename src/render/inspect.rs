@@ -114,7 +114,7 @@ fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result
 ///
 /// The module may bind `view` (uniform), `inputs` (read-only storage) and `outputs` (`output_len`
 /// elements, initially zero). Its workgroups have [`WORKGROUP`](crate::gpu::layout::WORKGROUP)
-/// invocations, in a 2-D grid.
+/// invocations, in a 2-D grid. The functions of `arithmetic.wgsl` are part of it.
 ///
 /// # Errors
 /// [`Error::Usage`] if the module is not valid or binds anything else; and any error of the device.
@@ -127,13 +127,14 @@ pub fn evaluate<I: Pod + Send + Sync, O: Pod>(
 ) -> Result<Vec<O>> {
     const ENTRY: &str = "evaluate";
     const NAMES: [&str; 3] = ["view", "inputs", "outputs"];
-    let (_, bindings, _) = reflect(text).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;
+    let text = Text::alone(text);
+    let (_, bindings, _) =
+        reflect(&text.joined).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;
     let variables =
         bindings.get(ENTRY).ok_or_else(|| Error::Usage(format!("the kernel has no entry point {ENTRY}")))?;
     if let Some((name, _)) = variables.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
         return Err(Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")));
     }
-    let text = Text::alone(text);
     let program = Program::compile(gpu, text, &[ENTRY], &[], &[])?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;

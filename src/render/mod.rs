@@ -18,7 +18,7 @@ pub mod sums;
 mod taken;
 mod targets;
 
-use std::borrow::Borrow;
+use std::borrow::{Borrow, Cow};
 use std::time::Instant;
 
 use crate::error::{Error, Result};
@@ -170,10 +170,16 @@ fn one(
     progress: &dyn Progress,
 ) -> Result<(Frame, Report)> {
     match backend {
-        Backend::Gpu { gpu, .. } if kept.options.has(Optimisation::UncountedLoops) => {
-            kept.frame((gpu, sources), source, camera, progress)
+        Backend::Gpu { gpu, .. } => {
+            let mut sources = Cow::Borrowed(sources);
+            if !kept.options.has(Optimisation::UncountedLoops) {
+                sources = Cow::Owned(sources.into_owned().with_counted_loops());
+            }
+            if !kept.options.has(Optimisation::Division) {
+                sources = Cow::Owned(sources.into_owned().with_own_division());
+            }
+            kept.frame((gpu, &sources), source, camera, progress)
         }
-        Backend::Gpu { gpu, .. } => kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress),
         Backend::Reference => {
             let scene = source.whole().ok_or_else(|| {
                 Error::Usage("the reference needs all surfels in memory: render on an adapter".into())

@@ -58,6 +58,8 @@ fn a_quick_run_tries_everything_and_keeps_it() {
     assert!(copy["clock"] != "timestamps" || gpu.adapter.timestamps);
     accuracy(&found["accuracy"], &out);
     determinism(&found["determinism"]);
+    let bits = found["bits"].as_object().unwrap();
+    assert!(bits.len() == 2 && bits.values().all(|bits| bits["color"].is_string()), "{bits:?}");
     throughput(&found["throughput"], number(&copy["gb_per_second"]["median"]));
     studies(&found["studies"], &out);
     let summary = std::fs::read_to_string(out.join("card.md")).unwrap();

@@ -36,6 +36,9 @@ fn a_render_reports_what_it_did() {
         assert!(report["passes"][pass].is_number(), "{pass}");
     }
     assert!(report["total_ms"].is_number() && report["adapter"].is_string());
+    let bits = report["bits"].as_object().unwrap();
+    assert_eq!(bits.keys().collect::<Vec<_>>(), ["color", "count", "decision", "depth", "normal", "weight"]);
+    assert!(bits.values().all(|hash| u64::from_str_radix(hash.as_str().unwrap(), 16).is_ok()), "{bits:?}");
     assert!(report["needs"].as_array().unwrap().contains(&"depth".into()));
     assert!(report["splats_drawn"].as_u64().unwrap() > 0);
 

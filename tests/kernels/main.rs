@@ -2,6 +2,7 @@
 //! All in one test program, so that shared code and kernels are compiled once.
 
 mod accumulators;
+mod arithmetic;
 #[path = "../common/mod.rs"]
 mod common;
 mod determinism;

@@ -61,7 +61,10 @@ fn no_optimisation_shows() {
                     Optimisation::Pairs => assert!(left_out("atomics-u64")),
                     Optimisation::LongWords => assert!(left_out("long-words")),
                     Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),
-                    Optimisation::Order | Optimisation::Hiding | Optimisation::UncountedLoops => {}
+                    Optimisation::Order
+                    | Optimisation::Hiding
+                    | Optimisation::UncountedLoops
+                    | Optimisation::Division => {}
                 }
             }
         }

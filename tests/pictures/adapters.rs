@@ -21,7 +21,8 @@ use std::process::{Command, Output};
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib/chromium-browser/vk_swiftshader_icd.json"];
 
-/// Draws three scenes on the adapter, and compares them with the reference.
+/// Draws three scenes on the adapter, and compares them with the reference and, bit by bit, with
+/// those of the default adapter.
 ///
 /// `render` runs the program with the given arguments; its flag says whether the run uses the
 /// adapter. The adapter's name must contain `name`.
@@ -58,6 +59,10 @@ fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) 
         let output = render(&theirs, "gpu", "depth,weight,count");
         let told = String::from_utf8(output.stderr).unwrap();
         assert!(told.lines().any(|line| line.starts_with("rendering on ") && line.contains(name)), "{told}");
+        let bits = |json: &[u8]| serde_json::from_slice::<serde_json::Value>(json).unwrap()["bits"].clone();
+        let own = [&["render"], scene, &["--samples", "1", "--size", "96x96", "--aov", "depth,weight,count"]].concat();
+        let own = succeeds(&[&own[..], &["--json", "-", "-o", text(&ours)]].concat());
+        assert!(bits(&output.stdout).is_object() && bits(&output.stdout) == bits(&own.stdout), "{scene:?}");
         render(&ours, "reference", "depth,weight,count,decision");
         let output = succeeds(&["compare", text(&theirs), text(&ours), "--json", "-"]);
         let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

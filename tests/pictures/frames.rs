@@ -1,12 +1,13 @@
 //! Hashes of all bits of frames: renders of every kind must give the hashes of earlier runs.
 //!
-//! The hashes of the f64 reference are in `tests/golden/frames.txt` and must not change. Hashes of
-//! an adapter differ from driver to driver, so they are written to the file that `EPSPLAT_FRAMES`
-//! names. Write one file before a change and one after it, and compare them. `EPSPLAT_TEST_ADAPTER`
-//! chooses the adapter.
+//! The hashes of the f64 reference are in `tests/golden/frames.txt`, and those of all adapters in
+//! `tests/golden/devices.txt`: every adapter draws the same bits. Both must not change. The
+//! rasteriser's frames are left out, because the bits that it interpolates differ between adapters.
+//! `EPSPLAT_TEST_ADAPTER` chooses the adapter. All hashes of a run are written to the file that
+//! `EPSPLAT_FRAMES` names:
 //!
 //! ```text
-//! EPSPLAT_FRAMES=before.txt cargo test --release --test pictures frames::
+//! EPSPLAT_FRAMES=now.txt cargo test --release --test pictures frames::
 //! ```
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -225,7 +226,54 @@ fn frames_of_the_reference_are_what_they_were() {
     assert!(rendered(&row(&moved), &Backend::Reference) != rendered(&row(&scenes.sphere), &Backend::Reference));
 }
 
-/// A second render of each frame has the same bits, and so has a render by a core WebGPU device.
+/// Compares hashes of frames with those that all adapters have. Each line is a hash and a name.
+fn compare_with_kept(made: &[String]) {
+    let kept = include_str!("../golden/devices.txt");
+    let kept: Vec<&str> = kept.lines().filter(|line| !line.starts_with('#')).collect();
+    let other: Vec<_> = made.iter().filter(|line| !kept.contains(&line.as_str())).collect();
+    assert!(other.is_empty(), "now:\n{}\nother than before: {other:#?}", made.join("\n"));
+}
+
+/// OpenGL, without the processor's own division, draws the same bits.
+#[test]
+fn frames_have_the_same_bits_by_opengl() {
+    let Some(gpu) = common::opengl() else { return };
+    let scenes = scenes();
+    let backend = Backend::gpu(gpu.clone());
+    let fits =
+        |row: &&Row<'_>| row.options.raster.is_none() && row.buffer_limit.is_none() && refused(row, &gpu).is_none();
+    let all = list(&scenes);
+    // A third of the rows, because compilers take seconds for each.
+    let made = all.iter().filter(fits).step_by(3).map(|row| {
+        let without = [row.options.without.as_slice(), &[Optimisation::Division]].concat();
+        let own = Row { name: row.name.clone(), options: Settings { without, ..row.options.clone() }, ..*row };
+        format!("{:016x} {}", rendered(&own, &backend), row.name)
+    });
+    let made: Vec<String> = made.collect();
+    assert!(made.len() >= 24, "{}", made.len());
+    compare_with_kept(&made);
+}
+
+/// The f32 twin, which needs no driver, draws the same bits. It is slow, so it draws a row of ten.
+#[test]
+fn frames_have_the_same_bits_by_the_f32_twin() {
+    let gpu = Gpu::open(Some("twin")).unwrap();
+    let scenes = scenes();
+    let backend = Backend::gpu(gpu.clone());
+    let fits =
+        |row: &&Row<'_>| row.options.raster.is_none() && row.buffer_limit.is_none() && refused(row, &gpu).is_none();
+    let made: Vec<String> = list(&scenes)
+        .iter()
+        .filter(fits)
+        .step_by(10)
+        .map(|row| format!("{:016x} {}", rendered(row, &backend), row.name))
+        .collect();
+    assert!(made.len() >= 7, "{}", made.len());
+    compare_with_kept(&made);
+}
+
+/// A second render of each frame has the same bits, and so has a render by a core WebGPU device,
+/// and an earlier one by any adapter.
 /// A core device, as in a browser or on a phone, has eight storage buffers, bindings of 128 MiB,
 /// and no optional feature.
 #[test]
@@ -240,7 +288,7 @@ fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
         |line: &str| file.iter().for_each(|mut file| std::io::Write::write_all(&mut file, line.as_bytes()).unwrap());
     write(&format!("# {}\n", gpu.adapter.name));
     let (backend, core_backend) = (Backend::gpu(gpu.clone()), Backend::gpu(core.clone()));
-    let mut compared = 0;
+    let (mut compared, mut all_adapters) = (0, Vec::new());
     for row in &all {
         let limited = |limit| common::gpu().map(|gpu| Backend::gpu(Gpu::with_buffer_limit(gpu, limit))).unwrap();
         let own = row.buffer_limit.map(limited);
@@ -250,6 +298,9 @@ fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
         }
         let made = rendered(row, own.as_ref().unwrap_or(&backend));
         write(&format!("{made:016x} {}\n", row.name));
+        if row.options.raster.is_none() {
+            all_adapters.push(format!("{made:016x} {}", row.name));
+        }
         if row.buffer_limit.is_none() && refused(row, &core).is_none() {
             let (scene, camera) = row.view;
             let (frame, _) = render(scene, camera, &row.options, &core_backend, &()).unwrap();
@@ -258,6 +309,7 @@ fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
         }
     }
     assert!(compared >= 75, "{compared}");
+    compare_with_kept(&all_adapters);
 }
 
 /// A renderer that owns its scene has no lifetimes, so it can move to another thread.

@@ -7,7 +7,7 @@
 // row b has none. Row a is then split on a common grid of 12 bits: the leading parts times whole
 // pixels sum exactly, so 36 bits survive the cancellation at the cost of three multiplications.
 // #import double::{Double, product, sum}
-// #import vectors::{dot2, unit2}
+// #import vectors::{dot2, norm2, unit2}
 
 struct Homography {
     a: vec3<f32>,
@@ -68,13 +68,20 @@ fn minor(a: Double, b_: Double, a_: Double, b: Double) -> Double {
     return difference(product(a, b_), product(a_, b));
 }
 
+// Returns cosine and sine of half the angle of (x, y), from -90 to 90 degrees.
+fn half_turn(x: f32, y: f32) -> vec2<f32> {
+    let length = norm2(vec2<f32>(x, y));
+    let right = vec2<f32>(length + x, y);
+    let left = vec2<f32>(abs(y), select(x - length, length - x, y >= 0.0));
+    return select(unit2(select(left, right, x >= 0.0)), vec2<f32>(1.0, 0.0), length == 0.0);
+}
+
 // Returns rows a and b from their changes per pixel, and from the offset in pixels of the splat's
 // centre from the anchor's centre. Both rows are 0 at the splat's centre.
 fn thin_rows(a_x: Double, a_y: Double, b_x: Double, b_y: Double, offset_x: Double, offset_y: Double) -> Rows {
     let a_2 = a_x.high * a_x.high + a_y.high * a_y.high;
     let b_2 = b_x.high * b_x.high + b_y.high * b_y.high;
-    let angle = 0.5 * atan2(2.0 * (a_x.high * b_x.high + a_y.high * b_y.high), a_2 - b_2);
-    let turn = unit2(vec2<f32>(cos(angle), sin(angle)));
+    let turn = half_turn(a_2 - b_2, 2.0 * (a_x.high * b_x.high + a_y.high * b_y.high));
     let cosine = single(turn.x);
     let sine = single(turn.y);
     let wide_x = sum(product(cosine, a_x), product(sine, b_x));

@@ -4,31 +4,24 @@
 //
 // WGSL lets a compiler reassociate where it considers the result no worse. Mesa's optimiser and
 // NVIDIA's compiler rewrite (a + b) - a to b, which removes the very rounding error that these
-// functions compute; NVIDIA's also rewrites a / b + c / b to (a + c) / b. `keep` passes a value
-// through an exclusive or with a uniform that is always zero: exact, one integer instruction, and
-// opaque to every compiler.
-// #import layout::{held}
+// functions compute. src/gpu/exact and src/gpu/spirv.rs keep operations apart.
 
 struct Double {
     high: f32,
     low: f32,
 }
 
-fn keep(x: f32) -> f32 {
-    return bitcast<f32>(bitcast<u32>(x) ^ held.zero);
-}
-
 // a + b exactly, for |a| >= |b| or a = 0.
 fn quick_two_sum(a: f32, b: f32) -> Double {
-    let sum = keep(a + b);
-    return Double(sum, keep(b - keep(sum - a)));
+    let sum = a + b;
+    return Double(sum, b - (sum - a));
 }
 
 // a + b exactly.
 fn two_sum(a: f32, b: f32) -> Double {
-    let sum = keep(a + b);
-    let part = keep(sum - a);
-    return Double(sum, keep(keep(a - keep(sum - part)) + keep(b - part)));
+    let sum = a + b;
+    let part = sum - a;
+    return Double(sum, (a - (sum - part)) + (b - part));
 }
 
 // The leading 12 bits of the significand. x minus them has 12 bits too, so products of halves are
@@ -39,13 +32,13 @@ fn upper_half(x: f32) -> f32 {
 
 // a * b exactly, unless the error underflows.
 fn two_product(a: f32, b: f32) -> Double {
-    let product = keep(a * b);
+    let product = a * b;
     let a1 = upper_half(a);
     let a2 = a - a1;
     let b1 = upper_half(b);
     let b2 = b - b1;
-    let error = keep(keep(keep(a1 * b1) - product) + keep(a1 * b2));
-    return Double(product, keep(error + keep(a2 * b1)) + a2 * b2);
+    let error = (a1 * b1 - product) + a1 * b2;
+    return Double(product, (error + a2 * b1) + a2 * b2);
 }
 
 fn sum(a: Double, b: Double) -> Double {
@@ -59,8 +52,8 @@ fn product(a: Double, b: Double) -> Double {
 }
 
 fn quotient(a: Double, b: Double) -> Double {
-    let q = keep(a.high / b.high);
+    let q = a.high / b.high;
     let back = two_product(q, b.high);
-    let rest = keep(a.high - back.high) - back.low + (a.low - q * b.low);
+    let rest = (a.high - back.high) - back.low + (a.low - q * b.low);
     return quick_two_sum(q, rest / b.high);
 }

@@ -29,7 +29,7 @@ struct View {
     lights: array<vec4<f32>, 8>,
     width: u32,
     height: u32,
-    // Always 0, which no compiler can know (double.wgsl).
+    // Always 0, which no compiler can know (src/gpu/exact).
     zero: u32,
     unit: f32,
     near: f32,

@@ -2,7 +2,7 @@
 // decided. Twin: src/passes/triangles.rs, which explains the method.
 // #import corner_*::{homogeneous_depth, is_before, shared_depth, spread_of_parts}
 // #import corners::{Corner}
-// #import double::{Double, keep, product, quotient, sum}
+// #import double::{Double, product, quotient, sum}
 // #import layout::{held}
 // #import rows::{minor, single}
 // #import vectors::{dot3}
@@ -44,15 +44,15 @@ fn is_plain(corner: Corner) -> bool {
 // The plain corner's position relative to the image point p. No digit of the difference is lost.
 fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(
-        keep(corner.x.high - p.x) + corner.x.low,
-        keep(corner.y.high - p.y) + corner.y.low,
+        (corner.x.high - p.x) + corner.x.low,
+        (corner.y.high - p.y) + corner.y.low,
     );
 }
 
 // Twice the signed area of the triangle of two corners and the point p that they are relative to.
 // Every kernel rounds it alike, and swapping the corners changes its sign and nothing else.
 fn plain_area(from_: vec2<f32>, to: vec2<f32>) -> f32 {
-    return keep(from_.x * to.y) - keep(from_.y * to.x);
+    return from_.x * to.y - from_.y * to.x;
 }
 
 // The side of an edge on which the point lies: 1 or -1, or 0 if the edge has no length. A point on

@@ -129,6 +129,7 @@ fn of_scene(
             record.determinism.push(Comparison::of((name, accumulator), what, &first, &found));
         }
         if accumulator == Accumulator::Fixed {
+            record.bits.insert(name.to_owned(), first.hashes());
             plain = Some(first);
         }
         told.progress.advance(1);

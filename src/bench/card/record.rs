@@ -1,5 +1,6 @@
 //! The record of a run, and its files.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -42,6 +43,9 @@ pub struct Record {
     pub accuracy: Option<Accuracy>,
     /// Comparisons of images that must be bit-identical.
     pub determinism: Vec<Comparison>,
+    /// A hash of the colour's and of each map's bits of one frame of each scene of the comparisons
+    /// ([`Frame::hashes`](crate::frame::Frame::hashes)).
+    pub bits: BTreeMap<String, BTreeMap<&'static str, String>>,
     /// Frame times, one entry per number of surfels.
     pub throughput: Vec<Throughput>,
     /// The studies that ran.
@@ -76,6 +80,7 @@ impl Record {
             copy_bandwidth: None,
             accuracy: None,
             determinism: Vec::new(),
+            bits: BTreeMap::new(),
             throughput: Vec::new(),
             studies: Vec::new(),
             problems: Vec::new(),

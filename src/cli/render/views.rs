@@ -2,7 +2,7 @@
 //! earlier pictures are encoded and written.
 
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -33,6 +33,8 @@ struct Written {
     /// Numbers of nodes, points and bytes that were read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<ReadReport>,
+    /// A hash of the colour's and of each map's bits ([`Frame::hashes`](epsplat::Frame::hashes)).
+    bits: Option<BTreeMap<&'static str, String>>,
     /// Milliseconds of encoding and writing, while other pictures were rendered.
     write_ms: f64,
 }
@@ -90,7 +92,9 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
         let Picture { frame, report, read, .. } = picture;
         format.write(file, &frame)?;
         bars.advance(1);
-        Ok(Written { file: file.clone(), report, read, write_ms: start.elapsed().as_secs_f64() * 1e3 })
+        let write_ms = start.elapsed().as_secs_f64() * 1e3;
+        let bits = arguments.json.as_ref().map(|_| frame.hashes());
+        Ok(Written { file: file.clone(), report, read, bits, write_ms })
     });
     bars.end();
     let pictures = pictures?;

@@ -1,0 +1,316 @@
+//! The twin as a device of wgpu: the renderer drives it as it drives any other.
+
+use std::collections::BTreeMap;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use naga::valid::Capabilities;
+use wgpu::custom as api;
+
+use super::commands::{Command, Encoder, Finished, Grid};
+use super::objects::{Bound, Buffer, Group, Kernels, Nothing, Pipeline};
+use super::raster::NoRaster;
+use crate::gpu::interface::Interface;
+
+/// Errors until somebody asks for them.
+#[derive(Default)]
+struct Errors {
+    handler: Option<Arc<dyn wgpu::UncapturedErrorHandler>>,
+    /// The first error of each open scope, by its number.
+    scopes: BTreeMap<u32, Option<wgpu::Error>>,
+}
+
+/// The device and its queue.
+#[derive(Clone, Default)]
+pub(super) struct Device {
+    errors: Arc<Mutex<Errors>>,
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        out.write_str("the f32 twin")
+    }
+}
+
+impl Device {
+    fn fail(&self, description: String) {
+        let error = wgpu::Error::Validation { source: description.clone().into(), description };
+        let handler = {
+            let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some((_, scope)) = errors.scopes.iter_mut().next_back() {
+                scope.get_or_insert(error);
+                return;
+            }
+            errors.handler.clone()
+        };
+        if let Some(handler) = handler {
+            handler(error);
+        }
+    }
+
+    fn lacks(&self, what: &str) {
+        self.fail(format!("the f32 twin has no {what}"));
+    }
+
+    /// Runs a command.
+    fn run(&self, command: Command) -> Result<(), String> {
+        match command {
+            Command::Copy { from: (from, first), into: (into, place), words } => {
+                let copied = from.with(|all| all[first..words.map_or(all.len(), |words| first + words)].to_vec());
+                into.with(|all| all[place..place + copied.len()].copy_from_slice(&copied));
+                Ok(())
+            }
+            Command::Clear { buffer, first, words } => {
+                buffer.with(|all| {
+                    let end = words.map_or(all.len(), |words| first + words);
+                    all[first..end].fill(0);
+                });
+                Ok(())
+            }
+            Command::Dispatch { pipeline, bound, grid } => {
+                let grid = match grid {
+                    Grid::Of(grid) => grid,
+                    Grid::In(buffer, at) => buffer.with(|words| [words[at], words[at + 1], words[at + 2]]),
+                };
+                super::dispatch(&pipeline, &bound, grid)
+            }
+            Command::Fail(what) => Err(format!("the f32 twin has no {what}")),
+        }
+    }
+}
+
+impl api::DeviceInterface for Device {
+    fn features(&self) -> wgpu::Features {
+        wgpu::Features::empty()
+    }
+
+    fn limits(&self) -> wgpu::Limits {
+        wgpu::Limits::default()
+    }
+
+    fn adapter_info(&self) -> wgpu::AdapterInfo {
+        wgpu::AdapterInfo::new(wgpu::DeviceType::Cpu, wgpu::Backend::Noop)
+    }
+
+    fn create_shader_module(
+        &self,
+        desc: wgpu::ShaderModuleDescriptor<'_>,
+        _: wgpu::ShaderRuntimeChecks,
+    ) -> api::DispatchShaderModule {
+        let read = match desc.source {
+            wgpu::ShaderSource::Wgsl(text) => Interface::of(&text, Capabilities::all())
+                .map(|interface| (interface.module, interface.info))
+                .map_err(|invalid| invalid.told(|line| Some(("line", line)))),
+            _ => Err("the f32 twin reads WGSL alone".to_owned()),
+        };
+        if let Err(error) = &read {
+            self.fail(error.clone());
+        }
+        api::DispatchShaderModule::custom(Kernels(Arc::new(read)))
+    }
+
+    #[allow(unsafe_code)]
+    unsafe fn create_shader_module_passthrough(
+        &self,
+        _: &wgpu::ShaderModuleDescriptorPassthrough<'_>,
+    ) -> api::DispatchShaderModule {
+        self.lacks("SPIR-V");
+        api::DispatchShaderModule::custom(Kernels(Arc::new(Err("the f32 twin has no SPIR-V".into()))))
+    }
+
+    fn create_bind_group_layout(&self, _: &wgpu::BindGroupLayoutDescriptor<'_>) -> api::DispatchBindGroupLayout {
+        api::DispatchBindGroupLayout::custom(Nothing)
+    }
+
+    fn create_bind_group(&self, desc: &wgpu::BindGroupDescriptor<'_>) -> api::DispatchBindGroup {
+        let bound = desc.entries.iter().filter_map(|entry| {
+            let wgpu::BindingResource::Buffer(part) = &entry.resource else { return None };
+            let buffer = part.buffer.as_custom::<Buffer>()?.clone();
+            let first = part.offset as usize / 4;
+            let held = buffer.with(|words| words.len());
+            let end = part.size.map_or(held, |bytes| first + bytes.get() as usize / 4);
+            Some(Bound { binding: entry.binding, buffer, words: first..end.min(held) })
+        });
+        let bound: Vec<_> = bound.collect();
+        if bound.len() < desc.entries.len() {
+            self.lacks("textures");
+        }
+        api::DispatchBindGroup::custom(Group(bound))
+    }
+
+    fn create_pipeline_layout(&self, _: &wgpu::PipelineLayoutDescriptor<'_>) -> api::DispatchPipelineLayout {
+        api::DispatchPipelineLayout::custom(Nothing)
+    }
+
+    fn create_render_pipeline(&self, _: &wgpu::RenderPipelineDescriptor<'_>) -> api::DispatchRenderPipeline {
+        self.lacks("rasteriser");
+        api::DispatchRenderPipeline::custom(Nothing)
+    }
+
+    fn create_mesh_pipeline(&self, _: &wgpu::MeshPipelineDescriptor<'_>) -> api::DispatchRenderPipeline {
+        self.lacks("rasteriser");
+        api::DispatchRenderPipeline::custom(Nothing)
+    }
+
+    fn create_compute_pipeline(&self, desc: &wgpu::ComputePipelineDescriptor<'_>) -> api::DispatchComputePipeline {
+        let unread = || Kernels(Arc::new(Err("a module of another device".into())));
+        let kernels = desc.module.as_custom::<Kernels>().cloned().unwrap_or_else(unread);
+        let entry = desc.entry_point.unwrap_or_default().to_owned();
+        api::DispatchComputePipeline::custom(Pipeline { kernels, entry })
+    }
+
+    #[allow(unsafe_code)]
+    unsafe fn create_pipeline_cache(&self, _: &wgpu::PipelineCacheDescriptor<'_>) -> api::DispatchPipelineCache {
+        api::DispatchPipelineCache::custom(Nothing)
+    }
+
+    fn create_buffer(&self, desc: &wgpu::BufferDescriptor<'_>) -> api::DispatchBuffer {
+        api::DispatchBuffer::custom(Buffer::new(desc.size))
+    }
+
+    fn create_texture(&self, _: &wgpu::TextureDescriptor<'_>) -> api::DispatchTexture {
+        self.lacks("textures");
+        api::DispatchTexture::custom(Nothing)
+    }
+
+    fn create_external_texture(
+        &self,
+        _: &wgpu::ExternalTextureDescriptor<'_>,
+        _: &[&wgpu::TextureView],
+    ) -> api::DispatchExternalTexture {
+        self.lacks("textures");
+        api::DispatchExternalTexture::custom(Nothing)
+    }
+
+    fn create_blas(
+        &self,
+        _: &wgpu::CreateBlasDescriptor<'_>,
+        _: wgpu::BlasGeometrySizeDescriptors,
+    ) -> (Option<u64>, api::DispatchBlas) {
+        self.lacks("acceleration structures");
+        (None, api::DispatchBlas::custom(Nothing))
+    }
+
+    fn create_tlas(&self, _: &wgpu::CreateTlasDescriptor<'_>) -> api::DispatchTlas {
+        self.lacks("acceleration structures");
+        api::DispatchTlas::custom(Nothing)
+    }
+
+    fn create_sampler(&self, _: &wgpu::SamplerDescriptor<'_>) -> api::DispatchSampler {
+        self.lacks("samplers");
+        api::DispatchSampler::custom(Nothing)
+    }
+
+    fn create_query_set(&self, _: &wgpu::QuerySetDescriptor<'_>) -> api::DispatchQuerySet {
+        self.lacks("queries");
+        api::DispatchQuerySet::custom(Nothing)
+    }
+
+    fn create_command_encoder(&self, _: &wgpu::CommandEncoderDescriptor<'_>) -> api::DispatchCommandEncoder {
+        api::DispatchCommandEncoder::custom(Encoder::default())
+    }
+
+    fn create_render_bundle_encoder(
+        &self,
+        _: &wgpu::RenderBundleEncoderDescriptor<'_>,
+    ) -> api::DispatchRenderBundleEncoder {
+        self.lacks("rasteriser");
+        api::DispatchRenderBundleEncoder::custom(NoRaster)
+    }
+
+    fn set_device_lost_callback(&self, _: api::BoxDeviceLostCallback) {}
+
+    fn on_uncaptured_error(&self, handler: Arc<dyn wgpu::UncapturedErrorHandler>) {
+        self.errors.lock().unwrap_or_else(PoisonError::into_inner).handler = Some(handler);
+    }
+
+    fn push_error_scope(&self, _: wgpu::ErrorFilter) -> u32 {
+        let scopes = &mut self.errors.lock().unwrap_or_else(PoisonError::into_inner).scopes;
+        let number = scopes.keys().next_back().map_or(0, |last| last + 1);
+        scopes.insert(number, None);
+        number
+    }
+
+    fn pop_error_scope(&self, index: u32) -> Pin<Box<dyn api::PopErrorScopeFuture>> {
+        let error = self.errors.lock().unwrap_or_else(PoisonError::into_inner).scopes.remove(&index).flatten();
+        Box::pin(std::future::ready(error))
+    }
+
+    #[allow(unsafe_code)]
+    unsafe fn start_graphics_debugger_capture(&self) {}
+
+    #[allow(unsafe_code)]
+    unsafe fn stop_graphics_debugger_capture(&self) {}
+
+    fn poll(&self, _: wgpu::wgt::PollType<u64>) -> Result<wgpu::PollStatus, wgpu::PollError> {
+        // Commands are run when they are submitted.
+        Ok(wgpu::PollStatus::QueueEmpty)
+    }
+
+    fn get_internal_counters(&self) -> wgpu::InternalCounters {
+        wgpu::InternalCounters::default()
+    }
+
+    fn generate_allocator_report(&self) -> Option<wgpu::AllocatorReport> {
+        None
+    }
+
+    fn destroy(&self) {}
+}
+
+impl api::QueueInterface for Device {
+    fn write_buffer(&self, buffer: &api::DispatchBuffer, offset: u64, data: &[u8]) {
+        if let Some(buffer) = buffer.as_custom::<Buffer>() {
+            buffer.with(|words| {
+                bytemuck::cast_slice_mut::<u32, u8>(words)[offset as usize..][..data.len()].copy_from_slice(data);
+            });
+        }
+    }
+
+    fn create_staging_buffer(&self, _: wgpu::BufferSize) -> Option<api::DispatchQueueWriteBuffer> {
+        None
+    }
+
+    fn validate_write_buffer(&self, _: &api::DispatchBuffer, _: u64, _: wgpu::BufferSize) -> Option<()> {
+        Some(())
+    }
+
+    fn write_staging_buffer(&self, _: &api::DispatchBuffer, _: u64, _: &api::DispatchQueueWriteBuffer) {}
+
+    fn write_texture(
+        &self,
+        _: wgpu::TexelCopyTextureInfo<'_>,
+        _: &[u8],
+        _: wgpu::TexelCopyBufferLayout,
+        _: wgpu::Extent3d,
+    ) {
+        self.lacks("textures");
+    }
+
+    fn submit(&self, buffers: &mut dyn Iterator<Item = api::DispatchCommandBuffer>) -> u64 {
+        for buffer in buffers {
+            let commands = buffer.as_custom::<Finished>().map(Finished::take).unwrap_or_default();
+            for command in commands {
+                if let Err(error) = self.run(command) {
+                    self.fail(error);
+                }
+            }
+        }
+        0
+    }
+
+    fn get_timestamp_period(&self) -> f32 {
+        1.0
+    }
+
+    fn on_submitted_work_done(&self, callback: api::BoxSubmittedWorkDoneCallback) {
+        callback();
+    }
+
+    fn compact_blas(&self, _: &api::DispatchBlas) -> (Option<u64>, api::DispatchBlas) {
+        self.lacks("acceleration structures");
+        (None, api::DispatchBlas::custom(Nothing))
+    }
+
+    fn present(&self, _: &api::DispatchSurfaceOutputDetail) {}
+}

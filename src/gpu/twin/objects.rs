@@ -1,0 +1,152 @@
+//! The objects of the twin's device: buffers, modules and bindings, and those that do nothing.
+
+use std::ops::Range;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use naga::Module;
+use naga::valid::ModuleInfo;
+use wgpu::custom as api;
+
+/// A buffer in the processor's memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Buffer {
+    words: Arc<Mutex<Vec<u32>>>,
+}
+
+impl Buffer {
+    pub fn new(bytes: u64) -> Self {
+        Self { words: Arc::new(Mutex::new(vec![0; bytes.div_ceil(4) as usize])) }
+    }
+
+    /// Whether two handles lead to one buffer.
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.words, &other.words)
+    }
+
+    /// Calls `with` with the buffer's words.
+    pub fn with<T>(&self, with: impl FnOnce(&mut Vec<u32>) -> T) -> T {
+        // A panic leaves words as they are.
+        with(&mut self.words.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl api::BufferInterface for Buffer {
+    fn map_async(&self, _: wgpu::MapMode, _: Range<u64>, callback: api::BufferMapCallback) {
+        callback(Ok(()));
+    }
+
+    fn get_mapped_range(&self, range: Range<u64>) -> Result<api::DispatchBufferMappedRange, wgpu::MapRangeError> {
+        let bytes = self.with(|words| bytemuck::cast_slice(words)[range.start as usize..range.end as usize].to_vec());
+        Ok(api::DispatchBufferMappedRange::custom(Bytes(bytes)))
+    }
+
+    fn unmap(&self) {}
+
+    fn destroy(&self) {}
+}
+
+/// A copy of a buffer's bytes.
+#[derive(Debug)]
+struct Bytes(Vec<u8>);
+
+impl api::BufferMappedRangeInterface for Bytes {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    #[allow(unsafe_code)]
+    unsafe fn read_slice(&self) -> &[u8] {
+        &self.0
+    }
+
+    #[allow(unsafe_code)]
+    unsafe fn write_slice(&mut self) -> wgpu::WriteOnly<'_, [u8]> {
+        (&mut self.0[..]).into()
+    }
+}
+
+/// A module, valid or with the reason why it is not.
+#[derive(Clone, Debug)]
+pub(super) struct Kernels(pub Arc<Result<(Module, ModuleInfo), String>>);
+
+impl api::ShaderModuleInterface for Kernels {
+    fn get_compilation_info(&self) -> Pin<Box<dyn api::ShaderCompilationInfoFuture>> {
+        Box::pin(std::future::ready(wgpu::CompilationInfo { messages: Vec::new() }))
+    }
+}
+
+/// A kernel to dispatch.
+#[derive(Clone, Debug)]
+pub(super) struct Pipeline {
+    pub kernels: Kernels,
+    pub entry: String,
+}
+
+impl api::ComputePipelineInterface for Pipeline {
+    fn get_bind_group_layout(&self, _: u32) -> api::DispatchBindGroupLayout {
+        api::DispatchBindGroupLayout::custom(Nothing)
+    }
+}
+
+/// A range of a buffer, in words, that a variable binds.
+#[derive(Clone, Debug)]
+pub(super) struct Bound {
+    pub binding: u32,
+    pub buffer: Buffer,
+    pub words: Range<usize>,
+}
+
+/// The bound buffers of a dispatch.
+#[derive(Clone, Debug)]
+pub(super) struct Group(pub Vec<Bound>);
+
+impl api::BindGroupInterface for Group {}
+
+/// An object without a function here: layouts, and what only rasterisers use.
+#[derive(Debug)]
+pub(super) struct Nothing;
+
+impl api::BindGroupLayoutInterface for Nothing {}
+impl api::PipelineLayoutInterface for Nothing {}
+impl api::SamplerInterface for Nothing {}
+impl api::TextureViewInterface for Nothing {}
+impl api::TlasInterface for Nothing {}
+
+impl api::TextureInterface for Nothing {
+    fn create_view(&self, _: &wgpu::TextureViewDescriptor<'_>) -> api::DispatchTextureView {
+        api::DispatchTextureView::custom(Self)
+    }
+
+    fn destroy(&self) {}
+}
+
+impl api::ExternalTextureInterface for Nothing {
+    fn destroy(&self) {}
+}
+
+impl api::BlasInterface for Nothing {
+    fn prepare_compact_async(&self, callback: api::BlasCompactCallback) {
+        callback(Ok(()));
+    }
+
+    fn ready_for_compaction(&self) -> bool {
+        false
+    }
+}
+
+impl api::QuerySetInterface for Nothing {
+    fn destroy(&self) {}
+}
+
+impl api::RenderPipelineInterface for Nothing {
+    fn get_bind_group_layout(&self, _: u32) -> api::DispatchBindGroupLayout {
+        api::DispatchBindGroupLayout::custom(Self)
+    }
+}
+
+impl api::PipelineCacheInterface for Nothing {
+    fn get_data(&self) -> Option<Vec<u8>> {
+        None
+    }
+}

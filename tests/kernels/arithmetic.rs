@@ -1,0 +1,252 @@
+//! The arithmetic of `wgsl/common/arithmetic.wgsl`: its errors against f64, its values outside the
+//! range, and the same bits on every adapter.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use crate::common;
+
+use bytemuck::Zeroable;
+use common::Random;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::gpu::layout::View;
+use epsplat::low_level::gpu::sources::FILES;
+use epsplat::low_level::inspect::evaluate;
+
+/// A function, its f64 value, and the largest error in units in the last place.
+struct Row {
+    call: &'static str,
+    exact: fn(f64, f64) -> f64,
+    /// The device's own operation, where it rounds to nearest.
+    native: Option<&'static str>,
+    most_ulps: f64,
+    /// The range of the logarithms to base 2 of arguments.
+    range: [f64; 2],
+    /// Whether arguments may be negative.
+    signed: bool,
+}
+
+const ROWS: [Row; 8] = [
+    Row {
+        call: "f32_divide(x, y)",
+        exact: |x, y| x / y,
+        native: Some("x / y"),
+        most_ulps: 0.5,
+        range: [-60.0, 60.0],
+        signed: true,
+    },
+    Row {
+        call: "f32_sqrt(x)",
+        exact: |x, _| x.sqrt(),
+        native: Some("sqrt(x)"),
+        most_ulps: 0.5,
+        range: [-126.0, 127.9],
+        signed: false,
+    },
+    // Two roundings.
+    Row {
+        call: "f32_inverse_sqrt(x)",
+        exact: |x, _| 1.0 / x.sqrt(),
+        native: Some("1.0 / sqrt(x)"),
+        most_ulps: 1.5,
+        range: [-126.0, 127.9],
+        signed: false,
+    },
+    Row {
+        call: "f32_exp2(x)",
+        exact: |x, _| x.exp2(),
+        native: None,
+        most_ulps: 1.1,
+        range: [-30.0, 5.9],
+        signed: true,
+    },
+    Row { call: "f32_exp(x)", exact: |x, _| x.exp(), native: None, most_ulps: 1.1, range: [-30.0, 5.9], signed: true },
+    Row {
+        call: "f32_log(x)",
+        exact: |x, _| x.ln(),
+        native: None,
+        most_ulps: 1.1,
+        range: [-126.0, 127.9],
+        signed: false,
+    },
+    Row {
+        call: "f32_log2(x)",
+        exact: |x, _| x.log2(),
+        native: None,
+        most_ulps: 1.1,
+        range: [-126.0, 127.9],
+        signed: false,
+    },
+    Row { call: "f32_pow(x, y)", exact: f64::powf, native: None, most_ulps: 1.3, range: [-5.0, 3.9], signed: false },
+];
+
+/// Returns a module that evaluates the WGSL expression `call` for each pair x, y.
+fn text(call: &str) -> String {
+    let kernel = format!(
+        "@group(0) @binding(20) var<storage, read> inputs: array<vec2<f32>>;
+        @group(0) @binding(21) var<storage, read_write> outputs: array<u32>;
+        @compute @workgroup_size(WORKGROUP)
+        fn evaluate(
+            @builtin(workgroup_id) workgroup: vec3<u32>,
+            @builtin(num_workgroups) workgroups: vec3<u32>,
+            @builtin(local_invocation_index) local: u32,
+        ) {{
+            hold_view();
+            let index = linear_index(workgroup, workgroups, local);
+            if (index >= arrayLength(&inputs)) {{
+                return;
+            }}
+            let x = inputs[index].x;
+            let y = inputs[index].y;
+            outputs[index] = bitcast<u32>({call});
+        }}"
+    );
+    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
+    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
+    [of("layout.wgsl"), lacking, &kernel].join("\n")
+}
+
+/// Returns the values of an expression on a device, as bits.
+fn values(gpu: &Gpu, call: &str, inputs: &[[f32; 2]]) -> Vec<u32> {
+    evaluate(gpu, &text(call), &View::zeroed(), inputs, inputs.len() as u64).unwrap()
+}
+
+fn inputs(row: &Row) -> Vec<[f32; 2]> {
+    let mut random = Random(17);
+    let mut number = || {
+        let significand = match random.bits() % 8 {
+            0 => 1.0,
+            1 => 2.0 - f64::from(f32::EPSILON),
+            2 => 1.0 + f64::from(f32::EPSILON),
+            _ => random.between(1.0, 2.0),
+        };
+        let negative = row.signed && random.bits() % 2 == 0;
+        let size = significand * random.between(row.range[0], row.range[1]).floor().exp2();
+        if negative { -size as f32 } else { size as f32 }
+    };
+    (0..1 << 18).map(|_| [number(), number()]).collect()
+}
+
+/// The error of `found` in units in the last place of `exact`.
+fn ulps(found: f32, exact: f64) -> f64 {
+    let unit = (exact.abs().log2().floor().max(-126.0) - 23.0).exp2();
+    (f64::from(found) - exact).abs() / unit
+}
+
+fn adapters() -> Vec<Gpu> {
+    [common::gpu(), common::core_gpu(), common::opengl()].into_iter().flatten().collect()
+}
+
+#[test]
+fn every_function_is_as_exact_as_it_says_and_has_one_set_of_bits() {
+    let adapters = adapters();
+    if adapters.is_empty() {
+        return;
+    }
+    for row in &ROWS {
+        let inputs = inputs(row);
+        let expected = values(&adapters[0], row.call, &inputs);
+        let errors = inputs.iter().zip(&expected).map(|(&[x, y], &bits)| {
+            let exact = (row.exact)(f64::from(x), f64::from(y));
+            (ulps(f32::from_bits(bits), exact), x, y)
+        });
+        let worst = errors.fold((0.0, 0.0, 0.0), |worst, error| if error.0 > worst.0 { error } else { worst });
+        println!("{}: {:.4} units in the last place at {}, {}", row.call, worst.0, worst.1, worst.2);
+        assert!(worst.0 <= row.most_ulps, "{}: {worst:?}", row.call);
+        for gpu in &adapters[1..] {
+            let found = values(gpu, row.call, &inputs);
+            assert!(found == expected, "{} on {} ({})", row.call, gpu.adapter.name, gpu.adapter.api);
+        }
+        for gpu in adapters.iter().filter(|gpu| gpu.adapter.rounds_division()) {
+            let Some(native) = row.native else { continue };
+            assert!(values(gpu, native, &inputs) == expected, "{native} on {}", gpu.adapter.api);
+        }
+    }
+}
+
+/// The f32 twin, which has no driver, has the bits of all devices.
+#[test]
+fn the_f32_twin_has_the_bits_of_devices() {
+    let (Some(gpu), twin) = (common::gpu(), Gpu::open(Some("twin")).unwrap()) else { return };
+    for row in &ROWS {
+        let inputs = &inputs(row)[..1 << 12];
+        for call in [Some(row.call), row.native].into_iter().flatten() {
+            assert!(values(&twin, call, inputs) == values(&gpu, call, inputs), "{call}");
+        }
+        // The control: a last digit is noticed.
+        let other = format!("{} * 1.0000001", row.call);
+        assert!(values(&twin, &other, inputs) != values(&gpu, row.call, inputs), "{other}");
+    }
+}
+
+/// Conversions of integers round to nearest, ties to even.
+#[test]
+fn integers_become_the_nearest_numbers() {
+    let mut random = Random(5);
+    let mut numbers: Vec<u32> = (0..1 << 16).map(|_| (random.bits() >> (random.bits() % 32)) as u32).collect();
+    numbers.extend([0, 1, u32::MAX, 0x8000_0080, 0x8000_0180, 0x8000_0081, 0x0100_0001, 0x0100_0003]);
+    let inputs: Vec<[f32; 2]> = numbers.iter().map(|&n| [f32::from_bits(n), 0.0]).collect();
+    for gpu in adapters() {
+        let found = values(&gpu, "f32(bitcast<u32>(x))", &inputs);
+        for (&number, found) in numbers.iter().zip(found) {
+            // Drivers may change the bits of a NaN that is passed as a number.
+            let same = f32::from_bits(number).is_nan() || found == (number as f32).to_bits();
+            assert!(same, "{number} on {}: {}", gpu.adapter.api, f32::from_bits(found));
+        }
+    }
+}
+
+#[test]
+fn numbers_outside_the_range_have_a_value() {
+    let (inf, nan, least) = (f32::INFINITY, f32::NAN, f32::MIN_POSITIVE);
+    let cases: [(&str, f32, f32, f32); 41] = [
+        ("f32_divide(x, y)", 1.0, 0.0, inf),
+        ("f32_divide(x, y)", -1.0, 0.0, -inf),
+        ("f32_divide(x, y)", 0.0, 3.0, 0.0),
+        ("f32_divide(x, y)", 0.0, -3.0, -0.0),
+        ("f32_divide(x, y)", 0.0, 0.0, nan),
+        ("f32_divide(x, y)", inf, 2.0, inf),
+        ("f32_divide(x, y)", inf, -2.0, -inf),
+        ("f32_divide(x, y)", 1.0, inf, 0.0),
+        ("f32_divide(x, y)", inf, inf, nan),
+        ("f32_divide(x, y)", nan, 1.0, nan),
+        ("f32_divide(x, y)", 1.0, nan, nan),
+        ("f32_divide(x, y)", 1e38, 1e-10, inf),
+        ("f32_divide(x, y)", 1e-38, 1e10, 0.0),
+        ("f32_divide(x, y)", least, 2.0, 0.0),
+        // The largest subnormal result, and the least infinite one.
+        ("f32_divide(x, y)", f32::from_bits(0x00ff_ffff), 2.0, 0.0),
+        ("f32_divide(x, y)", f32::MAX, f32::from_bits(0x3f7f_ffff), inf),
+        ("f32_sqrt(x)", 0.0, 0.0, 0.0),
+        ("f32_sqrt(x)", -0.0, 0.0, -0.0),
+        ("f32_sqrt(x)", -1.0, 0.0, nan),
+        ("f32_sqrt(x)", inf, 0.0, inf),
+        ("f32_sqrt(x)", nan, 0.0, nan),
+        ("f32_exp(x)", -1000.0, 0.0, 0.0),
+        ("f32_exp(x)", -inf, 0.0, 0.0),
+        ("f32_exp(x)", 1000.0, 0.0, inf),
+        ("f32_exp(x)", inf, 0.0, inf),
+        ("f32_exp(x)", 0.0, 0.0, 1.0),
+        ("f32_exp2(x)", -125.0, 0.0, 2.0 * least),
+        ("f32_exp2(x)", -127.5, 0.0, 0.0),
+        ("f32_exp2(x)", 128.0, 0.0, inf),
+        ("f32_log(x)", 0.0, 0.0, -inf),
+        ("f32_log(x)", -1.0, 0.0, nan),
+        ("f32_log(x)", inf, 0.0, inf),
+        ("f32_log(x)", 1.0, 0.0, 0.0),
+        ("f32_log2(x)", 8.0, 0.0, 3.0),
+        ("f32_pow(x, y)", 0.0, 2.0, 0.0),
+        ("f32_pow(x, y)", 0.0, -2.0, inf),
+        ("f32_pow(x, y)", 5.0, 0.0, 1.0),
+        ("f32_pow(x, y)", 1.0, 77.0, 1.0),
+        ("f32_pow(x, y)", inf, -1.0, 0.0),
+        ("max(x, y)", nan, 1.0, 1.0),
+        ("min(x, y)", nan, 1.0, 1.0),
+    ];
+    for gpu in adapters() {
+        for (call, x, y, expected) in cases {
+            let found = f32::from_bits(values(&gpu, call, &[[x, y]])[0]);
+            let same = if expected.is_nan() { found.is_nan() } else { found.to_bits() == expected.to_bits() };
+            assert!(same, "{call} of {x}, {y} on {}: {found} and not {expected}", gpu.adapter.api);
+        }
+    }
+}

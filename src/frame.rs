@@ -93,13 +93,12 @@ impl Frame {
     /// Returns a hash of the bits of the colour and of each map, by name, as 16 digits.
     ///
     /// Frames of one scene, view and options have one set of hashes on every adapter; the guide
-    /// names the exceptions. The hash is FNV-1a of 64 bits (Fowler, Noll, Vo) over the values as
-    /// f32 in little-endian order.
+    /// names the exceptions. The hash is FNV-1a of 64 bits (Fowler, Noll, Vo) over the words of the
+    /// values.
     pub fn hashes(&self) -> BTreeMap<&'static str, String> {
         let hash = |values: &[f32]| {
-            let bytes = values.iter().flat_map(|value| value.to_bits().to_le_bytes());
-            bytes.fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-                (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+            values.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, value| {
+                (hash ^ u64::from(value.to_bits())).wrapping_mul(0x0000_0100_0000_01b3)
             })
         };
         let maps = self.maps.iter().map(|(map, values)| (map.row().name, values.as_slice()));

@@ -140,18 +140,15 @@ impl Surface {
     }
 }
 
-/// Relative error of an exponential: 1.1 units in the last place (`wgsl/common/arithmetic.wgsl`).
-const EXPONENTIAL: f64 = 2.2 * U;
-
-/// Relative error of a power: 1.3 units in the last place.
-const POWER: f64 = 2.6 * U;
+/// Relative error of a power: 1.6 units in the last place (`wgsl/common/arithmetic.wgsl`).
+const POWER: f64 = 3.2 * U;
 
 /// Bounds the error of a fragment's weight.
 pub(super) fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
     let psi = |rho: f64| kernel.weight(rho * rho);
     let weight = psi(f.rho);
     let moved = (psi((f.rho - f.rho_error).max(0.0)) - weight).max(weight - psi((f.rho + f.rho_error).min(1.0)));
-    let exponential = |x: f64, power: f64| EXPONENTIAL + x * power;
+    let exponential = |x: f64, power: f64| 2.0 * U * (1.4 + 0.7 * x) + x * power;
     let evaluated = match kernel {
         Kernel::Constant => 0.0,
         Kernel::Cone { power } => {

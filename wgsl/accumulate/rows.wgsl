@@ -70,10 +70,13 @@ fn minor(a: Double, b_: Double, a_: Double, b: Double) -> Double {
 
 // Returns cosine and sine of half the angle of (x, y), from -90 to 90 degrees.
 fn half_turn(x: f32, y: f32) -> vec2<f32> {
-    let length = norm2(vec2<f32>(x, y));
-    let right = vec2<f32>(length + x, y);
-    let left = vec2<f32>(abs(y), select(x - length, length - x, y >= 0.0));
-    return select(unit2(select(left, right, x >= 0.0)), vec2<f32>(1.0, 0.0), length == 0.0);
+    // Squares of these may be beyond f32.
+    let size = max(abs(x), abs(y));
+    let at = vec2<f32>(x, y) / size;
+    let length = norm2(at);
+    let right = vec2<f32>(length + at.x, at.y);
+    let left = vec2<f32>(abs(at.y), select(at.x - length, length - at.x, at.y >= 0.0));
+    return select(unit2(select(left, right, at.x >= 0.0)), vec2<f32>(1.0, 0.0), size == 0.0);
 }
 
 // Returns rows a and b from their changes per pixel, and from the offset in pixels of the splat's

@@ -93,42 +93,32 @@ fn f32_inverse_sqrt_native(x: f32) -> f32 {
 // of the sum hold.
 const F32_WHOLE: f32 = 12582912.0;
 
-// y 2^n for n = whole - F32_WHOLE, where the result is neither subnormal nor infinite.
-fn f32_scaled(y: f32, whole: f32) -> u32 {
-    return bitcast<u32>(y) + (bitcast<u32>(whole) << 23u);
-}
-
 // Whether x is NaN. Compilers may drop a comparison of x with itself.
 fn f32_is_nan(x: f32) -> bool {
     return (bitcast<u32>(x) & ~F32_SIGN) > F32_INFINITY;
 }
 
-// 2^(high + low), |low| below 2^-10. 0 below 2^-125.9999, and the least number for NaN.
+// 2^(high + low), |low| below 2^-10. Outside the range of f32 it is the least or the largest
+// number, and the least for NaN.
 fn f32_exp2_of(high: f32, low: f32) -> f32 {
     let x = clamp(high, -125.9999, 127.99999);
     let whole = x + F32_WHOLE;
     let f = (x - (whole - F32_WHOLE)) + low;
-    let p = 0.0013390863314270973 + f * 0.00015453163359779865;
-    let q = 0.24022650718688965 + f * (0.055503569543361664 + f * (0.009618083015084267 + f * p));
-    let bits = f32_scaled(1.0 + f * (0.6931471824645996 + f * q), whole);
-    return bitcast<f32>(select(select(bits, 0u, high < -125.9999), F32_INFINITY, high >= 128.0));
+    let square = f * f;
+    let first = 0.6931471824645996 + f * 0.24022650718688965;
+    let second = 0.055503569543361664 + f * 0.009618083015084267;
+    let third = 0.0013390863314270973 + f * 0.00015453163359779865;
+    let y = 1.0 + f * (first + square * (second + square * third));
+    return bitcast<f32>(bitcast<u32>(y) + (bitcast<u32>(whole) << 23u));
 }
 
 fn f32_exp2(x: f32) -> f32 {
     return f32_exp2_of(x, 0.0);
 }
 
-// e^x. 0 below e^-87.336, and the least number for NaN.
+// e^x, with an error of 1.4 + 0.7 |x| units in the last place: the product is rounded.
 fn f32_exp(x: f32) -> f32 {
-    let within = clamp(x, -87.336, 88.72283);
-    let whole = within * 1.4426950216293335 + F32_WHOLE;
-    let n = whole - F32_WHOLE;
-    // The first part of ln 2 has 10 bits, so its product with n is exact.
-    let f = (within - n * 0.693359375) + n * 0.00021219444;
-    let p = 0.041666556149721146 + f * (0.008363194763660431 + f * 0.0013926203828305006);
-    let q = f * f * (0.5 + f * (0.16666576266288757 + f * p));
-    let bits = f32_scaled(1.0 + (f + q), whole);
-    return bitcast<f32>(select(select(bits, 0u, x < -87.336), F32_INFINITY, x > 88.72283));
+    return f32_exp2_of(x * 1.4426950216293335, 0.0);
 }
 
 // The parts of a logarithm: x = 2^exponent (1 + t), and ln(1 + t) = t - t^2 / 2 + t^3 tail.
@@ -192,7 +182,7 @@ fn f32_log2(x: f32) -> f32 {
     return f32_log_of(x, parts.x + parts.y);
 }
 
-// x^p for x of 0 or more; 1 for p = 0.
+// x^p for x of 0 or more; 1 for p = 0 and for x = 1.
 fn f32_pow(x: f32, p: f32) -> f32 {
     let parts = f32_log2_parts(x);
     // p times the leading part, exactly.
@@ -202,7 +192,9 @@ fn f32_pow(x: f32, p: f32) -> f32 {
     let lower = parts.x - upper;
     let product = p * parts.x;
     let rest = ((p_upper * upper - product) + (p_upper * lower + p_lower * upper)) + p_lower * lower;
-    let power = f32_exp2_of(product, rest + p * parts.y);
+    let more = rest + p * parts.y;
+    let sum = product + more;
+    let power = f32_exp2_of(sum, (product - sum) + more);
     let bits = bitcast<u32>(x);
     let none = (bits & F32_INFINITY) == 0u;
     // x is 0 or infinite, and so is the power.
@@ -210,7 +202,7 @@ fn f32_pow(x: f32, p: f32) -> f32 {
     let result = select(bitcast<u32>(power), end, none || bits == F32_INFINITY);
     let undefined = f32_is_nan(x) || f32_is_nan(p) || (!none && bits > F32_INFINITY);
     let value = select(result, F32_NAN, undefined);
-    return select(bitcast<f32>(value), 1.0, p == 0.0);
+    return select(bitcast<f32>(value), 1.0, p == 0.0 || x == 1.0);
 }
 
 fn f32_fract(x: f32) -> f32 {

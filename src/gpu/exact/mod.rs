@@ -17,16 +17,17 @@
 
 mod rewrite;
 
+use std::collections::HashSet;
+use std::sync::LazyLock;
+
 use naga::valid::{Capabilities, ModuleInfo};
 use naga::{BinaryOperator, Expression, Function, Handle, MathFunction, Module, Scalar, ScalarKind, TypeInner};
 
 use super::interface::Interface;
+use super::sources::FILES;
 
 /// The file of the functions, which is appended to every module.
 pub(super) const ARITHMETIC: &str = "arithmetic.wgsl";
-
-/// The start of the names of all functions of that file.
-const PREFIX: &str = "f32_";
 
 /// How a module is rewritten for an adapter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,7 +121,11 @@ pub(super) fn settle(module: &Module, info: &ModuleInfo, needs: Needs) -> Result
 
 /// Whether a function is one of [`ARITHMETIC`].
 fn is_own(function: &Function) -> bool {
-    function.name.as_deref().is_some_and(|name| name.starts_with(PREFIX))
+    static NAMES: LazyLock<HashSet<&str>> = LazyLock::new(|| {
+        let text = FILES.iter().find(|(name, _)| *name == ARITHMETIC).map_or("", |(_, text)| text);
+        text.lines().filter_map(|line| line.strip_prefix("fn ")?.split('(').next()).collect()
+    });
+    function.name.as_deref().is_some_and(|name| NAMES.contains(name))
 }
 
 /// Lists what in a module may have other bits on another adapter, each with its function; empty if
@@ -167,7 +172,6 @@ pub fn open(text: &str) -> Result<Vec<String>, String> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use super::super::sources::FILES;
     use super::*;
 
     const TEXT: &str = "

@@ -300,12 +300,17 @@ impl<'a> Body<'a> {
 
     /// Returns a component of a vector. `naga` folds the component of a vector that was just
     /// composed to the earlier expression, which no later statement may evaluate, so it is used
-    /// right away.
+    /// right away. Overrides may be folded later, so a statement of its own evaluates it.
     fn component(&mut self, base: Handle<Expression>, size: usize, index: u32) -> Handle<Expression> {
         match &self.expressions[base] {
             Expression::Compose { components, .. } if components.len() == size => components[index as usize],
             Expression::Splat { value, .. } => *value,
-            _ => self.append(Expression::AccessIndex { base, index }),
+            _ => {
+                self.evaluate();
+                let component = self.append(Expression::AccessIndex { base, index });
+                self.evaluate();
+                component
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, ThreadId};
 
 use naga::valid::Capabilities;
 use wgpu::custom as api;
@@ -16,8 +17,14 @@ use crate::gpu::interface::Interface;
 #[derive(Default)]
 struct Errors {
     handler: Option<Arc<dyn wgpu::UncapturedErrorHandler>>,
-    /// The first error of each open scope, by its number.
-    scopes: BTreeMap<u32, Option<wgpu::Error>>,
+    /// The open scopes, by their numbers.
+    scopes: BTreeMap<u32, Scope>,
+}
+
+/// An error scope, which belongs to a thread, and the first error in it.
+struct Scope {
+    thread: ThreadId,
+    error: Option<wgpu::Error>,
 }
 
 /// The device and its queue.
@@ -37,8 +44,9 @@ impl Device {
         let error = wgpu::Error::Validation { source: description.clone().into(), description };
         let handler = {
             let mut errors = self.errors.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((_, scope)) = errors.scopes.iter_mut().next_back() {
-                scope.get_or_insert(error);
+            let own = |scope: &&mut Scope| scope.thread == thread::current().id();
+            if let Some(scope) = errors.scopes.values_mut().rev().find(own) {
+                scope.error.get_or_insert(error);
                 return;
             }
             errors.handler.clone()
@@ -98,7 +106,7 @@ impl api::DeviceInterface for Device {
         _: wgpu::ShaderRuntimeChecks,
     ) -> api::DispatchShaderModule {
         let read = match desc.source {
-            wgpu::ShaderSource::Wgsl(text) => Interface::of(&text, Capabilities::all())
+            wgpu::ShaderSource::Wgsl(text) => Interface::of(&text, Capabilities::empty())
                 .map(|interface| (interface.module, interface.info))
                 .map_err(|invalid| invalid.told(|line| Some(("line", line)))),
             _ => Err("the f32 twin reads WGSL alone".to_owned()),
@@ -227,12 +235,13 @@ impl api::DeviceInterface for Device {
     fn push_error_scope(&self, _: wgpu::ErrorFilter) -> u32 {
         let scopes = &mut self.errors.lock().unwrap_or_else(PoisonError::into_inner).scopes;
         let number = scopes.keys().next_back().map_or(0, |last| last + 1);
-        scopes.insert(number, None);
+        scopes.insert(number, Scope { thread: thread::current().id(), error: None });
         number
     }
 
     fn pop_error_scope(&self, index: u32) -> Pin<Box<dyn api::PopErrorScopeFuture>> {
-        let error = self.errors.lock().unwrap_or_else(PoisonError::into_inner).scopes.remove(&index).flatten();
+        let scope = self.errors.lock().unwrap_or_else(PoisonError::into_inner).scopes.remove(&index);
+        let error = scope.and_then(|scope| scope.error);
         Box::pin(std::future::ready(error))
     }
 

@@ -5,8 +5,8 @@
 //! operations that drivers compute differently. What is left are sums and products of f32, each
 //! rounded to nearest, comparisons and integers. A workgroup's invocations run in step, so a
 //! barrier needs no work, and atomic operations take place in the order of the invocations; the
-//! kernels' results do not depend on that order. It has the features of core WebGPU but for
-//! textures and a rasteriser, and takes a hundred times as long as a software driver.
+//! kernels' results do not depend on that order. It knows what the built-in kernels use on core
+//! WebGPU: no 64-bit integers, textures, matrices, nor functions that `arithmetic.wgsl` lacks.
 
 mod commands;
 mod device;

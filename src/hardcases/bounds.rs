@@ -5,8 +5,8 @@
 //! [`Precision`](super::precision::Precision). With u = 2^-24:
 //!
 //! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls
-//!   with rho), and by the errors of `wgsl/common/arithmetic.wgsl`: 1.4 + 0.7 x units in the last
-//!   place for exp(-x), 1.6 for a power, 0.5 for a square root or a division.
+//!   with rho), and by the errors of `wgsl/common/arithmetic.wgsl`: u (2.8 + 1.4 x) for exp(-x),
+//!   1.6 units in the last place for a power, 0.5 for a square root or a division.
 //! - **Mean of an attribute** a: wrong weights add `sum dw (a - mean) / sum w`, at most the spread
 //!   of the pixel's attributes times `sum |dw| / sum w`. Wrong attributes add `sum w da / sum w`.
 //!   The accumulator adds its own bound times the range that it maps to [0, 1]: the scene's

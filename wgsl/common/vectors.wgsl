@@ -1,5 +1,5 @@
 // Products of vectors whose terms are added in the order that is written here. WGSL leaves the
-// order of the built-in dot, cross, length, normalize and mix to the driver, and so their rounding.
+// order of the built-in dot, cross, length and normalize to the driver, and so their rounding.
 // NVIDIA's driver chooses the order by the surrounding code (src/gpu/spirv.rs). A test checks that
 // kernels use none of these built-ins.
 

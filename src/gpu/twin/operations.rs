@@ -115,10 +115,8 @@ pub(super) fn converted(from: Scalar, to: Scalar, a: u64) -> Result<u64, String>
         (ScalarKind::Float, ScalarKind::Float, _) => a,
         // As the translators do: out of the range, the nearest number that f32 holds.
         (ScalarKind::Float, ScalarKind::Uint, 8) => x as u64,
-        (ScalarKind::Float, ScalarKind::Uint, _) => x.max(0.0).min(4_294_967_040.0) as u64,
-        (ScalarKind::Float, ScalarKind::Sint, 4) => {
-            u64::from(x.max(-2_147_483_648.0).min(2_147_483_520.0) as i32 as u32)
-        }
+        (ScalarKind::Float, ScalarKind::Uint, _) => x.clamp(0.0, 4_294_967_040.0) as u64,
+        (ScalarKind::Float, ScalarKind::Sint, 4) => u64::from(x.clamp(-2_147_483_648.0, 2_147_483_520.0) as i32 as u32),
         (ScalarKind::Float, ScalarKind::Bool, _) => u64::from(x != 0.0),
         (_, ScalarKind::Bool, _) => u64::from(a != 0),
         (ScalarKind::Bool | ScalarKind::Uint, ScalarKind::Float, _) => number(a as f32),

@@ -91,7 +91,7 @@ impl Moments {
     }
 
     /// The sum of the changes of [`let_through`](Self::let_through) when each moment and both
-    /// depths change by [`ROUNDING`]: f32 knows the transmittance no better.
+    /// depths change by `ROUNDING`: f32 knows the transmittance no better.
     ///
     /// Fragments close together in a deep scene have central moments far smaller than the rounding
     /// of their moments.

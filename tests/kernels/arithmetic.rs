@@ -119,7 +119,7 @@ fn inputs(row: &Row) -> Vec<[f32; 2]> {
             2 => 1.0 + f64::from(f32::EPSILON),
             _ => random.between(1.0, 2.0),
         };
-        let negative = row.signed && random.bits() % 2 == 0;
+        let negative = row.signed && random.bits().is_multiple_of(2);
         let size = significand * random.between(row.range[0], row.range[1]).floor().exp2();
         if negative { -size as f32 } else { size as f32 }
     };

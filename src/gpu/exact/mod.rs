@@ -7,7 +7,7 @@
 //! from these alone. The module is rewritten in the form in which `naga` holds it, so no kernel has
 //! to name a function, and a kernel of a user gets the same arithmetic.
 //!
-//! Vulkan keeps sums and products apart by a decoration ([`super::spirv`]). Other interfaces have
+//! Vulkan keeps sums and products apart by a decoration (`src/gpu/spirv.rs`). Other interfaces have
 //! none. There, every result passes an exclusive or with a zero that the compiler does not know:
 //! one integer instruction, and no compiler computes `a * b + c` or `(a + b) - a` across it.
 //!
@@ -133,7 +133,7 @@ fn is_own(function: &Function) -> bool {
 ///
 /// These are operations that no function replaces, and entry points whose barriers lack the zero
 /// because they call neither `hold` nor `hold_view` (`layout.wgsl`). The functions of
-/// [`ARITHMETIC`] are left out: integers correct the quotients and roots there.
+/// `arithmetic.wgsl` are left out: integers correct the quotients and roots there.
 ///
 /// # Errors
 /// A message if the text is not valid WGSL, or cannot be rewritten.

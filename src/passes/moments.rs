@@ -42,9 +42,13 @@ pub type Sums = [f64; 5];
 /// Without it, the rounded moments of a nearly transparent pixel may belong to no measure.
 const LEAST_SPREAD: f64 = 1e-6;
 
-/// The error of a moment of unit mass on the device: four roundings of a number of up to 1. There
-/// are about eight, but few of their errors add up.
-const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+/// Two standard deviations of the error of a moment of unit mass on the device.
+///
+/// A moment of up to 1 is rounded eleven times: in four products of a depth, twice where its sum
+/// becomes an f32, twice where the mass does, in the division by the mass, and twice in the mixing.
+/// Each error is spread evenly over +-u, u = 2^-24, so the standard deviation of all is
+/// sqrt(11 / 3) u = 1.9 u. Two of them are 4 u.
+const ROUNDING: f64 = 4.0 / 16_777_216.0;
 
 /// Below this optical depth a pixel counts as fully transparent.
 const LEAST_MASS: f64 = 1.0 / 65536.0;

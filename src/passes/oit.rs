@@ -39,7 +39,8 @@ use crate::scene::{Composite, Map};
 /// The smallest depth weight v_i of `weighted`.
 const LEAST_OF_DEPTH: f64 = 1.0 / 300_000.0;
 
-/// The largest error of a fragment's visibility with which the pixel still counts as decided.
+/// The largest error of a fragment's visibility with which the pixel still counts as decided: the
+/// difference that the random combinations of options allow (`tests/pictures/matrix/judge.rs`).
 const UNSURE: f64 = 3e-4;
 
 /// The smallest transmittance of a single fragment, so that its optical depth stays finite.

@@ -7,6 +7,7 @@ pub mod any_options;
 pub mod any_scene;
 pub mod command;
 pub mod enclosure;
+pub mod evaluated;
 pub mod gaussians;
 pub mod judged;
 pub mod levels;

@@ -5,12 +5,9 @@
 
 use crate::common;
 
-use bytemuck::Zeroable;
 use common::Random;
+use common::evaluated::evaluated;
 use epsplat::low_level::gpu::Gpu;
-use epsplat::low_level::gpu::layout::View;
-use epsplat::low_level::gpu::sources::FILES;
-use epsplat::low_level::inspect::evaluate;
 
 /// A function, its f64 value, and the largest error in units in the last place.
 struct Row {
@@ -79,35 +76,17 @@ const ROWS: [Row; 8] = [
     Row { call: "f32_pow(x, y)", exact: f64::powf, native: None, most_ulps: 1.6, range: [-5.0, 3.9], signed: false },
 ];
 
-/// Returns a module that evaluates the WGSL expression `call` for each pair x, y.
-fn text(call: &str) -> String {
-    let kernel = format!(
-        "@group(0) @binding(20) var<storage, read> inputs: array<vec2<f32>>;
-        @group(0) @binding(21) var<storage, read_write> outputs: array<u32>;
-        @compute @workgroup_size(WORKGROUP)
-        fn evaluate(
-            @builtin(workgroup_id) workgroup: vec3<u32>,
-            @builtin(num_workgroups) workgroups: vec3<u32>,
-            @builtin(local_invocation_index) local: u32,
-        ) {{
-            hold_view();
-            let index = linear_index(workgroup, workgroups, local);
-            if (index >= arrayLength(&inputs)) {{
-                return;
-            }}
-            let x = inputs[index].x;
-            let y = inputs[index].y;
-            outputs[index] = bitcast<u32>({call});
-        }}"
-    );
-    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
-    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
-    [of("layout.wgsl"), lacking, &kernel].join("\n")
-}
-
-/// Returns the values of an expression on a device, as bits.
+/// Returns the values of the WGSL expression `call` for each pair x, y, as bits.
 fn values(gpu: &Gpu, call: &str, inputs: &[[f32; 2]]) -> Vec<u32> {
-    evaluate(gpu, &text(call), &View::zeroed(), inputs, inputs.len() as u64).unwrap()
+    // The names x and y are those of the expressions.
+    let function = format!("fn value(x: f32, y: f32) -> f32 {{ return {call}; }}");
+    evaluated(
+        gpu,
+        ["vec2<f32>", "u32"],
+        &[&function],
+        "outputs[index] = bitcast<u32>(value(x.x, x.y));",
+        (inputs, inputs.len()),
+    )
 }
 
 fn inputs(row: &Row) -> Vec<[f32; 2]> {

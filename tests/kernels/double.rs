@@ -4,43 +4,25 @@
 
 use crate::common;
 
-use bytemuck::Zeroable;
 use common::Random;
+use common::evaluated::{evaluated, file};
 use epsplat::low_level::gpu::Gpu;
-use epsplat::low_level::gpu::layout::View;
-use epsplat::low_level::gpu::sources::FILES;
-use epsplat::low_level::inspect::evaluate;
 
-/// Applies every function to one pair of doubles.
-const KERNEL: &str = "
-@group(0) @binding(20) var<storage, read> inputs: array<vec4<f32>>;
-@group(0) @binding(21) var<storage, read_write> outputs: array<vec2<f32>>;
-
+/// Writes one result of a pair of doubles.
+const PUT: &str = "
 fn put(index: u32, which: u32, value: Double) {
     outputs[index * 5u + which] = vec2<f32>(value.high, value.low);
-}
+}";
 
-@compute @workgroup_size(WORKGROUP)
-fn evaluate(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    hold_view();
-    let index = linear_index(workgroup, workgroups, local);
-    if (index >= arrayLength(&inputs)) {
-        return;
-    }
-    let x = inputs[index];
+/// Applies every function to one pair of doubles.
+const STATEMENTS: &str = "
     let a = Double(x.x, x.y);
     let b = Double(x.z, x.w);
     put(index, 0u, two_sum(a.high, b.high));
     put(index, 1u, two_product(a.high, b.high));
     put(index, 2u, sum(a, b));
     put(index, 3u, product(a, b));
-    put(index, 4u, quotient(a, b));
-}
-";
+    put(index, 4u, quotient(a, b));";
 
 const NAMES: [&str; 6] = ["two_sum", "two_product", "sum", "product", "quotient", "tail"];
 
@@ -81,16 +63,9 @@ fn pairs() -> Vec<[f32; 4]> {
 /// The errors of `two_sum` and `two_product` are absolute. That of `sum` is relative to the
 /// magnitudes of its terms, those of `product` and `quotient` are relative to the result.
 fn errors(gpu: &Gpu, double: &str) -> [f64; 6] {
-    let layout = FILES.iter().find(|(name, _)| *name == "layout.wgsl").unwrap().1;
-    let text = [
-        layout,
-        "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }",
-        double,
-        KERNEL,
-    ]
-    .join("\n");
     let pairs = pairs();
-    let results: Vec<[f32; 2]> = evaluate(gpu, &text, &View::zeroed(), &pairs, 5 * pairs.len() as u64).unwrap();
+    let types = ["vec4<f32>", "vec2<f32>"];
+    let results: Vec<[f32; 2]> = evaluated(gpu, types, &[double, PUT], STATEMENTS, (&pairs, 5 * pairs.len()));
     let wide = |high: f32, low: f32| f64::from(high) + f64::from(low);
     let mut worst = [0f64; 6];
     for (pair, results) in pairs.iter().zip(results.chunks_exact(5)) {
@@ -118,7 +93,7 @@ fn tail([high, low]: [f32; 2]) -> f64 {
 }
 
 fn original() -> &'static str {
-    FILES.iter().find(|(name, _)| *name == "double.wgsl").unwrap().1
+    file("double.wgsl")
 }
 
 fn changed(from: &str, to: &str) -> String {

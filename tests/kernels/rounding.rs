@@ -5,40 +5,18 @@
 
 use crate::common;
 
-use bytemuck::Zeroable;
 use common::Random;
+use common::evaluated::{evaluated, file};
 use epsplat::low_level::gpu::Gpu;
-use epsplat::low_level::gpu::layout::View;
-use epsplat::low_level::gpu::sources::FILES;
-use epsplat::low_level::inspect::evaluate;
 
 /// Expressions that a compiler could fuse or rewrite if allowed.
-const KERNEL: &str = "
-@group(0) @binding(20) var<storage, read> inputs: array<vec4<f32>>;
-@group(0) @binding(21) var<storage, read_write> outputs: array<vec4<f32>>;
-
-@compute @workgroup_size(WORKGROUP)
-fn evaluate(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    hold_view();
-    let index = linear_index(workgroup, workgroups, local);
-    if (index >= arrayLength(&inputs)) {
-        return;
-    }
-    let x = inputs[index];
+const STATEMENTS: &str = "
     outputs[2u * index] = vec4<f32>(x.x * x.y + x.z, (x.x + x.y) - x.x, x.x * x.y - x.z * x.w, x.x * x.z + x.y * x.z);
     outputs[2u * index + 1u] = vec4<f32>(dot3(x.xyz, x.yzw), cross3(x.xyz, x.yzw).x, (x * x.w + x.yzwx).x, x.x * 3.0 - x.x);
-}
 ";
 
-fn on_the_device(gpu: &Gpu, kernel: &str, inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
-    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
-    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
-    let text = [of("layout.wgsl"), lacking, of("vectors.wgsl"), kernel].join("\n");
-    evaluate(gpu, &text, &View::zeroed(), inputs, 2 * inputs.len() as u64).unwrap()
+fn on_the_device(gpu: &Gpu, statements: &str, inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    evaluated(gpu, ["vec4<f32>"; 2], &[file("vectors.wgsl")], statements, (inputs, 2 * inputs.len()))
 }
 
 fn on_the_processor(inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
@@ -69,7 +47,7 @@ fn sums_and_products_are_those_of_the_processor() {
     let (inputs, core, opengl) = (inputs(), common::core_gpu().unwrap(), common::opengl());
     let expected = on_the_processor(&inputs);
     for gpu in [&gpu, &core].into_iter().chain(&opengl) {
-        let wrong = wrong(&on_the_device(gpu, KERNEL, &inputs), &expected);
+        let wrong = wrong(&on_the_device(gpu, STATEMENTS, &inputs), &expected);
         eprintln!("{} ({}): {wrong} of {} differ", gpu.adapter.name, gpu.adapter.api, 4 * expected.len());
         assert_eq!(wrong, 0, "{}", gpu.adapter.api);
     }
@@ -91,7 +69,7 @@ fn other_roundings_are_noticed() {
         ("dot3(x.xyz, x.yzw)", "x.x * x.y + (x.y * x.z + x.z * x.w)"),
         ("x.x * 3.0 - x.x", "x.x * 2.0"),
     ] {
-        assert_eq!(KERNEL.matches(from).count(), 1, "{from}");
-        assert!(wrong(&on_the_device(&gpu, &KERNEL.replace(from, to), &inputs), &expected) > 1000, "{from}");
+        assert_eq!(STATEMENTS.matches(from).count(), 1, "{from}");
+        assert!(wrong(&on_the_device(&gpu, &STATEMENTS.replace(from, to), &inputs), &expected) > 1000, "{from}");
     }
 }

@@ -5,15 +5,12 @@
 
 use crate::common;
 
-use bytemuck::Zeroable;
+use common::evaluated::{evaluated, file};
 use common::levels::{cut, frame, levels, tree};
 use common::scenes::{shuffled, sphere, sphere_camera};
 use common::{Random, bits};
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::gpu::layout::View;
-use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::inspect::evaluate;
 use epsplat::low_level::plan::{Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
@@ -457,32 +454,11 @@ fn children_are_drawn_together_where_each_would_be() {
 /// Runs the function `drawn_at` of `text`, a version of select.wgsl, for each (runs, stride, place,
 /// first).
 fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
-    const KERNEL: &str = "
-        const RUN: u32 = 512u;
-        var<private> own: Page;
-        @group(0) @binding(20) var<storage, read> inputs: array<vec4<u32>>;
-        @group(0) @binding(21) var<storage, read_write> outputs: array<u32>;
-
-        @compute @workgroup_size(WORKGROUP)
-        fn evaluate(
-            @builtin(workgroup_id) workgroup: vec3<u32>,
-            @builtin(num_workgroups) workgroups: vec3<u32>,
-            @builtin(local_invocation_index) local: u32,
-        ) {
-            let index = linear_index(workgroup, workgroups, local);
-            if (index < arrayLength(&inputs)) {
-                let given = inputs[index];
-                own = Page(given.w, 0u, given.x, given.y, 0u, 0u, 0u, 0u);
-                outputs[index] = drawn_at(given.z);
-            }
-        }
-    ";
-    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
     let start = text.find("fn drawn_at").unwrap();
     let function = text[start..].split_inclusive("\n}\n").next().unwrap().replace("page.", "own.");
-    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
-    let text = [of("layout.wgsl"), lacking, &function, KERNEL].join("\n");
-    evaluate(gpu, &text, &View::zeroed(), inputs, inputs.len() as u64).unwrap()
+    let parts = ["const RUN: u32 = 512u; var<private> own: Page;", &function];
+    let statements = "own = Page(x.w, 0u, x.x, x.y, 0u, 0u, 0u, 0u); outputs[index] = drawn_at(x.z);";
+    evaluated(gpu, ["vec4<u32>", "u32"], &parts, statements, (inputs, inputs.len()))
 }
 
 /// Remainders computed in f32 and corrected equal integer remainders, up to the largest number of
@@ -500,7 +476,7 @@ fn places_are_dealt_out_exactly() {
             [runs, stride, 512 * below(u64::from(runs) + 1) + below(512), below(1000)]
         })
         .collect();
-    let text = FILES.iter().find(|(file, _)| *file == "select.wgsl").unwrap().1;
+    let text = file("select.wgsl");
     let expected = |[runs, stride, place, first]: [u32; 4]| {
         let run = u64::from(place / 512);
         let whole = run < u64::from(runs);

@@ -20,8 +20,10 @@ mod rewrite;
 use std::collections::HashSet;
 use std::sync::LazyLock;
 
-use naga::valid::{Capabilities, ModuleInfo};
-use naga::{BinaryOperator, Expression, Function, Handle, MathFunction, Module, Scalar, ScalarKind, TypeInner};
+use naga::valid::Capabilities;
+use naga::{BinaryOperator, Expression, Function, Handle, MathFunction, Scalar, ScalarKind, TypeInner};
+
+pub(super) use rewrite::settle;
 
 use super::interface::Interface;
 use super::sources::FILES;
@@ -111,14 +113,6 @@ fn fate<'a>(
     }
 }
 
-/// Returns `module` with the functions in place of the operations.
-///
-/// # Errors
-/// A message if the module lacks a function, or `held` where barriers are needed.
-pub(super) fn settle(module: &Module, info: &ModuleInfo, needs: Needs) -> Result<Module, String> {
-    rewrite::settle(module, info, needs)
-}
-
 /// Whether a function is one of [`ARITHMETIC`].
 fn is_own(function: &Function) -> bool {
     static NAMES: LazyLock<HashSet<&str>> = LazyLock::new(|| {
@@ -173,6 +167,7 @@ pub fn open(text: &str) -> Result<Vec<String>, String> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use naga::Module;
 
     const TEXT: &str = "
         struct View { zero: u32 }

@@ -34,8 +34,11 @@ struct Context<'a> {
     own: HashMap<String, Handle<Function>>,
 }
 
-/// As [`super::settle`].
-pub(super) fn settle(module: &Module, info: &ModuleInfo, needs: Needs) -> Result<Module, String> {
+/// Returns `module` with the functions in place of the operations.
+///
+/// # Errors
+/// A message if the module lacks a function, or `held` where barriers are needed.
+pub(in super::super) fn settle(module: &Module, info: &ModuleInfo, needs: Needs) -> Result<Module, String> {
     let mut settled = module.clone();
     let sizes = [VectorSize::Bi, VectorSize::Tri, VectorSize::Quad];
     let vector = |size| Type { name: None, inner: TypeInner::Vector { size, scalar: Scalar::F32 } };

@@ -2,11 +2,11 @@
 
 use std::rc::Rc;
 
-use naga::{BinaryOperator, Expression, Function, Handle, Literal, RelationalFunction, Scalar, ScalarKind, TypeInner};
+use naga::{Expression, Function, Handle, Literal, RelationalFunction, TypeInner};
 
 use super::group::{Done, Group, Pointer, Root, Slot};
 use super::operations::{binary, converted, math, unary};
-use super::shape::{Part, components, part, parts, scalar_of, scalar_words, words};
+use super::shape::{Part, kind_of, part, parts, words};
 
 impl Group<'_> {
     /// Returns the value that a statement stored for an expression, or evaluates the expression.
@@ -34,7 +34,7 @@ impl Group<'_> {
     /// The words of a constant expression of the module.
     pub(super) fn constant(&self, handle: Handle<Expression>) -> Done<Vec<u32>> {
         match &self.module.global_expressions[handle] {
-            Expression::Literal(literal) => of_literal(*literal),
+            Expression::Literal(literal) => of_literal(*literal).map(|word| vec![word]),
             Expression::Constant(constant) => self.constant(self.module.constants[*constant].init),
             Expression::ZeroValue(ty) => Ok(vec![0; words(self.module, &self.module.types[*ty].inner)?]),
             Expression::Compose { components, .. } => {
@@ -59,7 +59,7 @@ impl Group<'_> {
             | Expression::Access { .. }
             | Expression::AccessIndex { .. } => self.arranged(&function.expressions[handle]),
             Expression::Unary { .. } | Expression::Binary { .. } | Expression::Math { .. } | Expression::As { .. } => {
-                self.computed(handle, &function.expressions[handle])
+                self.computed(&function.expressions[handle])
             }
             Expression::Select { condition, accept, reject } => self.selected(*condition, *accept, *reject),
             Expression::Relational { fun, argument } => self.related(*fun, *argument),
@@ -71,7 +71,7 @@ impl Group<'_> {
     fn given(&mut self, function: &Function, expression: &Expression) -> Done<Slot> {
         let lanes = self.lanes;
         Ok(match *expression {
-            Expression::Literal(literal) => self.everywhere(&of_literal(literal)?),
+            Expression::Literal(literal) => self.everywhere(&[of_literal(literal)?]),
             Expression::Constant(constant) => {
                 let words = self.constant(self.module.constants[constant].init)?;
                 self.everywhere(&words)
@@ -100,7 +100,7 @@ impl Group<'_> {
                     return Err("only buffers have lengths".into());
                 };
                 let held = self.buffers.of(variable).map_or(0, |words| words.len()) as u32;
-                Slot::Value(at.iter().map(|at| (held - at) / (stride / 4)).collect())
+                Slot::Value(at.iter().map(|at| held.saturating_sub(*at) / (stride / 4)).collect())
             }
             ref other => return Err(format!("the expression {other:?} is not known here")),
         })
@@ -119,9 +119,8 @@ impl Group<'_> {
             }
             Expression::Splat { size, value } => Slot::Value(self.value(value)?.repeat(size as usize).into()),
             Expression::Swizzle { size, vector, pattern } => {
-                let each = scalar_words(scalar_of(self.inner(vector))) * lanes;
                 let vector = self.value(vector)?;
-                let taken = pattern[..size as usize].iter().map(|c| &vector[*c as usize * each..][..each]);
+                let taken = pattern[..size as usize].iter().map(|c| &vector[*c as usize * lanes..][..lanes]);
                 Slot::Value(taken.flatten().copied().collect())
             }
             Expression::AccessIndex { base, index } => {
@@ -137,42 +136,30 @@ impl Group<'_> {
     }
 
     /// The result of an operation, component by component.
-    fn computed(&mut self, handle: Handle<Expression>, expression: &Expression) -> Done<Slot> {
+    fn computed(&mut self, expression: &Expression) -> Done<Slot> {
         Ok(match *expression {
             Expression::Unary { op, expr } => {
-                let scalar = scalar_of(self.inner(expr));
-                let value = self.value(expr)?;
-                self.each(scalar, scalar, &[&value], |[a, ..]| Ok(unary(op, scalar, a)))?
+                let kind = kind_of(self.inner(expr));
+                Slot::Value(self.value(expr)?.iter().map(|word| unary(op, kind, *word)).collect())
             }
             Expression::Binary { op, left, right } => {
-                let (scalar, out) = (scalar_of(self.inner(left)), scalar_of(self.inner(handle)));
-                let (wide, other) = (components(self.inner(left)), components(self.inner(right)));
-                let (mut a, mut b) = (self.value(left)?, self.value(right)?);
-                if wide < other {
-                    a = a.repeat(other).into();
-                } else if other < wide && !matches!(op, BinaryOperator::ShiftLeft | BinaryOperator::ShiftRight) {
-                    b = b.repeat(wide).into();
-                }
-                if scalar.width == 8 && b.len() < a.len() {
-                    // A shift of a word of 64 bits by one of 32.
-                    b = [&b[..], &vec![0; b.len()]].concat().into();
-                }
-                self.each(scalar, out, &[&a, &b], |[a, b, _]| binary(op, scalar, a, b))?
+                let kind = kind_of(self.inner(left));
+                let (a, b) = (self.value(left)?, self.value(right)?);
+                // A scalar beside a vector is the same for each component.
+                let each = |k: usize| binary(op, kind, a[k % a.len()], b[k % b.len()]);
+                Slot::Value((0..a.len().max(b.len())).map(each).collect::<Done<_>>()?)
             }
             Expression::Math { fun, arg, arg1, arg2, .. } => {
-                let scalar = scalar_of(self.inner(arg));
-                let mut all = vec![self.value(arg)?];
-                for other in [arg1, arg2].into_iter().flatten() {
-                    all.push(self.value(other)?);
-                }
-                let all: Vec<&[u32]> = all.iter().map(|value| &value[..]).collect();
-                self.each(scalar, scalar, &all, |[a, b, c]| math(fun, scalar, a, b, c))?
+                let kind = kind_of(self.inner(arg));
+                let a = self.value(arg)?;
+                let [b, c] = [self.value(arg1.unwrap_or(arg))?, self.value(arg2.unwrap_or(arg))?];
+                let each = |k: usize| math(fun, kind, a[k], b[k], c[k]);
+                Slot::Value((0..a.len()).map(each).collect::<Done<_>>()?)
             }
             Expression::As { expr, convert: None, .. } => Slot::Value(self.value(expr)?),
-            Expression::As { expr, kind, convert: Some(width) } => {
-                let (from, to) = (scalar_of(self.inner(expr)), Scalar { kind, width });
-                let value = self.value(expr)?;
-                self.each(from, to, &[&value], |[a, ..]| converted(from, to, a))?
+            Expression::As { expr, kind, .. } => {
+                let from = kind_of(self.inner(expr));
+                Slot::Value(self.value(expr)?.iter().map(|word| converted(from, kind, *word)).collect::<Done<_>>()?)
             }
             ref other => return Err(format!("{other:?} computes nothing")),
         })
@@ -186,7 +173,6 @@ impl Group<'_> {
         reject: Handle<Expression>,
     ) -> Done<Slot> {
         let lanes = self.lanes;
-
         let (chosen, accept, reject) = (self.value(condition)?, self.value(accept)?, self.value(reject)?);
         let each = accept.len() / chosen.len();
         let one = |k: usize| {
@@ -198,57 +184,14 @@ impl Group<'_> {
     }
 
     fn related(&mut self, fun: RelationalFunction, argument: Handle<Expression>) -> Done<Slot> {
-        let lanes = self.lanes;
-
-        let float = scalar_of(self.inner(argument)).kind == ScalarKind::Float;
-        let value = self.value(argument)?;
+        let (lanes, value) = (self.lanes, self.value(argument)?);
         let of_lane = |lane: usize| value.iter().skip(lane).step_by(lanes);
-        Ok(match fun {
-            RelationalFunction::All => {
-                Slot::Value((0..lanes).map(|lane| u32::from(of_lane(lane).all(|t| *t == 1))).collect())
-            }
-            RelationalFunction::Any => {
-                Slot::Value((0..lanes).map(|lane| u32::from(of_lane(lane).any(|t| *t == 1))).collect())
-            }
-            _ if !float => return Err(format!("{fun:?} of integers")),
-            RelationalFunction::IsNan => {
-                Slot::Value(value.iter().map(|word| u32::from(f32::from_bits(*word).is_nan())).collect())
-            }
-            RelationalFunction::IsInf => {
-                Slot::Value(value.iter().map(|word| u32::from(f32::from_bits(*word).is_infinite())).collect())
-            }
-        })
-    }
-
-    /// Applies an operation to each component of each invocation's operands.
-    fn each(
-        &self,
-        scalar: Scalar,
-        out: Scalar,
-        operands: &[&[u32]],
-        operation: impl Fn([u64; 3]) -> Done<u64>,
-    ) -> Done<Slot> {
-        let (lanes, each, wide) = (self.lanes, scalar_words(scalar), scalar_words(out));
-        let count = operands[0].len() / (lanes * each);
-        let mut all = vec![0; count * wide * lanes];
-        for component in 0..count {
-            for lane in 0..lanes {
-                let of = |operand: &&[u32]| {
-                    let at = component * each * lanes + lane;
-                    let high = if each == 2 { u64::from(operand[at + lanes]) << 32 } else { 0 };
-                    u64::from(operand[at]) | high
-                };
-                let mut given = [0; 3];
-                given.iter_mut().zip(operands).for_each(|(given, operand)| *given = of(operand));
-                let result = operation(given)?;
-                let at = component * wide * lanes + lane;
-                all[at] = result as u32;
-                if wide == 2 {
-                    all[at + lanes] = (result >> 32) as u32;
-                }
-            }
-        }
-        Ok(Slot::Value(all.into()))
+        let truth: &dyn Fn(usize) -> bool = match fun {
+            RelationalFunction::All => &|lane| of_lane(lane).all(|t| *t == 1),
+            RelationalFunction::Any => &|lane| of_lane(lane).any(|t| *t == 1),
+            other => return Err(format!("the function {other:?} is not known here")),
+        };
+        Ok(Slot::Value((0..lanes).map(|lane| u32::from(truth(lane))).collect()))
     }
 
     /// A part of a value, or a pointer to a part of what a pointer leads to.
@@ -298,14 +241,13 @@ impl Group<'_> {
     }
 }
 
-fn of_literal(literal: Literal) -> Done<Vec<u32>> {
-    Ok(match literal {
-        Literal::F32(value) => vec![value.to_bits()],
-        Literal::U32(value) => vec![value],
-        Literal::I32(value) => vec![value as u32],
-        Literal::U64(value) => vec![value as u32, (value >> 32) as u32],
-        Literal::I64(value) => vec![value as u32, (value >> 32) as u32],
-        Literal::Bool(value) => vec![u32::from(value)],
-        other => return Err(format!("the number {other:?} is not known here")),
-    })
+/// The word of a number.
+fn of_literal(literal: Literal) -> Done<u32> {
+    match literal {
+        Literal::F32(value) => Ok(value.to_bits()),
+        Literal::U32(value) => Ok(value),
+        Literal::I32(value) => Ok(value as u32),
+        Literal::Bool(value) => Ok(u32::from(value)),
+        other => Err(format!("the number {other:?} is not known here")),
+    }
 }

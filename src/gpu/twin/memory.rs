@@ -2,11 +2,11 @@
 
 use std::rc::Rc;
 
-use naga::{AddressSpace, AtomicFunction, BinaryOperator, Expression, Handle};
+use naga::{AddressSpace, AtomicFunction, BinaryOperator, Expression, Handle, MathFunction};
 
 use super::group::{Done, Group, Mask, Pointer, Root, Slot};
 use super::operations::{binary, math};
-use super::shape::{places, scalar_of, scalar_words, words};
+use super::shape::{kind_of, places, words};
 
 impl Group<'_> {
     /// Returns where the words that a pointer leads to lie, relative to its place, and the number
@@ -78,45 +78,32 @@ impl Group<'_> {
             AtomicFunction::Exchange { compare: Some(compare) } => Some(self.value(compare)?),
             _ => None,
         };
-        let scalar = scalar_of(&pointer.inner);
-        let each = scalar_words(scalar);
+        let kind = kind_of(&pointer.inner);
         let memory = self.memory(pointer.root)?;
-        let mut before = vec![0; (each + usize::from(compare.is_some())) * lanes];
+        let mut before = vec![0; lanes];
+        let mut exchanged = vec![0; lanes];
         for lane in (0..lanes).filter(|lane| mask[*lane]) {
-            let at = pointer.at[lane] as usize;
-            if at + each > memory.len() {
-                continue;
-            }
-            let of = |words: &[u32], at: usize, step: usize| {
-                u64::from(words[at]) | if each == 2 { u64::from(words[at + step]) << 32 } else { 0 }
-            };
-            let (old, given) = (of(memory, at, 1), of(&value, lane, lanes));
-            let equal = compare.as_ref().is_none_or(|compare| of(compare, lane, lanes) == old);
-            let new = match fun {
-                AtomicFunction::Add => binary(BinaryOperator::Add, scalar, old, given)?,
-                AtomicFunction::Subtract => binary(BinaryOperator::Subtract, scalar, old, given)?,
+            // An access outside the buffer has no effect.
+            let Some(held) = memory.get_mut(pointer.at[lane] as usize) else { continue };
+            let (old, given) = (*held, value[lane]);
+            let equal = compare.as_ref().is_none_or(|compare| compare[lane] == old);
+            *held = match fun {
+                AtomicFunction::Add => binary(BinaryOperator::Add, kind, old, given)?,
+                AtomicFunction::Subtract => binary(BinaryOperator::Subtract, kind, old, given)?,
                 AtomicFunction::And => old & given,
                 AtomicFunction::ExclusiveOr => old ^ given,
                 AtomicFunction::InclusiveOr => old | given,
-                AtomicFunction::Min => math(naga::MathFunction::Min, scalar, old, given, 0)?,
-                AtomicFunction::Max => math(naga::MathFunction::Max, scalar, old, given, 0)?,
-                AtomicFunction::Exchange { .. } => {
-                    if equal {
-                        given
-                    } else {
-                        old
-                    }
-                }
+                AtomicFunction::Min => math(MathFunction::Min, kind, old, given, 0)?,
+                AtomicFunction::Max => math(MathFunction::Max, kind, old, given, 0)?,
+                AtomicFunction::Exchange { .. } if !equal => old,
+                AtomicFunction::Exchange { .. } => given,
             };
-            memory[at] = new as u32;
-            before[lane] = old as u32;
-            if each == 2 {
-                memory[at + 1] = (new >> 32) as u32;
-                before[lanes + lane] = (old >> 32) as u32;
-            }
-            if compare.is_some() {
-                before[each * lanes + lane] = u32::from(equal);
-            }
+            before[lane] = old;
+            exchanged[lane] = u32::from(equal);
+        }
+        // The result of a comparing exchange is a structure of both.
+        if compare.is_some() {
+            before.extend(exchanged);
         }
         if let Some(result) = result {
             self.top().values[result.index()] = Some(Slot::Value(before.into()));

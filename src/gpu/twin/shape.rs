@@ -1,26 +1,11 @@
-//! Sizes of types: in values, which are packed words, and in buffers, which have padding.
+//! Sizes of types: in values, which are packed words, and in buffers, which have padding. Every
+//! scalar has one word.
 
-use naga::{ArraySize, Handle, Module, Scalar, Type, TypeInner};
+use naga::{ArraySize, Handle, Module, ScalarKind, Type, TypeInner};
 
-/// The words of a scalar in a value. A truth value takes one, too.
-pub(super) fn scalar_words(scalar: Scalar) -> usize {
-    if scalar.width == 8 { 2 } else { 1 }
-}
-
-/// The scalar of a scalar, vector or atomic type; f32 words otherwise.
-pub(super) fn scalar_of(inner: &TypeInner) -> Scalar {
-    match *inner {
-        TypeInner::Scalar(scalar) | TypeInner::Vector { scalar, .. } | TypeInner::Atomic(scalar) => scalar,
-        _ => Scalar::U32,
-    }
-}
-
-/// The number of components of a vector; 1 otherwise.
-pub(super) fn components(inner: &TypeInner) -> usize {
-    match *inner {
-        TypeInner::Vector { size, .. } => size as usize,
-        _ => 1,
-    }
+/// The kind of a scalar, of a vector's components or of an atomic number.
+pub(super) fn kind_of(inner: &TypeInner) -> ScalarKind {
+    inner.scalar_kind().unwrap_or(ScalarKind::Uint)
 }
 
 fn elements(size: ArraySize) -> Result<usize, String> {
@@ -34,8 +19,8 @@ fn elements(size: ArraySize) -> Result<usize, String> {
 pub(super) fn words(module: &Module, inner: &TypeInner) -> Result<usize, String> {
     let of = |ty: Handle<Type>| words(module, &module.types[ty].inner);
     match inner {
-        TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => Ok(scalar_words(*scalar)),
-        TypeInner::Vector { size, scalar } => Ok(*size as usize * scalar_words(*scalar)),
+        TypeInner::Scalar(_) | TypeInner::Atomic(_) => Ok(1),
+        TypeInner::Vector { size, .. } => Ok(*size as usize),
         TypeInner::Array { base, size, .. } => Ok(elements(*size)? * of(*base)?),
         TypeInner::Struct { members, .. } => members.iter().map(|member| of(member.ty)).sum(),
         other => Err(format!("{other:?} is no value")),
@@ -52,10 +37,7 @@ pub(super) struct Part {
 /// Returns part `index` of a type.
 pub(super) fn part(module: &Module, inner: &TypeInner, index: usize) -> Result<Part, String> {
     match inner {
-        TypeInner::Vector { scalar, .. } => {
-            let at = index * scalar_words(*scalar);
-            Ok(Part { inner: TypeInner::Scalar(*scalar), value: at, buffer: at })
-        }
+        TypeInner::Vector { scalar, .. } => Ok(Part { inner: TypeInner::Scalar(*scalar), value: index, buffer: index }),
         TypeInner::Array { base, stride, .. } => {
             let inner = module.types[*base].inner.clone();
             Ok(Part { value: index * words(module, &inner)?, buffer: index * *stride as usize / 4, inner })

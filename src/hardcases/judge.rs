@@ -1,5 +1,7 @@
 //! Compares the image of a case with its reference: errors and verdict.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::bounds::{ColorRange, Pixel, PixelBound, color_of_samples};
@@ -78,6 +80,8 @@ pub struct Row {
     /// The map and both values, if the RMSE of `fixed` exceeds that of f32 sums by more than one
     /// rounding of the output.
     pub over_float: Option<String>,
+    /// Hashes of the picture's bits ([`Frame::hashes`]).
+    pub bits: BTreeMap<&'static str, String>,
     /// Milliseconds of the render on the device, without compilation.
     pub device_ms: f64,
 }
@@ -232,6 +236,7 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
         covered: covered as f64 / pixels,
         overflows: report.overflows,
         over_float: None,
+        bits: frame.hashes(),
         device_ms: report.total_ms,
     };
     row.verdict = verdict(case, &row);

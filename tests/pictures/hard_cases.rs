@@ -4,11 +4,13 @@
 
 use crate::common;
 
+use std::collections::BTreeMap;
+
 use common::judged::judge;
-use epsplat::low_level::gpu::Sources;
-use epsplat::low_level::hardcases::{self, Verdict};
-use epsplat::low_level::plan::{Accumulator, Settings};
-use epsplat::low_level::render::Backend;
+use epsplat::low_level::gpu::{Gpu, Sources};
+use epsplat::low_level::hardcases::{self, HardCase, Verdict};
+use epsplat::low_level::plan::{Accumulator, Optimisation, Settings};
+use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
@@ -68,6 +70,56 @@ fn odd_image_sizes_work() {
     }
 }
 
+/// Whether an accumulator's sums have the same bits in every order.
+fn sums_integers(accumulator: &str) -> bool {
+    ["fixed", "fixed32", "fixed64", "packed64"].contains(&accumulator)
+}
+
+/// One line of `tests/golden/hardcases.txt`.
+fn told(case: &str, accumulator: &str, bits: &BTreeMap<&'static str, String>) -> String {
+    let hashes: Vec<_> = bits.iter().map(|(map, hash)| format!("{map} {hash}")).collect();
+    format!("{case}, {accumulator}: {}", hashes.join(" "))
+}
+
+/// Compares the bits of pictures with those that all adapters have. The file that `EPSPLAT_CASES`
+/// names gets the lines.
+fn compare_with_kept(made: &[String]) {
+    if let Ok(path) = std::env::var("EPSPLAT_CASES") {
+        std::fs::write(path, made.join("\n") + "\n").unwrap();
+    }
+    let kept: Vec<&str> = include_str!("../golden/hardcases.txt").lines().collect();
+    let other: Vec<_> = made.iter().filter(|line| !kept.contains(&line.as_str())).collect();
+    assert!(!made.is_empty() && other.is_empty(), "{} of {} differ: {other:#?}", other.len(), made.len());
+}
+
+/// Draws some cases on an adapter, and compares the bits with those of all adapters.
+fn drawn(gpu: Gpu, without: &[Optimisation], chosen: impl Fn(usize, &HardCase) -> bool) {
+    let backend = Backend::gpu(gpu);
+    let cases = hardcases::cases().unwrap();
+    let chosen = cases.iter().enumerate().filter(|(k, case)| chosen(*k, case));
+    let made = chosen.map(|(_, case)| {
+        let without = [&case.options.without, without].concat();
+        let options = Settings { maps: case.maps(), without, ..case.options.clone() };
+        let (frame, _) = render(&case.scene, &case.camera, &options, &backend, &()).unwrap();
+        told(&case.name, options.accumulator.name(), &frame.hashes())
+    });
+    compare_with_kept(&made.collect::<Vec<_>>());
+}
+
+/// Compilers of OpenGL take seconds for a case, so it draws every sixth.
+#[test]
+fn hard_cases_have_the_same_bits_by_opengl() {
+    let Some(gpu) = common::opengl() else { return };
+    drawn(gpu, &[Optimisation::Division], |k, _| k % 6 == 0);
+}
+
+/// The f32 twin is slow, so it draws small pictures of few surfels.
+#[test]
+fn hard_cases_have_the_same_bits_by_the_f32_twin() {
+    let light = |case: &HardCase| case.camera.pixels() <= 4096 && case.scene.surfels.len() <= 1000;
+    drawn(Gpu::open(Some("twin")).unwrap(), &[], |k, case| k % 3 == 0 && light(case));
+}
+
 /// Draws every case with every accumulator that the adapter supports.
 #[test]
 fn every_hard_case_passes_or_fails_as_expected() {
@@ -81,6 +133,8 @@ fn every_hard_case_passes_or_fails_as_expected() {
         }
         assert!(row.over_float.is_none(), "{row:#?}");
     }
+    let made = rows.iter().filter(|row| sums_integers(row.accumulator));
+    compare_with_kept(&made.map(|row| told(&row.case, row.accumulator, &row.bits)).collect::<Vec<_>>());
     // An expected failure that does not occur must be deleted from its case.
     for case in &cases {
         for excused in &case.expected {

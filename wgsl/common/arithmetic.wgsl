@@ -98,12 +98,15 @@ fn f32_is_nan(x: f32) -> bool {
     return (bitcast<u32>(x) & ~F32_SIGN) > F32_INFINITY;
 }
 
-// 2^(high + low), |low| below 2^-10. Outside the range of f32 it is the least or the largest
-// number, and the least for NaN.
-fn f32_exp2_of(high: f32, low: f32) -> f32 {
-    let x = clamp(high, -125.9999, 127.99999);
-    let whole = x + F32_WHOLE;
-    let f = (x - (whole - F32_WHOLE)) + low;
+// x, or the nearest of -125.9999 and 127.99999; one of them for NaN. One integer operation serves
+// each end: bits of negative numbers are largest as u32 and fall with the number, those of positive
+// ones are largest as i32.
+fn f32_bounded(x: f32) -> f32 {
+    return bitcast<f32>(min(i32(min(bitcast<u32>(x), 0xc2fbfff3u)), 0x42ffffff));
+}
+
+// 2^(whole - F32_WHOLE + f), |f| at most 1/2 + 2^-10.
+fn f32_raised(whole: f32, f: f32) -> f32 {
     let square = f * f;
     let first = 0.6931471824645996 + f * 0.24022650718688965;
     let second = 0.055503569543361664 + f * 0.009618083015084267;
@@ -112,13 +115,16 @@ fn f32_exp2_of(high: f32, low: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(y) + (bitcast<u32>(whole) << 23u));
 }
 
+// 2^x. Outside the range of f32 it is the least or the largest normal number.
 fn f32_exp2(x: f32) -> f32 {
-    return f32_exp2_of(x, 0.0);
+    let bounded = f32_bounded(x);
+    let whole = bounded + F32_WHOLE;
+    return f32_raised(whole, bounded - (whole - F32_WHOLE));
 }
 
 // e^x, with a relative error of 2^-24 (2.8 + 1.3 |x|): the product is rounded.
 fn f32_exp(x: f32) -> f32 {
-    return f32_exp2_of(x * 1.4426950216293335, 0.0);
+    return f32_exp2(x * 1.4426950216293335);
 }
 
 // The parts of a logarithm: x = 2^exponent (1 + t), and ln(1 + t) = t - t^2 / 2 + t^3 tail.
@@ -194,7 +200,9 @@ fn f32_pow(x: f32, p: f32) -> f32 {
     let rest = ((p_upper * upper - product) + (p_upper * lower + p_lower * upper)) + p_lower * lower;
     let more = rest + p * parts.y;
     let sum = product + more;
-    let power = f32_exp2_of(sum, (product - sum) + more);
+    let bounded = f32_bounded(sum);
+    let whole = bounded + F32_WHOLE;
+    let power = f32_raised(whole, (bounded - (whole - F32_WHOLE)) + ((product - sum) + more));
     let bits = bitcast<u32>(x);
     let none = (bits & F32_INFINITY) == 0u;
     // x is 0 or infinite, and so is the power.

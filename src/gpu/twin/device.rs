@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::pin::Pin;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, ThreadId};
 
@@ -64,21 +65,18 @@ impl Device {
     fn run(&self, command: Command) -> Result<(), String> {
         match command {
             Command::Copy { from: (from, first), into: (into, place), words } => {
-                let copied = from.with(|all| all[first..words.map_or(all.len(), |words| first + words)].to_vec());
-                into.with(|all| all[place..place + copied.len()].copy_from_slice(&copied));
+                let end = words.map_or(from.0.len(), |words| first + words);
+                into.write(place, from.words(first..end));
                 Ok(())
             }
             Command::Clear { buffer, first, words } => {
-                buffer.with(|all| {
-                    let end = words.map_or(all.len(), |words| first + words);
-                    all[first..end].fill(0);
-                });
+                buffer.write(first, std::iter::repeat_n(0, words.unwrap_or(buffer.0.len())));
                 Ok(())
             }
             Command::Dispatch { pipeline, bound, grid } => {
                 let grid = match grid {
                     Grid::Of(grid) => grid,
-                    Grid::In(buffer, at) => buffer.with(|words| [words[at], words[at + 1], words[at + 2]]),
+                    Grid::In(buffer, at) => [0, 1, 2].map(|k| buffer.0[at + k].load(Relaxed)),
                 };
                 super::dispatch(&pipeline, &bound, grid)
             }
@@ -135,9 +133,9 @@ impl api::DeviceInterface for Device {
             let wgpu::BindingResource::Buffer(part) = &entry.resource else { return None };
             let buffer = part.buffer.as_custom::<Buffer>()?.clone();
             let first = part.offset as usize / 4;
-            let held = buffer.with(|words| words.len());
-            let end = part.size.map_or(held, |bytes| first + bytes.get() as usize / 4);
-            Some(Bound { binding: entry.binding, buffer, words: first..end.min(held) })
+            let end = part.size.map_or(buffer.0.len(), |bytes| first + bytes.get() as usize / 4);
+            let words = first..end.min(buffer.0.len());
+            Some(Bound { binding: entry.binding, buffer, words })
         });
         let bound: Vec<_> = bound.collect();
         if bound.len() < desc.entries.len() {
@@ -270,9 +268,8 @@ impl api::DeviceInterface for Device {
 impl api::QueueInterface for Device {
     fn write_buffer(&self, buffer: &api::DispatchBuffer, offset: u64, data: &[u8]) {
         if let Some(buffer) = buffer.as_custom::<Buffer>() {
-            buffer.with(|words| {
-                bytemuck::cast_slice_mut::<u32, u8>(words)[offset as usize..][..data.len()].copy_from_slice(data);
-            });
+            // WebGPU: offsets and sizes of writes are multiples of 4.
+            buffer.write(offset as usize / 4, bytemuck::pod_collect_to_vec::<u8, u32>(data));
         }
     }
 

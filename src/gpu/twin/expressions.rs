@@ -5,7 +5,7 @@ use std::rc::Rc;
 use naga::{Expression, Function, Handle, Literal, RelationalFunction, TypeInner};
 
 use super::group::{Done, Group, Pointer, Root, Slot};
-use super::operations::{binary, converted, math, unary};
+use super::operations::{Math, Two, binary, conversion, math, unary};
 use super::shape::{Part, kind_of, part, parts, words};
 
 impl Group<'_> {
@@ -99,7 +99,7 @@ impl Group<'_> {
                 let (Root::Global(variable), TypeInner::Array { stride, .. }) = (root, &inner) else {
                     return Err("only buffers have lengths".into());
                 };
-                let held = self.buffers.of(variable).map_or(0, |words| words.len()) as u32;
+                let held = self.buffers.get(&variable).map_or(0, |words| words.len()) as u32;
                 Slot::Value(at.iter().map(|at| held.saturating_sub(*at) / (stride / 4)).collect())
             }
             ref other => return Err(format!("the expression {other:?} is not known here")),
@@ -139,27 +139,26 @@ impl Group<'_> {
     fn computed(&mut self, expression: &Expression) -> Done<Slot> {
         Ok(match *expression {
             Expression::Unary { op, expr } => {
-                let kind = kind_of(self.inner(expr));
-                Slot::Value(self.value(expr)?.iter().map(|word| unary(op, kind, *word)).collect())
+                let operation = unary(op, kind_of(self.inner(expr)));
+                Slot::Value(self.value(expr)?.iter().map(|word| operation(*word)).collect())
             }
             Expression::Binary { op, left, right } => {
-                let kind = kind_of(self.inner(left));
-                let (a, b) = (self.value(left)?, self.value(right)?);
-                // A scalar beside a vector is the same for each component.
-                let each = |k: usize| binary(op, kind, a[k % a.len()], b[k % b.len()]);
-                Slot::Value((0..a.len().max(b.len())).map(each).collect::<Done<_>>()?)
+                let operation = binary(op, kind_of(self.inner(left)))?;
+                Slot::Value(each_pair(operation, &self.value(left)?, &self.value(right)?))
             }
             Expression::Math { fun, arg, arg1, arg2, .. } => {
-                let kind = kind_of(self.inner(arg));
                 let a = self.value(arg)?;
                 let [b, c] = [self.value(arg1.unwrap_or(arg))?, self.value(arg2.unwrap_or(arg))?];
-                let each = |k: usize| math(fun, kind, a[k], b[k], c[k]);
-                Slot::Value((0..a.len()).map(each).collect::<Done<_>>()?)
+                Slot::Value(match math(fun, kind_of(self.inner(arg)))? {
+                    Math::One(operation) => a.iter().map(|word| operation(*word)).collect(),
+                    Math::Two(operation) => each_pair(operation, &a, &b),
+                    Math::Three(operation) => (0..a.len()).map(|k| operation(a[k], b[k], c[k])).collect(),
+                })
             }
             Expression::As { expr, convert: None, .. } => Slot::Value(self.value(expr)?),
             Expression::As { expr, kind, .. } => {
-                let from = kind_of(self.inner(expr));
-                Slot::Value(self.value(expr)?.iter().map(|word| converted(from, kind, *word)).collect::<Done<_>>()?)
+                let operation = conversion(kind_of(self.inner(expr)), kind)?;
+                Slot::Value(self.value(expr)?.iter().map(|word| operation(*word)).collect())
             }
             ref other => return Err(format!("{other:?} computes nothing")),
         })
@@ -172,15 +171,10 @@ impl Group<'_> {
         accept: Handle<Expression>,
         reject: Handle<Expression>,
     ) -> Done<Slot> {
-        let lanes = self.lanes;
         let (chosen, accept, reject) = (self.value(condition)?, self.value(accept)?, self.value(reject)?);
-        let each = accept.len() / chosen.len();
-        let one = |k: usize| {
-            let (word, lane) = (k / lanes, k % lanes);
-            let truth = chosen[word / each.max(1) * lanes + lane];
-            if truth == 1 { accept[k] } else { reject[k] }
-        };
-        Ok(Slot::Value((0..accept.len()).map(one).collect()))
+        let one = |((truth, accept), reject): ((&u32, &u32), &u32)| if *truth == 1 { *accept } else { *reject };
+        let choices = chosen.iter().cycle().zip(accept.iter()).zip(reject.iter());
+        Ok(Slot::Value(choices.map(one).collect()))
     }
 
     fn related(&mut self, fun: RelationalFunction, argument: Handle<Expression>) -> Done<Slot> {
@@ -217,7 +211,7 @@ impl Group<'_> {
 
     /// A pointer to a part of what a pointer leads to.
     fn pointed(&mut self, Pointer { root, inner, at }: Pointer, index: &[u32]) -> Done<Slot> {
-        let in_buffer = matches!(root, Root::Global(variable) if self.buffers.bind(variable));
+        let in_buffer = matches!(root, Root::Global(variable) if self.buffers.contains_key(&variable));
         let place = |part: &Part| if in_buffer { part.buffer } else { part.value };
         let places = self.places_of(&inner, index, place)?;
         let at = at.iter().zip(places).map(|(at, place)| at.wrapping_add(place as u32)).collect();
@@ -239,6 +233,15 @@ impl Group<'_> {
         let (first, step) = (of(0)?, of(most.min(1))?);
         Ok(index.iter().map(|index| first + (*index).min(most) as usize * (step - first)).collect())
     }
+}
+
+/// The results of an operation on each pair of words. A scalar beside a vector is the same for each
+/// component.
+fn each_pair(operation: Two, a: &[u32], b: &[u32]) -> Rc<[u32]> {
+    if a.len() == b.len() {
+        return a.iter().zip(b).map(|(a, b)| operation(*a, *b)).collect();
+    }
+    a.iter().cycle().zip(b.iter().cycle()).take(a.len().max(b.len())).map(|(a, b)| operation(*a, *b)).collect()
 }
 
 /// The word of a number.

@@ -1,8 +1,8 @@
 //! A workgroup that runs on the processor, all invocations in step: its calls and statements.
 
 use std::collections::HashMap;
-use std::ops::Range;
 use std::rc::Rc;
+use std::sync::atomic::AtomicU32;
 
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
@@ -12,25 +12,8 @@ use naga::{
 
 use super::shape::words;
 
-/// The bound buffers of a dispatch.
-pub(super) struct Buffers {
-    /// The buffer of each variable, and the words of it that the variable binds.
-    pub variables: HashMap<Handle<GlobalVariable>, (usize, Range<usize>)>,
-    /// The words of each buffer.
-    pub words: Vec<Vec<u32>>,
-}
-
-impl Buffers {
-    pub fn bind(&self, variable: Handle<GlobalVariable>) -> bool {
-        self.variables.contains_key(&variable)
-    }
-
-    /// The words that a variable binds.
-    pub fn of(&mut self, variable: Handle<GlobalVariable>) -> Option<&mut [u32]> {
-        let (place, range) = self.variables.get(&variable)?;
-        self.words.get_mut(*place)?.get_mut(range.clone())
-    }
-}
+/// The words that each variable of a dispatch binds. All workgroups share them.
+pub(super) type Buffers<'a> = HashMap<Handle<GlobalVariable>, &'a [AtomicU32]>;
 
 /// The invocations that take part, one flag each.
 pub(super) type Mask = Vec<bool>;
@@ -91,7 +74,7 @@ pub(super) struct Group<'a> {
     pub id: [u32; 3],
     /// The number of workgroups.
     pub grid: [u32; 3],
-    pub buffers: &'a mut Buffers,
+    pub buffers: &'a Buffers<'a>,
     /// Private variables of all invocations, laid out as values, and workgroup memory.
     pub memory: HashMap<Handle<GlobalVariable>, Vec<u32>>,
     pub frames: Vec<Frame<'a>>,
@@ -105,7 +88,7 @@ impl<'a> Group<'a> {
         (module, info): (&'a Module, &'a ModuleInfo),
         size: [u32; 3],
         (id, grid): ([u32; 3], [u32; 3]),
-        buffers: &'a mut Buffers,
+        buffers: &'a Buffers<'a>,
     ) -> Done<Self> {
         let lanes = size.iter().product::<u32>() as usize;
         let mut group =

@@ -4,8 +4,8 @@
 //! It runs the modules that devices run, after [`super::exact`] has put functions in place of the
 //! operations that drivers compute differently. What is left are sums and products of f32, each
 //! rounded to nearest, comparisons and integers. A workgroup's invocations run in step, so a
-//! barrier needs no work, and atomic operations take place in the order of the invocations; the
-//! kernels' results do not depend on that order. It knows what the built-in kernels use on core
+//! barrier needs no work. Workgroups run on all threads, in any order; the kernels' results do not
+//! depend on it. It knows what the built-in kernels use on core
 //! WebGPU: no 64-bit integers, textures, matrices, nor functions that `arithmetic.wgsl` lacks.
 
 mod commands;
@@ -18,7 +18,7 @@ mod operations;
 mod raster;
 mod shape;
 
-use std::collections::HashMap;
+use rayon::prelude::*;
 
 use self::device::Device;
 use self::group::{Buffers, Group};
@@ -51,26 +51,18 @@ fn dispatch(pipeline: &Pipeline, bound: &[Bound], grid: [u32; 3]) -> Result<(), 
     let (module, info) = (*pipeline.kernels.0).as_ref().map_err(Clone::clone)?;
     let found = module.entry_points.iter().position(|point| point.name == pipeline.entry);
     let index = found.ok_or_else(|| format!("there is no kernel {}", pipeline.entry))?;
-    let mut variables = HashMap::new();
-    // The words of a buffer are taken once, although several variables may bind parts of it.
-    let mut taken: Vec<(&Bound, Vec<u32>)> = Vec::new();
-    for (handle, variable) in module.global_variables.iter() {
-        let Some(binding) = variable.binding else { continue };
-        let Some(bound) = bound.iter().find(|bound| bound.binding == binding.binding) else { continue };
-        let known = taken.iter().position(|(other, _)| other.buffer.is(&bound.buffer));
-        let place = known.unwrap_or_else(|| {
-            taken.push((bound, bound.buffer.with(std::mem::take)));
-            taken.len() - 1
-        });
-        variables.insert(handle, (place, bound.words.clone()));
-    }
-    let mut buffers = Buffers { variables, words: taken.iter_mut().map(|(_, words)| std::mem::take(words)).collect() };
+    let bound_by = |variable: &naga::GlobalVariable| {
+        let binding = variable.binding?.binding;
+        let Bound { buffer, words, .. } = bound.iter().find(|bound| bound.binding == binding)?;
+        buffer.0.get(words.clone())
+    };
+    let variables = module.global_variables.iter();
+    let buffers: Buffers = variables.filter_map(|(handle, variable)| Some((handle, bound_by(variable)?))).collect();
     let size = module.entry_points[index].workgroup_size;
-    let groups = (0..grid[2]).flat_map(|z| (0..grid[1]).flat_map(move |y| (0..grid[0]).map(move |x| [x, y, z])));
-    let mut run = |id| Group::new((module, info), size, (id, grid), &mut buffers)?.run(index);
-    let done = groups.into_iter().try_for_each(&mut run);
-    for ((bound, _), words) in taken.into_iter().zip(buffers.words) {
-        bound.buffer.with(|held| *held = words);
-    }
+    let [across, down, deep] = grid.map(|count| count as usize);
+    let done = (0..across * down * deep).into_par_iter().try_for_each(|k| {
+        let id = [k % across, k / across % down, k / (across * down)].map(|place| place as u32);
+        Group::new((module, info), size, (id, grid), &buffers)?.run(index)
+    });
     done.map_err(|error| format!("the kernel {}: {error}", pipeline.entry))
 }

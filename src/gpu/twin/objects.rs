@@ -2,32 +2,31 @@
 
 use std::ops::Range;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 use naga::Module;
 use naga::valid::ModuleInfo;
 use wgpu::custom as api;
 
-/// A buffer in the processor's memory.
+/// A buffer in the processor's memory. Workgroups write to it from several threads.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Buffer {
-    words: Arc<Mutex<Vec<u32>>>,
-}
+pub(super) struct Buffer(pub Arc<[AtomicU32]>);
 
 impl Buffer {
     pub fn new(bytes: u64) -> Self {
-        Self { words: Arc::new(Mutex::new(vec![0; bytes.div_ceil(4) as usize])) }
+        Self((0..bytes.div_ceil(4)).map(|_| AtomicU32::new(0)).collect())
     }
 
-    /// Whether two handles lead to one buffer.
-    pub fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.words, &other.words)
+    /// Copies words from this one on.
+    pub fn words(&self, range: Range<usize>) -> Vec<u32> {
+        self.0[range].iter().map(|word| word.load(Relaxed)).collect()
     }
 
-    /// Calls `with` with the buffer's words.
-    pub fn with<T>(&self, with: impl FnOnce(&mut Vec<u32>) -> T) -> T {
-        // A panic leaves words as they are.
-        with(&mut self.words.lock().unwrap_or_else(PoisonError::into_inner))
+    /// Writes words from this one on.
+    pub fn write(&self, first: usize, words: impl IntoIterator<Item = u32>) {
+        self.0[first..].iter().zip(words).for_each(|(held, word)| held.store(word, Relaxed));
     }
 }
 
@@ -37,8 +36,9 @@ impl api::BufferInterface for Buffer {
     }
 
     fn get_mapped_range(&self, range: Range<u64>) -> Result<api::DispatchBufferMappedRange, wgpu::MapRangeError> {
-        let bytes = self.with(|words| bytemuck::cast_slice(words)[range.start as usize..range.end as usize].to_vec());
-        Ok(api::DispatchBufferMappedRange::custom(Bytes(bytes)))
+        let words = self.words(range.start as usize / 4..(range.end as usize).div_ceil(4));
+        let bytes = &bytemuck::cast_slice(&words)[..(range.end - range.start) as usize];
+        Ok(api::DispatchBufferMappedRange::custom(Bytes(bytes.to_vec())))
     }
 
     fn unmap(&self) {}

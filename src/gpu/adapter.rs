@@ -140,6 +140,12 @@ impl AdapterDescription {
         self.is_software() && matches!(self.api.as_str(), "vulkan" | "gl" | twin::API)
     }
 
+    /// Whether its conversions from u32 to f32 round to nearest. SwiftShader rounds numbers above
+    /// 2^31 twice.
+    pub fn rounds_integers(&self) -> bool {
+        self.rounds_division() && !self.name.contains("SwiftShader")
+    }
+
     /// Returns an error that names this adapter.
     pub fn error(&self, what: impl Into<String>) -> Error {
         Error::Gpu { adapter: self.name.clone(), what: what.into() }

@@ -69,6 +69,7 @@ impl Module {
         })?;
         let needs = Needs {
             division: text.divides || !gpu.adapter.rounds_division(),
+            integers: text.divides || !gpu.adapter.rounds_integers(),
             barriers: !spirv && gpu.adapter.api != twin::API,
         };
         let interface = interface

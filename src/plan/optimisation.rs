@@ -31,8 +31,8 @@ pub enum Optimisation {
     Sharing,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,
-    /// Processors divide and take roots by their own instructions, which round to nearest as the
-    /// functions of `wgsl/common/arithmetic.wgsl` do (`gpu/exact`).
+    /// Processors divide, take roots and convert integers by their own instructions, which round to
+    /// nearest as the functions of `wgsl/common/arithmetic.wgsl` do (`gpu/exact`).
     Division,
 }
 

@@ -196,11 +196,12 @@ fn integers_become_the_nearest_numbers() {
     numbers.extend([0, 1, u32::MAX, 0x8000_0080, 0x8000_0180, 0x8000_0081, 0x0100_0001, 0x0100_0003]);
     let inputs: Vec<[f32; 2]> = numbers.iter().map(|&n| [f32::from_bits(n), 0.0]).collect();
     for gpu in adapters() {
-        let found = values(&gpu, "f32(bitcast<u32>(x))", &inputs);
-        for (&number, found) in numbers.iter().zip(found) {
-            // Drivers may change the bits of a NaN that is passed as a number.
-            let same = f32::from_bits(number).is_nan() || found == (number as f32).to_bits();
-            assert!(same, "{number} on {}: {}", gpu.adapter.api, f32::from_bits(found));
+        for call in ["f32(bitcast<u32>(x))", "f32_of_u32(bitcast<u32>(x))"] {
+            for (&number, found) in numbers.iter().zip(values(&gpu, call, &inputs)) {
+                // Drivers may change the bits of a NaN that is passed as a number.
+                let same = f32::from_bits(number).is_nan() || found == (number as f32).to_bits();
+                assert!(same, "{call} of {number} on {}: {}", gpu.adapter.api, f32::from_bits(found));
+            }
         }
     }
 }

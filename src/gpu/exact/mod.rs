@@ -36,6 +36,8 @@ pub(super) const ARITHMETIC: &str = "arithmetic.wgsl";
 pub(super) struct Needs {
     /// Whether quotients and roots are replaced; processors round them correctly themselves.
     pub division: bool,
+    /// Whether conversions from u32 are replaced; most processors round them correctly.
+    pub integers: bool,
     /// Whether results of sums and products pass a barrier.
     pub barriers: bool,
 }
@@ -62,7 +64,7 @@ enum Fate {
 fn fate<'a>(
     expression: &Expression,
     inner: impl Fn(Handle<Expression>) -> &'a TypeInner,
-    Needs { division, .. }: Needs,
+    Needs { division, integers, .. }: Needs,
 ) -> Fate {
     use {BinaryOperator as B, MathFunction as M};
     let is_float = |handle| inner(handle).scalar_kind() == Some(ScalarKind::Float);
@@ -100,7 +102,11 @@ fn fate<'a>(
         Expression::As { expr, kind: ScalarKind::Float, convert: Some(4) }
             if inner(expr).scalar() == Some(Scalar::U32) =>
         {
-            Fate::Call("f32_of_u32")
+            if integers {
+                Fate::Call("f32_of_u32")
+            } else {
+                Fate::Exact
+            }
         }
         // Integers of 64 bits and floats of other sizes.
         Expression::As { expr, kind: ScalarKind::Float, convert: Some(width) }
@@ -136,7 +142,7 @@ pub fn open(text: &str) -> Result<Vec<String>, String> {
     let all = Capabilities::all();
     let interface = Interface::of(&text, all).map_err(|invalid| invalid.told(|line| Some(("line", line))))?;
     let (module, info) = (&interface.module, &interface.info);
-    let needs = Needs { division: true, barriers: true };
+    let needs = Needs { division: true, integers: true, barriers: true };
     let functions = module.functions.iter().filter(|(_, f)| !is_own(f)).map(|(handle, f)| (f, &info[handle]));
     let entries = module.entry_points.iter().enumerate().map(|(k, entry)| (&entry.function, info.get_entry_point(k)));
     let mut told = Vec::new();
@@ -210,14 +216,14 @@ mod tests {
 
     #[test]
     fn each_component_becomes_a_call_and_the_module_stays_valid() {
-        let all = Needs { division: true, barriers: false };
+        let all = Needs { division: true, integers: true, barriers: false };
         let module = settled(TEXT, all).unwrap();
         Interface::validated(module.clone(), Capabilities::empty()).unwrap();
         let called = calls(&module, "turned");
         let count = |name: &str| called.iter().filter(|called| *called == name).count();
         assert_eq!(["f32_divide", "f32_of_u32", "f32_sqrt"].map(count), [3, 1, 3], "{called:?}");
-        let native = settled(TEXT, Needs { division: false, barriers: false }).unwrap();
-        assert_eq!(calls(&native, "turned").len(), called.len() - 6);
+        let native = settled(TEXT, Needs { division: false, integers: false, barriers: false }).unwrap();
+        assert_eq!(calls(&native, "turned").len(), called.len() - 7);
     }
 
     #[test]
@@ -230,13 +236,13 @@ mod tests {
             let of = |function: &Function| function.expressions.iter().filter(|(_, e)| is_or(e)).count();
             [of(turned), of(&module.entry_points[0].function)]
         };
-        assert_eq!(ors(Needs { division: true, barriers: false }), [0, 0]);
+        assert_eq!(ors(Needs { division: true, integers: true, barriers: false }), [0, 0]);
         // sum + ..., sum * ...; turned * ..., ... - 1; 1 / BY is a call.
-        assert_eq!(ors(Needs { division: true, barriers: true }), [2, 2]);
+        assert_eq!(ors(Needs { division: true, integers: true, barriers: true }), [2, 2]);
         // The quotients and roots, too.
-        assert_eq!(ors(Needs { division: false, barriers: true }), [4, 3]);
+        assert_eq!(ors(Needs { division: false, integers: true, barriers: true }), [4, 3]);
         let without = TEXT.replace("held", "kept");
-        let message = settled(&without, Needs { division: true, barriers: true }).unwrap_err();
+        let message = settled(&without, Needs { division: true, integers: true, barriers: true }).unwrap_err();
         assert!(message.contains("held"), "{message}");
     }
 }

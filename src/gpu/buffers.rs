@@ -7,6 +7,7 @@ use std::ops::Range;
 use bytemuck::Pod;
 
 use super::device::Gpu;
+use super::traffic::Traffic;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 
@@ -84,16 +85,22 @@ impl<T: Pod> Buffer<T> {
     /// Waits for the copy, so that the old and the new buffer exist together only briefly.
     pub(crate) fn grow(&mut self, gpu: &Gpu, what: &str, len: u64) -> Result<()> {
         let new = Self::create(gpu, what, len, self.raw.usage(), gpu.buffer_limit())?;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut encoder = gpu.encoder();
         encoder.copy_buffer_to_buffer(&self.raw, 0, &new.raw, 0, self.raw.size().min(new.raw.size()));
-        gpu.queue.submit([encoder.finish()]);
+        gpu.submit(encoder);
         *self = new;
         gpu.wait()
     }
 
     /// Overwrites the first element.
     pub fn set(&self, gpu: &Gpu, value: &T) {
-        gpu.queue.write_buffer(&self.raw, 0, bytemuck::bytes_of(value));
+        self.put(gpu, bytemuck::bytes_of(value));
+    }
+
+    /// Overwrites the first bytes.
+    pub(crate) fn put(&self, gpu: &Gpu, bytes: &[u8]) {
+        Traffic::count(Traffic { bytes_written: bytes.len() as u64, ..Traffic::default() });
+        gpu.queue.write_buffer(&self.raw, 0, bytes);
     }
 
     fn create(gpu: &Gpu, what: &str, len: u64, usage: wgpu::BufferUsages, limit: u64) -> Result<Self> {
@@ -151,7 +158,9 @@ impl<T: Pod> Buffer<T> {
         let per_piece = (PIECE / size_of::<T>() as u64).max(1) as usize;
         for first in (0..len).step_by(per_piece) {
             let values = values(first..len.min(first + per_piece));
-            gpu.queue.write_buffer(&self.raw, (first * size_of::<T>()) as u64, bytemuck::cast_slice(&values));
+            let bytes: &[u8] = bytemuck::cast_slice(&values);
+            Traffic::count(Traffic { bytes_written: bytes.len() as u64, ..Traffic::default() });
+            gpu.queue.write_buffer(&self.raw, (first * size_of::<T>()) as u64, bytes);
             // Submitting and waiting frees the staging memory of this piece.
             gpu.queue.submit([]);
             gpu.wait()?;
@@ -238,6 +247,24 @@ impl Readback {
         self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
+    /// Records the copy of the piece of the first `bytes` of `buffer` that starts at `offset`.
+    /// Returns what the host maps to read the piece.
+    fn record<'a>(
+        &'a self,
+        encoder: &mut wgpu::CommandEncoder,
+        buffer: &'a wgpu::Buffer,
+        (offset, bytes): (u64, u64),
+    ) -> wgpu::BufferSlice<'a> {
+        match &self.staging {
+            Some(staging) => {
+                let size = (bytes - offset).min(self.step);
+                encoder.copy_buffer_to_buffer(buffer, offset, staging, 0, size);
+                staging.slice(..size)
+            }
+            None => buffer.slice(..bytes),
+        }
+    }
+
     /// Calls `piece` with the bytes of each piece of the first `bytes` of `buffer`, in order.
     pub(crate) fn visit<T>(
         &self,
@@ -246,52 +273,86 @@ impl Readback {
         bytes: u64,
         mut piece: impl FnMut(&[u8]),
     ) -> Result<()> {
-        let bytes = bytes.min(buffer.raw.size());
-        let mut offset = 0;
-        while offset < bytes {
-            let (read, slice) = match &self.staging {
-                Some(staging) => {
-                    let size = (bytes - offset).min(self.step);
-                    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                    encoder.copy_buffer_to_buffer(&buffer.raw, offset, staging, 0, size);
-                    gpu.queue.submit([encoder.finish()]);
-                    (staging, staging.slice(..size))
-                }
-                None => (&buffer.raw, buffer.raw.slice(..bytes)),
-            };
-            slice.map_async(wgpu::MapMode::Read, |_| {});
-            gpu.wait()?;
-            let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
-            piece(&view);
-            offset += view.len() as u64;
-            drop(view);
-            read.unmap();
+        let image = Image { readback: self, buffer: &buffer.raw, bytes, piece: &mut piece };
+        read(gpu, gpu.encoder(), &[], Some(image)).map(|_| ())
+    }
+}
+
+/// The start of a buffer that the host reads in pieces.
+pub(crate) struct Image<'a> {
+    /// The staging memory.
+    pub readback: &'a Readback,
+    /// The buffer.
+    pub buffer: &'a wgpu::Buffer,
+    /// The number of bytes to read.
+    pub bytes: u64,
+    /// Takes each piece, in order.
+    pub piece: &'a mut dyn FnMut(&[u8]),
+}
+
+/// Some 64-bit words of a buffer.
+pub(crate) struct Words<'a> {
+    /// The buffer.
+    pub buffer: &'a wgpu::Buffer,
+    /// The byte at which the first word starts.
+    pub first: u64,
+    /// The number of words.
+    pub count: u64,
+}
+
+/// Submits the commands of `encoder`, and reads `words` and `image` after them. Waits for the device
+/// once, and once more for each further piece of the image.
+pub(super) fn read(
+    gpu: &Gpu,
+    mut encoder: wgpu::CommandEncoder,
+    words: &[Words<'_>],
+    image: Option<Image<'_>>,
+) -> Result<Vec<u64>> {
+    let count: u64 = words.iter().map(|words| words.count).sum();
+    let tray = (count > 0).then(|| gpu.spare.tray(gpu, 8 * count));
+    let mut place = 0;
+    for words in words {
+        if let Some(tray) = &tray {
+            encoder.copy_buffer_to_buffer(words.buffer, words.first, tray, place, 8 * words.count);
         }
-        Ok(())
+        place += 8 * words.count;
+    }
+    let bytes = image.as_ref().map_or(0, |image| image.bytes.min(image.buffer.size()));
+    let first = image.as_ref().filter(|_| bytes > 0);
+    let first = first.map(|image| image.readback.record(&mut encoder, image.buffer, (0, bytes)));
+    gpu.submit(encoder);
+    let tray_slice = tray.as_ref().map(|tray| tray.slice(..8 * count));
+    tray_slice.into_iter().chain(first).for_each(|slice| slice.map_async(wgpu::MapMode::Read, |_| {}));
+    gpu.wait()?;
+    let mut values = Vec::new();
+    if let Some(slice) = tray_slice {
+        values = mapped(gpu, slice, |bytes| bytes.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect())?;
+    }
+    tray.into_iter().for_each(|tray| gpu.spare.keep(tray));
+    let (Some(image), Some(mut slice)) = (image, first) else { return Ok(values) };
+    let mut offset = 0;
+    loop {
+        offset += mapped(gpu, slice, |bytes| {
+            (image.piece)(bytes);
+            bytes.len() as u64
+        })?;
+        if offset >= bytes {
+            return Ok(values);
+        }
+        let mut encoder = gpu.encoder();
+        slice = image.readback.record(&mut encoder, image.buffer, (offset, bytes));
+        gpu.submit(encoder);
+        slice.map_async(wgpu::MapMode::Read, |_| {});
+        gpu.wait()?;
     }
 }
 
-/// Reads the first two words of each of `buffers`, which must have at least two, in one round trip
-/// to the device.
-pub(crate) fn counts(gpu: &Gpu, buffers: &[&Buffer<u32>]) -> Result<Vec<[u32; 2]>> {
-    let starts: Vec<_> = buffers.iter().map(|buffer| (*buffer, 0)).collect();
-    counts_at(gpu, &starts)
-}
-
-/// Reads two consecutive words of each of `buffers`, from the given word on, in one round trip.
-pub(crate) fn counts_at(gpu: &Gpu, buffers: &[(&Buffer<u32>, u64)]) -> Result<Vec<[u32; 2]>> {
-    let all = Buffer::<[u32; 2]>::readable(gpu, "counts", buffers.len() as u64)?;
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    for (place, (buffer, word)) in (0..).zip(buffers) {
-        encoder.copy_buffer_to_buffer(&buffer.raw, 4 * word, &all.raw, 8 * place, 8);
-    }
-    gpu.queue.submit([encoder.finish()]);
-    all.read(gpu, buffers.len() as u64)
-}
-
-impl<T> Buffer<T> {
-    /// Wraps a raw buffer of `len` elements.
-    pub(crate) fn from_raw(raw: wgpu::Buffer, len: u64) -> Self {
-        Self { raw, len, element: PhantomData }
-    }
+/// Returns what `of` makes of the bytes of a mapped slice, and unmaps it.
+fn mapped<R>(gpu: &Gpu, slice: wgpu::BufferSlice<'_>, of: impl FnOnce(&[u8]) -> R) -> Result<R> {
+    let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
+    Traffic::count(Traffic { bytes_read: view.len() as u64, ..Traffic::default() });
+    let made = of(&view);
+    drop(view);
+    slice.buffer().unmap();
+    Ok(made)
 }

@@ -4,6 +4,8 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use super::adapter::AdapterDescription;
 use super::program::Compiled;
+use super::spare::Spare;
+use super::traffic::Traffic;
 use super::twin;
 use crate::error::{Error, Result};
 
@@ -34,10 +36,11 @@ pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu wit
 /// Validation adds a dispatch before each indirect dispatch. This takes a fifth of the frame time
 /// of small cuts of levels of detail (1.9 ms instead of 1.5). No workgroup count of the renderer is
 /// too large. Most grids come from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than
-/// 2^30, so they have at most 65,535 groups per row and 2^14 rows. The others have one row per
-/// batch of a page, and a page has at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On
-/// Windows validation stays on: Direct3D 12 passes the counts to kernels only if they are
-/// validated.
+/// 2^30, so they have at most 65,535 groups per row and 2^14 rows. Grids that grow with a page's
+/// queue or with the list of tiles have 1024 groups per row and at most 2^14 rows. The others have
+/// one row per batch of a page, and a page has at most
+/// [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows validation stays on: Direct3D 12
+/// passes the counts to kernels only if they are validated.
 fn counts_are_checked() -> bool {
     cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")
 }
@@ -101,6 +104,7 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     pub(crate) compiled: Arc<Compiled>,
+    pub(super) spare: Arc<Spare>,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -177,7 +181,7 @@ impl Gpu {
                 slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
             }
         });
-        Self { adapter, device, queue, compiled: Arc::default(), failure }
+        Self { adapter, device, queue, compiled: Arc::default(), spare: Arc::default(), failure }
     }
 
     /// Limits the buffers of this device to `bytes` each, so that scenes and images are cut into
@@ -209,8 +213,20 @@ impl Gpu {
         }
     }
 
+    /// Creates an encoder of commands.
+    pub(crate) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&Default::default())
+    }
+
+    /// Submits the commands of an encoder.
+    pub(crate) fn submit(&self, encoder: wgpu::CommandEncoder) {
+        Traffic::count(Traffic { submits: 1, ..Traffic::default() });
+        self.queue.submit([encoder.finish()]);
+    }
+
     /// Waits until the device has finished all submitted work.
     pub(crate) fn wait(&self) -> Result<()> {
+        Traffic::count(Traffic { waits: 1, ..Traffic::default() });
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| self.error(format!("waiting for the device failed: {e}")))?;

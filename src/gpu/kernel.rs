@@ -2,6 +2,7 @@
 //! bind.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -11,6 +12,7 @@ use super::layout::WORKGROUP;
 use super::module::Module;
 use super::program::{Compiled, Draw, PipelineKey, Program};
 use super::sources::{Sources, Text};
+use super::traffic::Traffic;
 use crate::error::{Error, Result};
 
 impl Compiled {
@@ -119,6 +121,7 @@ impl Draw {
         module: &Module,
         constants: &[(&str, f64)],
     ) -> Result<(wgpu::RenderPipeline, Vec<(String, u32)>)> {
+        gpu.spare.will_draw();
         let constants: Vec<_> = constants.iter().copied().chain(self.constant).collect();
         let bound = module
             .bind(gpu, &[(wgpu::ShaderStages::VERTEX, self.vertex), (wgpu::ShaderStages::FRAGMENT, self.fragment)])?;
@@ -232,7 +235,13 @@ impl Program {
             Ok(wgpu::BindGroupEntry { binding: *number, resource })
         };
         let entries = self.variables(stage).iter().map(entry).collect::<Result<Vec<_>>>()?;
+        Traffic::count(Traffic { bind_groups: 1, ..Traffic::default() });
         Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(stage), layout, entries: &entries }))
+    }
+
+    /// Returns the pipeline of `stage`.
+    fn pipeline(&self, gpu: &Gpu, stage: &str) -> Result<&wgpu::ComputePipeline> {
+        self.pipelines.get(stage).ok_or_else(|| gpu.error(format!("there is no kernel {stage}")))
     }
 
     /// Dispatches `stage` over `grid`; `binding` returns the resource of each variable by its name.
@@ -244,17 +253,58 @@ impl Program {
         binding: &dyn Fn(&str) -> Option<wgpu::BindingResource<'a>>,
         grid: Grid<'_>,
     ) -> Result<()> {
-        let Some(pipeline) = self.pipelines.get(stage) else {
-            return Err(gpu.error(format!("there is no kernel {stage}")));
-        };
+        let pipeline = self.pipeline(gpu, stage)?;
         let group = self.group(gpu, stage, &pipeline.get_bind_group_layout(0), binding)?;
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        match grid {
-            Grid::Of((x, y)) => pass.dispatch_workgroups(x, y, 1),
-            Grid::In(buffer, at) => pass.dispatch_workgroups_indirect(buffer, at),
-        }
+        over(pass, pipeline, &group, grid);
         Ok(())
+    }
+
+    /// Dispatches `stage` as [`dispatch`](Self::dispatch) does, with the bind group that `groups`
+    /// keeps for the pipeline and `place`.
+    pub(crate) fn dispatch_kept<'a>(
+        &self,
+        gpu: &Gpu,
+        pass: &mut wgpu::ComputePass<'_>,
+        stage: &str,
+        (groups, place): (&Groups, Place),
+        binding: &dyn Fn(&str) -> Option<wgpu::BindingResource<'a>>,
+        grid: Grid<'_>,
+    ) -> Result<()> {
+        let pipeline = self.pipeline(gpu, stage)?;
+        let key = (pipeline.clone(), place);
+        // A poisoned lock means that another thread panicked; the groups are intact.
+        let mut kept = groups.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let group = match kept.entry(key) {
+            Entry::Occupied(group) => group.into_mut(),
+            Entry::Vacant(none) => none.insert(self.group(gpu, stage, &pipeline.get_bind_group_layout(0), binding)?),
+        };
+        over(pass, pipeline, group, grid);
+        Ok(())
+    }
+}
+
+/// The page, the band and the kind of lists that a dispatch is about.
+pub(crate) type Place = (usize, usize, Option<usize>);
+
+/// Bind groups that serve every frame as long as the buffers in them do.
+#[derive(Default)]
+pub(crate) struct Groups(Mutex<BTreeMap<(wgpu::ComputePipeline, Place), wgpu::BindGroup>>);
+
+impl Groups {
+    /// Drops all groups, and with them their hold on buffers. Callers do this before they replace a
+    /// buffer.
+    pub(crate) fn forget(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+}
+
+fn over(pass: &mut wgpu::ComputePass<'_>, pipeline: &wgpu::ComputePipeline, group: &wgpu::BindGroup, grid: Grid<'_>) {
+    Traffic::count(Traffic { dispatches: 1, ..Traffic::default() });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    match grid {
+        Grid::Of((x, y)) => pass.dispatch_workgroups(x, y, 1),
+        Grid::In(buffer, at) => pass.dispatch_workgroups_indirect(buffer, at),
     }
 }
 

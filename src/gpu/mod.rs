@@ -15,11 +15,14 @@ pub mod program;
 mod recent;
 mod replacement;
 pub mod sources;
+mod spare;
 mod spirv;
 pub mod timing;
+mod traffic;
 mod twin;
 
 pub use adapter::AdapterDescription;
 pub use device::{Gpu, adapters};
 pub use replacement::Replacement;
 pub use sources::Sources;
+pub use traffic::Traffic;

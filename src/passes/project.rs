@@ -145,14 +145,12 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
 pub const PASS: Pass = Pass {
     name: "project",
     files: |_| vec!["project.wgsl"],
-    kernels: |_| vec![PROJECT, ARRANGE_RARE, PROJECT_RARE, ARRANGE],
+    kernels: |_| vec![PROJECT, PROJECT_RARE],
     constants: |making| vec![("LARGE", large(making).into()), ("CULL_BACK", u32::from(making.needs.cull_back).into())],
 };
 
 const PROJECT: Kernel = Kernel::new("project");
-const ARRANGE_RARE: Kernel = Kernel::of("arrange_rare", [1; 3]);
 const PROJECT_RARE: Kernel = Kernel::new("project_rare");
-const ARRANGE: Kernel = Kernel::of("arrange", [1; 3]);
 
 /// The number of pixels above which the bounds of a splat make it large.
 fn large(making: &Making<'_>) -> u32 {
@@ -174,11 +172,6 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
         clears.push(start("queue"));
     }
     let run = |kernel, over| Run { kernel, over };
-    let runs = vec![
-        run(PROJECT, Over::Slots(part)),
-        run(ARRANGE_RARE, Over::Once),
-        run(PROJECT_RARE, Over::Rare),
-        run(ARRANGE, Over::Once),
-    ];
+    let runs = vec![run(PROJECT, Over::Slots(part)), run(PROJECT_RARE, Over::Rare)];
     Stage::new("project", band, runs).after(clears).as_twin(Twin::Project)
 }

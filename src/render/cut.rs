@@ -2,7 +2,6 @@
 
 use super::run::{Run, over};
 use crate::error::Result;
-use crate::gpu::buffers::counts_at;
 use crate::passes::select;
 
 /// Surfel slots that may stay unused, beyond four times those that the cuts of all branches need:
@@ -37,9 +36,8 @@ impl Run<'_> {
 
     /// Reads the sizes of the cuts and records the slots that the next try needs.
     pub(super) fn look_for_cut(&mut self) -> Result<()> {
-        self.timing.flush(self.gpu)?;
         let chosen: Vec<_> = self.store.chosen().collect();
-        let rooms = counts_at(self.gpu, &chosen)?.into_iter().map(|[cut, _]| with_room(cut.into()));
+        let rooms = self.timing.counts(self.gpu, &chosen)?.into_iter().map(|[cut, _]| with_room(cut.into()));
         self.make_room(rooms.collect());
         Ok(())
     }

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::kernel::beside;
 use crate::gpu::layout::View;
-use crate::gpu::{Gpu, Sources};
+use crate::gpu::{Gpu, Sources, Traffic};
 use crate::passes::source::Source;
 use crate::passes::upload::upload;
 use crate::passes::{asks_for_order, finish, tiles};
@@ -55,7 +55,7 @@ impl Kept {
     ) -> Result<(Frame, Report)> {
         let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
         self.look_at(gpu, camera);
-        let (mut total_ms, mut all_passes) = (0.0, BTreeMap::new());
+        let (mut total_ms, mut all_passes, mut traffic) = (0.0, BTreeMap::new(), Traffic::default());
         let mut number = 0;
         while number < MOST_TRIES + self.known.times_cut {
             let first = number == 0;
@@ -68,24 +68,25 @@ impl Kept {
             if first {
                 progress.begin("rendering rows", camera.height.into());
             }
-            let start = Instant::now();
+            let (start, before) = (Instant::now(), Traffic::so_far());
             store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
             let mut frame = Frame::empty(image, self.options.maps);
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;
-            let tally = all.then(|| run.tally()).transpose()?;
+            let tally = all.then(|| run.tally());
             let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
             let order = &run.store.order;
             for (pass, ms) in run.timing.finish(gpu)? {
                 *all_passes.entry(pass).or_insert(0.0) += ms;
             }
+            traffic = traffic + (Traffic::so_far() - before);
             if let Some(tally) = tally.filter(|tally| tally.complete) {
                 finish(&mut frame, &plan.needs, &source.provenance(), order);
                 bar.end();
                 let report = self.report(gpu, &plan, image, (tally, clock, all_passes, total_ms));
-                return Ok((frame, report));
+                return Ok((frame, Report { traffic, ..report }));
             }
         }
         bar.end();
@@ -185,6 +186,7 @@ impl Kept {
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),
             clock,
             total_ms,
+            traffic: Traffic::default(),
             needs: plan.needs.names(),
             tail: None,
             kernel: None,

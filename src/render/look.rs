@@ -3,7 +3,6 @@
 
 use super::run::Run;
 use crate::error::{Error, Result};
-use crate::gpu::buffers::counts;
 use crate::gpu::layout::BATCH;
 use crate::passes::tiles::{LONGEST, list_name};
 use crate::passes::{fragments, long_lists};
@@ -14,16 +13,16 @@ use crate::plan::{FragmentLayout, KEY_WORDS, Lists, tuning};
 impl Run<'_> {
     /// Makes the pages hold the splats of the listed batches, and an eighth more for the next view.
     pub(super) fn look_for_slots(&mut self, part: Part) -> Result<()> {
-        self.timing.flush(self.gpu)?;
-        let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
-        let listed = counts(self.gpu, &lists)?;
-        for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
+        let lists = self.store.pages.iter().filter_map(|page| Some((page.buffer("drawn")?, 0)));
+        let listed = self.timing.counts(self.gpu, &lists.collect::<Vec<_>>())?;
+        for (number, [_, batches]) in listed.into_iter().enumerate() {
+            let page = &self.store.pages[number];
             let slots = u64::from(batches) * u64::from(BATCH);
             if slots > page.slots {
                 // Slots come in whole batches, because the partly filled last batch may be listed
                 // anywhere.
                 let [slots, all] = [slots + slots / 8, page.surfels].map(|n| n.next_multiple_of(BATCH.into()));
-                page.grow(self.gpu, slots.min(all))?;
+                self.store.grow(self.gpu, number, slots.min(all))?;
             }
         }
         self.known.slots = part == Part::Far;
@@ -35,11 +34,11 @@ impl Run<'_> {
     /// lists. But tiles that gather all splats need lists: then this returns false, and the frame
     /// is retried without gathering.
     pub(super) fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
-        self.timing.flush(self.gpu)?;
         let gathers = self.plan.needs.surface.gathers();
         if of == Listed::Large && !gathers {
-            let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
-            let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
+            let queues = self.store.pages.iter().filter_map(|page| Some((page.buffer("queue")?, 0)));
+            let counted = self.timing.counts(self.gpu, &queues.collect::<Vec<_>>())?;
+            let large = counted.iter().any(|[large, _]| *large > 0);
             // If lists cannot hold the large splats of one separate input, the large splats of all
             // inputs are drawn without lists, and later bands skip the count below.
             let large = large && !(self.plan.needs.surface.separate() && self.unlisted);
@@ -49,9 +48,9 @@ impl Run<'_> {
             }
         }
         stages.iter().try_for_each(|stage| self.stage(stage))?;
-        self.timing.flush(self.gpu)?;
         let Some(lists) = self.store.buffer(list_name(of)) else { return Ok(true) };
-        let [entries, longest] = counts(self.gpu, &[lists])?.first().copied().unwrap_or_default().map(u64::from);
+        let counted = self.timing.counts(self.gpu, &[(lists, 0)])?;
+        let [entries, longest] = counted.first().copied().unwrap_or_default().map(u64::from);
         let entries = entries + entries / 4;
         let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
         if entries > most || longest > LONGEST {

@@ -60,7 +60,7 @@ impl Page {
         let batches = if branch.is_some() { 0 } else { surfels.div_ceil(BATCH.into()) };
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
         // One row of the dispatch grid is one batch.
-        gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
+        drawn.put(gpu, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
         buffers.insert("drawn", drawn);
         buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
         // A binding must hold at least one record.
@@ -82,10 +82,7 @@ impl Page {
     }
 
     /// Grows the buffers to at least `slots` splats and keeps their contents.
-    pub fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
-        if self.slots >= slots {
-            return Ok(());
-        }
+    pub(super) fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
         let list = slots + u64::from(QUEUE_START);
         for (name, what, words) in [
             ("splats", "splats", slots * self.splat_words),

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::report::Report;
 use super::sequence;
 use crate::frame::Frame;
+use crate::gpu::Traffic;
 use crate::passes::asks_for_order;
 use crate::passes::join::Beside;
 use crate::passes::order::order;
@@ -203,6 +204,7 @@ fn report(
         passes,
         clock: "wall",
         total_ms,
+        traffic: Traffic::default(),
         needs: needs.names(),
         tail: None,
         kernel: None,

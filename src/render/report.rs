@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::frame::Frame;
+use crate::gpu::Traffic;
 use crate::scene::{KernelFaults, Map};
 
 /// Describes one render: what was drawn, how, and how long it took.
@@ -41,6 +42,8 @@ pub struct Report {
     pub clock: &'static str,
     /// Milliseconds from the uploaded scene to the frame in host memory.
     pub total_ms: f64,
+    /// What the host asked of the device, summed over all tries.
+    pub traffic: Traffic,
     /// Names of the needs of scene and options
     /// ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
     pub needs: Vec<&'static str>,

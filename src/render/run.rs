@@ -6,7 +6,7 @@ use super::store::Store;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::gpu::buffers::{Buffer, counts_at};
+use crate::gpu::buffers::{Buffer, Image};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
     BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID,
@@ -89,7 +89,6 @@ impl<'a> Run<'a> {
                 Step::Draw => self.draw()?,
                 Step::DrawTriangles => self.draw_triangles()?,
                 Step::ReadBack(band) => {
-                    self.end_band(*band)?;
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
                 }
@@ -114,18 +113,26 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Reads the last counts, records them in `known`, and returns the totals of the frame.
-    pub fn tally(&mut self) -> Result<Tally> {
-        self.count(self.plan.bands.len() - 1)?;
+    /// Records in `known` what the bands counted, and returns the totals of the frame.
+    pub fn tally(&mut self) -> Tally {
         self.learn();
-        Ok(self.tally)
+        self.tally
     }
 
-    /// Reads the counts of `band` before the next band resets them; [`tally`](Self::tally) reads
-    /// those of the last band.
+    /// Whether the counts of `band` must be read: the next band resets them, or there is none.
+    fn counts_in(&self, band: usize) -> bool {
+        self.plan.projects_each_band || band + 1 == self.plan.bands.len()
+    }
+
+    /// Reads the counts of `band` where no image is read.
     pub fn end_band(&mut self, band: usize) -> Result<()> {
-        let last = band + 1 == self.plan.bands.len();
-        if self.plan.projects_each_band && !last { self.count(band) } else { Ok(()) }
+        if !self.counts_in(band) {
+            return Ok(());
+        }
+        let counters = counters(self.plan, self.store, self.by_tiles);
+        let counted = self.timing.counts(self.gpu, &counters)?;
+        self.count(band, &counted);
+        Ok(())
     }
 
     /// Records the list entries of the band that needs most, so that the next try allocates them.
@@ -142,19 +149,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Adds the device's counts at the end of `band` to the tally.
-    fn count(&mut self, band: usize) -> Result<()> {
-        self.timing.flush(self.gpu)?;
-        let wanted = |name: &'static str| self.store.buffer(name);
-        let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
-        let small = self.plan.needs.surface.gathers().then(|| wanted("small_lists")).flatten();
-        let counts_wraps = self.plan.sum_words > 0 && self.plan.needs.accumulator.row().head_words() > 0;
-        let sums = counts_wraps.then(|| wanted("sums")).flatten();
-        let chosen = self.store.chosen().filter(|_| self.plan.cut.is_some());
-        let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
-        let starts = of_pages.chain([large, small, sums]).flatten().map(|buffer| (buffer, 0));
-        let all: Vec<_> = starts.chain(chosen).collect();
-        let mut counted = counts_at(self.gpu, &all)?.into_iter();
+    /// Adds what the [`counters`] held at the end of `band` to the tally.
+    fn count(&mut self, band: usize, counted: &[[u32; 2]]) {
+        let mut counted = counted.iter().copied();
         let mut next = || counted.next().unwrap_or_default();
         let (mut most_large, mut slots, mut unseen_in_all) = (0, true, 0);
         for page in &self.store.pages {
@@ -165,11 +162,11 @@ impl<'a> Run<'a> {
             slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
         }
         let mut lists = true;
-        for (of, _) in [(Listed::Large, large), (Listed::Small, small)].into_iter().filter(|(_, list)| list.is_some()) {
+        for of in listed(self.plan, self.store, self.by_tiles).into_iter().flatten() {
             let [entries, longest] = next().map(u64::from);
             lists &= entries <= self.store.entries(of) && longest <= LONGEST;
         }
-        let [overflows, _] = sums.map_or([0; 2], |_| next());
+        let overflows = if counts_wraps(self.plan) { next()[0] } else { 0 };
         let mut fits = true;
         if let Some(rooms) = &self.plan.cut {
             let cuts: Vec<u64> = rooms.iter().map(|_| next()[0].into()).collect();
@@ -188,7 +185,6 @@ impl<'a> Run<'a> {
             self.known.overflows = self.known.overflows.max(overflows.into());
         }
         self.tally.complete &= slots && lists && fits && overflows == 0;
-        Ok(())
     }
 
     pub(super) fn stage(&mut self, stage: &Stage) -> Result<()> {
@@ -206,7 +202,8 @@ impl<'a> Run<'a> {
                 for page in pages {
                     let grid = over(gpu, plan, store, (stage.band, page), run.over)?;
                     let binding = |name: &str| binding(store, &run.kernel, name, (stage.band, page));
-                    program.dispatch(gpu, pass, run.kernel.name, &binding, grid)?;
+                    let place = (page, stage.band, run.kernel.lists.map(|of| of as usize));
+                    program.dispatch_kept(gpu, pass, run.kernel.name, (&store.groups, place), &binding, grid)?;
                 }
             }
             Ok(())
@@ -269,11 +266,17 @@ impl<'a> Run<'a> {
     }
 
     fn read_back(&mut self, band: usize, frame: &mut Frame) -> Result<()> {
-        self.timing.flush(self.gpu)?;
-        let Some((image, readback)) = self.store.image() else { return Ok(()) };
+        let Some((image, readback)) = self.store.image() else { return self.end_band(band) };
         let (layout, pixels) = (&self.plan.pixel, self.plan.image_pixels(band));
-        let record = u64::from(layout.image_words) * 4;
-        readback.visit(self.gpu, image, pixels * record, |bytes| resolve::unpack(layout, bytes, frame))?;
+        let bytes = pixels * u64::from(layout.image_words) * 4;
+        let counts = self.counts_in(band);
+        let counters = if counts { counters(self.plan, self.store, self.by_tiles) } else { Vec::new() };
+        let piece = &mut |bytes: &[u8]| resolve::unpack(layout, bytes, frame);
+        let counted =
+            self.timing.read(self.gpu, &counters, Some(Image { readback, buffer: &image.raw, bytes, piece }))?;
+        if counts {
+            self.count(band, &counted);
+        }
         frame.height += self.plan.bands[band].rows / self.plan.needs.samples.down;
         Ok(())
     }
@@ -282,6 +285,27 @@ impl<'a> Run<'a> {
     pub fn never_fits(gpu: &Gpu) -> Error {
         gpu.error("the buffers were too small after every retry of the frame: choose a smaller image")
     }
+}
+
+/// The kinds of lists that a band had.
+fn listed(plan: &Plan, store: &Store, by_tiles: bool) -> [Option<Listed>; 2] {
+    let had = |of| store.buffer(list_name(of)).map(|_| of);
+    [had(Listed::Large).filter(|_| by_tiles), had(Listed::Small).filter(|_| plan.needs.surface.gathers())]
+}
+
+/// Whether the device counts one-word sums that wrap.
+fn counts_wraps(plan: &Plan) -> bool {
+    plan.sum_words > 0 && plan.needs.accumulator.row().head_words() > 0
+}
+
+/// The buffers that count what a band needed, in two words each, from the given word on. The order
+/// is that in which [`Run::count`] takes them.
+fn counters<'a>(plan: &Plan, store: &'a Store, by_tiles: bool) -> Vec<(&'a Buffer<u32>, u64)> {
+    let of_pages = store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
+    let [large, small] = listed(plan, store, by_tiles).map(|of| store.buffer(list_name(of?)));
+    let sums = store.buffer("sums").filter(|_| counts_wraps(plan));
+    let chosen = store.chosen().filter(|_| plan.cut.is_some());
+    of_pages.chain([large, small, sums]).flatten().map(|buffer| (buffer, 0)).chain(chosen).collect()
 }
 
 fn clear(store: &Store, encoder: &mut wgpu::CommandEncoder, clear: &Clear) {

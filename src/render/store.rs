@@ -7,6 +7,7 @@ use super::targets::Targets;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
+use crate::gpu::kernel::Groups;
 use crate::gpu::layout::{Band as BandUniform, View};
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
@@ -125,6 +126,8 @@ pub struct Store {
     /// Capacity of the lists of large and of small splats, in entries.
     entries: [u64; 2],
     readback: Option<Readback>,
+    /// The bind groups of all dispatches so far.
+    pub(super) groups: Groups,
     /// The rasteriser's textures.
     pub targets: Option<Targets>,
     /// The numbers of the surfels of all pages in their source; empty unless a map asks for them.
@@ -165,6 +168,7 @@ impl Store {
             bands: Vec::new(),
             entries: [0; 2],
             readback: None,
+            groups: Groups::default(),
             targets: None,
             order,
         })
@@ -191,11 +195,13 @@ impl Store {
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // Frees the old buffers before new ones are allocated.
+            self.groups.forget();
             (self.made, self.targets, self.readback) = (None, None, None);
             self.frame.clear();
         }
         if let Some(rooms) = plan.cut.as_ref().filter(|rooms| **rooms != self.rooms) {
             // Frees the old pages before new ones are allocated.
+            self.groups.forget();
             (self.pages, self.rooms) = (Vec::new(), Vec::new());
             let most = page_surfels(&gpu.adapter, &plan.needs);
             for (number, (branch, room)) in self.branches.iter().zip(rooms).enumerate() {
@@ -206,7 +212,7 @@ impl Store {
             self.rooms.clone_from(rooms);
         }
         if !plan.needs.cull {
-            self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
+            (0..self.pages.len()).try_for_each(|page| self.grow(gpu, page, self.pages[page].surfels))?;
         }
         if fresh {
             self.make_pixels(gpu, plan)?;
@@ -277,6 +283,7 @@ impl Store {
 
     /// Replaces the lists of a kind by lists with a capacity of `entries`.
     pub fn make_lists(&mut self, gpu: &Gpu, plan: &Plan, of: Listed, entries: u64) -> Result<()> {
+        self.groups.forget();
         self.frame.remove(list_name(of));
         let lists = Buffer::storage(gpu, "lists of splats", self.list_words(plan, of) + entries)?;
         self.frame.insert(list_name(of), lists);
@@ -294,6 +301,7 @@ impl Store {
         };
         if !buffers.iter().all(holds) {
             // Frees the old buffers before new ones are allocated.
+            self.groups.forget();
             buffers.iter().for_each(|(name, ..)| drop(self.frame.remove(name)));
             for (name, what, words) in buffers {
                 let room = (count + count / 8).min(most).max(1);
@@ -303,8 +311,18 @@ impl Store {
         if plan.needs.surface.long_lists() {
             let words = long_lists::words(count, plan.needs.samples);
             if self.frame.get("long_lists").is_none_or(|kept| kept.len < words) {
+                self.groups.forget();
                 self.frame.insert("long_lists", Buffer::storage(gpu, "long lists", words)?);
             }
+        }
+        Ok(())
+    }
+
+    /// Grows the buffers of a page to at least `slots` splats and keeps their contents.
+    pub fn grow(&mut self, gpu: &Gpu, page: usize, slots: u64) -> Result<()> {
+        if self.pages[page].slots < slots {
+            self.groups.forget();
+            self.pages[page].grow(gpu, slots)?;
         }
         Ok(())
     }
@@ -322,7 +340,7 @@ impl Store {
     /// Writes the view uniform.
     pub fn set_view(&self, gpu: &Gpu, view: &View) {
         if let Some(buffer) = self.frame.get("view") {
-            gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::bytes_of(view));
+            buffer.put(gpu, bytemuck::bytes_of(view));
         }
     }
 

@@ -162,7 +162,7 @@ pub fn sums(source: &dyn Source, camera: &Camera, options: &Settings, gpu: &Gpu,
                 step => drop(run.steps(&[step], &mut nothing, &())?),
             }
         }
-        if run.tally()?.complete {
+        if run.tally().complete {
             return Ok(sums);
         }
     }

@@ -70,8 +70,8 @@ fn lines(plan: &Plan) -> Vec<String> {
     steps(plan).iter().map(step).collect()
 }
 
-const PROJECT: &str = "project: project/Slots(All), arrange_rare, project_rare/Rare, arrange";
-const RESOLVE: &str = "resolve: list_covered/Occlusion, arrange_covered, resolve/Covered";
+const PROJECT: &str = "project: project/Slots(All), project_rare/Rare";
+const RESOLVE: &str = "resolve: list_covered/Occlusion, resolve/Covered";
 
 /// The steps of scatter.
 fn scattered() -> [&'static str; 8] {
@@ -140,12 +140,12 @@ fn many_surfels_are_drawn_near_ones_first() {
         [
             "project: cull_near/Batches",
             "look for slots of Near",
-            "project: project/Slots(Near), arrange_rare, project_rare/Rare, arrange",
+            "project: project/Slots(Near), project_rare/Rare",
             "visibility: visibility/Slots(Near)",
             "visibility: occlude_open/Occlusion",
             "project: cull_far/Batches",
             "look for slots of Far",
-            "project: project/Slots(Far), arrange_rare, project_rare/Rare, arrange",
+            "project: project/Slots(Far), project_rare/Rare",
             "visibility: visibility/Slots(Far)",
             "visibility: visibility_large/Large",
             "visibility: occlude/Occlusion",
@@ -170,7 +170,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
         [
             "look for lists of Small",
             "bin: bin_count/Slots(All), bin_scan, bin_place/Slots(All) page 0",
-            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights page 0",
+            "accumulate: list_covered/Occlusion, tile_resolve/CoveredEights page 0",
             "read back 0",
         ]
     );

@@ -452,7 +452,7 @@ fn uniforms_are_read_once_and_first() {
         // `layout.wgsl` declares both uniforms and reads each once.
         assert_eq!(read, if *file == "layout.wgsl" { 4 } else { 0 }, "{file}");
         for (entry, first) in beginnings(text) {
-            let arranges = ["arrange", "arrange_rare", "arrange_triangles"].contains(&entry);
+            let arranges = entry == "arrange_triangles";
             let without = arranges || (*file == "select.wgsl" && !["select_top", "select_judge"].contains(&entry));
             assert_eq!(["hold", "hold_view"].contains(&first), !without, "{entry} in {file} begins with {first}");
         }

@@ -29,5 +29,6 @@ mod refusals;
 mod samples;
 mod separate;
 mod texture;
+mod traffic;
 mod transparency;
 mod triangles;

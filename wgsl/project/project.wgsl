@@ -3,7 +3,7 @@
 // depth). Queued ones are processed together later, so that the other invocations of a subgroup
 // need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x20f7c987e4d23957
+// All loops end, by 1 of src/gpu/loops.rs: 0xc63bbcb19e997a9e
 // #import axes_*::{half_axes}
 // #import camera_*::{homography}
 // #import center|center_doubled::{relative_center}
@@ -25,7 +25,7 @@
 // The queue of large splats. Word 0 counts them; word 1 counts all surfels out of view. The three
 // words from QUEUE_GRID on are a grid with one workgroup per large splat. The three from
 // QUEUE_LISTING on are a grid with one workgroup per LISTED_AT_ONCE large splats. The splats' slots
-// follow from QUEUE_START on.
+// follow from QUEUE_START on. Both grids grow with the queue, so that no dispatch has to write them.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 // The queue of rare surfels, in the same layout; its grid is that of project_rare(). `listed` is
@@ -41,6 +41,8 @@ const QUEUE_LISTING: u32 = 5u;
 // Large splats that one workgroup lists (bin.wgsl).
 const LISTED_AT_ONCE: u32 = 8u;
 const MOST_GROUPS: u32 = 65535u;
+// Workgroups in a row of a grid that grows with its list.
+const GRID_ROW: u32 = 1024u;
 
 var<workgroup> group_unseen: atomic<u32>;
 
@@ -64,6 +66,40 @@ fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
         dot3(held.rotation[1].xyz, world),
         dot3(held.rotation[2].xyz, world),
     );
+}
+
+// The order in a queue depends on the schedule, but nothing later depends on that order.
+fn queue_large(slot: u32) {
+    let place = atomicAdd(&queue[0], 1u);
+    atomicStore(&queue[QUEUE_START + place], slot);
+    if (place < GRID_ROW) {
+        atomicMax(&queue[QUEUE_GRID], place + 1u);
+    }
+    if (place % GRID_ROW == 0u) {
+        atomicMax(&queue[QUEUE_GRID + 1u], place / GRID_ROW + 1u);
+        atomicStore(&queue[QUEUE_GRID + 2u], 1u);
+    }
+    let group = place / LISTED_AT_ONCE;
+    if (place % LISTED_AT_ONCE == 0u && group < GRID_ROW) {
+        atomicMax(&queue[QUEUE_LISTING], group + 1u);
+    }
+    if (place % (LISTED_AT_ONCE * GRID_ROW) == 0u) {
+        atomicMax(&queue[QUEUE_LISTING + 1u], group / GRID_ROW + 1u);
+        atomicStore(&queue[QUEUE_LISTING + 2u], 1u);
+    }
+}
+
+fn queue_rare(slot: u32) {
+    let place = atomicAdd(&rare[0], 1u);
+    atomicStore(&rare[QUEUE_START + place], slot);
+    let group = place / WORKGROUP;
+    if (place % WORKGROUP == 0u && group < GRID_ROW) {
+        atomicMax(&rare[QUEUE_GRID], group + 1u);
+    }
+    if (place % (WORKGROUP * GRID_ROW) == 0u) {
+        atomicMax(&rare[QUEUE_GRID + 1u], group / GRID_ROW + 1u);
+        atomicStore(&rare[QUEUE_GRID + 2u], 1u);
+    }
 }
 
 // The outcomes of projecting a surfel.
@@ -113,8 +149,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     if (visible && is_large(splat)) {
-        // The order in the queue depends on the schedule, but nothing later depends on that order.
-        atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], slot);
+        queue_large(slot);
     }
     splats[slot] = splat_record(splat, place, filter_);
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
@@ -126,8 +161,9 @@ fn count_unseen(local: u32, slot: u32, unseen: bool) {
         atomicAdd(&group_unseen, copies_of(surfel_of(place_for(slot))));
     }
     workgroupBarrier();
-    if (local == 0u) {
-        atomicAdd(&queue[1], atomicLoad(&group_unseen));
+    let all_unseen = atomicLoad(&group_unseen);
+    if (local == 0u && all_unseen > 0u) {
+        atomicAdd(&queue[1], all_unseen);
     }
 }
 
@@ -144,7 +180,7 @@ fn project(
         fate = project_into(slot, false);
     }
     if (fate == RARE) {
-        atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], slot);
+        queue_rare(slot);
     }
     count_unseen(local, slot, fate == OUT_OF_VIEW);
 }
@@ -166,34 +202,13 @@ fn project_rare(
     count_unseen(local, slot, fate == OUT_OF_VIEW);
 }
 
-// Runs between project and project_rare: writes the grid of the latter, with one invocation per
-// rare surfel and at most MOST_GROUPS workgroups in a row.
-@compute @workgroup_size(1)
-fn arrange_rare() {
-    let grid = rows_of(groups_of(atomicLoad(&rare[0])));
-    for (var k = 0u; k < 3u; k++) {
-        atomicStore(&rare[QUEUE_GRID + k], grid[k]);
-    }
-}
-
 // The number of workgroups that together have at least this many invocations.
 fn groups_of(invocations: u32) -> u32 {
     return (invocations + WORKGROUP - 1u) / WORKGROUP;
 }
 
+// The grid of this number of workgroups, with at most MOST_GROUPS in a row.
 fn rows_of(groups: u32) -> vec3<u32> {
     let rows = (groups + MOST_GROUPS - 1u) / MOST_GROUPS;
     return vec3<u32>((groups + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u);
-}
-
-// Runs after all surfels are projected: writes the grids over the large splats.
-@compute @workgroup_size(1)
-fn arrange() {
-    let large = atomicLoad(&queue[0]);
-    let grid = rows_of(large);
-    let listing = rows_of((large + LISTED_AT_ONCE - 1u) / LISTED_AT_ONCE);
-    for (var k = 0u; k < 3u; k++) {
-        atomicStore(&queue[QUEUE_GRID + k], grid[k]);
-        atomicStore(&queue[QUEUE_LISTING + k], listing[k]);
-    }
 }

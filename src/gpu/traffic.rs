@@ -5,7 +5,7 @@ use std::ops::{Add, Sub};
 
 use serde::Serialize;
 
-/// What the host asked of the device.
+/// Requests of the host to the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Traffic {
     /// Submissions of commands.

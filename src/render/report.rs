@@ -42,7 +42,7 @@ pub struct Report {
     pub clock: &'static str,
     /// Milliseconds from the uploaded scene to the frame in host memory.
     pub total_ms: f64,
-    /// What the host asked of the device, summed over all tries.
+    /// Submissions, waits and other requests of the host to the device, summed over all tries.
     pub traffic: Traffic,
     /// Names of the needs of scene and options
     /// ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).

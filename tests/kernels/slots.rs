@@ -124,7 +124,7 @@ fn wrong_slots_are_noticed() {
         ("cull.wgsl", "drawn[1] - workgroups.y + workgroup.y", "workgroup.y"),
         // The large disk's anchor needs more than 16 bits.
         ("cull.wgsl", "const SPARE: vec2<u32> = vec2<u32>(9u)", "const SPARE: vec2<u32> = vec2<u32>(16u)"),
-        ("project.wgsl", "atomicAdd(&rare[0], 1u)], slot)", "atomicAdd(&rare[0], 1u)], place_for(slot))"),
+        ("project.wgsl", "&rare[QUEUE_START + place], slot)", "&rare[QUEUE_START + place], place_for(slot))"),
     ];
     for options in options() {
         let expected = image(Sources::default(), &options);

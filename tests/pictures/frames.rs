@@ -236,7 +236,7 @@ fn compare_with_kept(made: &[String]) {
     assert!(other.is_empty(), "now:\n{}\nother than before: {other:#?}", made.join("\n"));
 }
 
-/// Of how many rows one is drawn.
+/// One row of this many is drawn, or every row if that is asked for.
 fn one_of(rows: usize) -> usize {
     if std::env::var("EPSPLAT_EVERY_ROW").is_ok() { 1 } else { rows }
 }

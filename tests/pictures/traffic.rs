@@ -1,4 +1,4 @@
-//! What the host asks of the device for a frame.
+//! Requests of the host to the device for a frame.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

@@ -12,9 +12,9 @@ use super::shape::{kind_of, places, words};
 
 /// The words of a variable.
 enum Memory<'a> {
-    /// Those of a buffer, which all workgroups share.
+    /// A buffer, which all workgroups share.
     Shared(&'a [AtomicU32]),
-    /// Those of a variable of the workgroup.
+    /// A variable of the workgroup.
     Own(&'a mut [u32]),
 }
 

@@ -162,7 +162,7 @@ impl<T: Pod> Buffer<T> {
             Traffic::count(Traffic { bytes_written: bytes.len() as u64, ..Traffic::default() });
             gpu.queue.write_buffer(&self.raw, (first * size_of::<T>()) as u64, bytes);
             // Submitting and waiting frees the staging memory of this piece.
-            gpu.queue.submit([]);
+            gpu.submit(gpu.encoder());
             gpu.wait()?;
             progress.advance(values.len() as u64);
         }
@@ -197,6 +197,7 @@ impl<T: Pod> Buffer<T> {
                 }
                 let bytes: &[u8] = bytemuck::cast_slice(&these);
                 view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
+                Traffic::count(Traffic { bytes_written: bytes.len() as u64, ..Traffic::default() });
             });
             progress.advance(these.len() as u64);
         }
@@ -300,8 +301,8 @@ pub(crate) struct Words<'a> {
     pub count: u64,
 }
 
-/// Submits the commands of `encoder`, and reads `words` and `image` after them. Waits for the device
-/// once, and once more for each further piece of the image.
+/// Submits the commands of `encoder`, and reads `words` and `image` after them. Waits for the
+/// device once, and once more for each further piece of the image.
 pub(super) fn read(
     gpu: &Gpu,
     mut encoder: wgpu::CommandEncoder,
@@ -322,11 +323,11 @@ pub(super) fn read(
     let first = first.map(|image| image.readback.record(&mut encoder, image.buffer, (0, bytes)));
     gpu.submit(encoder);
     let tray_slice = tray.as_ref().map(|tray| tray.slice(..8 * count));
-    tray_slice.into_iter().chain(first).for_each(|slice| slice.map_async(wgpu::MapMode::Read, |_| {}));
-    gpu.wait()?;
+    map(gpu, tray_slice.into_iter().chain(first))?;
     let mut values = Vec::new();
     if let Some(slice) = tray_slice {
-        values = mapped(gpu, slice, |bytes| bytes.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect())?;
+        values = mapped(gpu, slice, |bytes| bytes.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect())
+            .inspect_err(|_| first.into_iter().for_each(|slice| slice.buffer().unmap()))?;
     }
     tray.into_iter().for_each(|tray| gpu.spare.keep(tray));
     let (Some(image), Some(mut slice)) = (image, first) else { return Ok(values) };
@@ -342,9 +343,15 @@ pub(super) fn read(
         let mut encoder = gpu.encoder();
         slice = image.readback.record(&mut encoder, image.buffer, (offset, bytes));
         gpu.submit(encoder);
-        slice.map_async(wgpu::MapMode::Read, |_| {});
-        gpu.wait()?;
+        map(gpu, std::iter::once(slice))?;
     }
+}
+
+/// Maps slices and waits until the host can read them. After an error, none is mapped.
+fn map<'a>(gpu: &Gpu, slices: impl Iterator<Item = wgpu::BufferSlice<'a>> + Clone) -> Result<()> {
+    gpu.check()?;
+    slices.clone().for_each(|slice| slice.map_async(wgpu::MapMode::Read, |_| {}));
+    gpu.wait().inspect_err(|_| slices.for_each(|slice| slice.buffer().unmap()))
 }
 
 /// Returns what `of` makes of the bytes of a mapped slice, and unmaps it.

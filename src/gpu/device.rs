@@ -35,7 +35,7 @@ pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu wit
 ///
 /// Validation adds a dispatch before each indirect dispatch. This takes a fifth of the frame time
 /// of small cuts of levels of detail (1.9 ms instead of 1.5). No workgroup count of the renderer is
-/// too large. Most grids come from `rows_of` (`wgsl/project/project.wgsl`) for lists shorter than
+/// too large. Grids that `rows_of` makes (`wgsl/project/project.wgsl`) are for lists shorter than
 /// 2^30, so they have at most 65,535 groups per row and 2^14 rows. Grids that grow with a page's
 /// queue or with the list of tiles have 1024 groups per row and at most 2^14 rows. The others have
 /// one row per batch of a page, and a page has at most

@@ -43,7 +43,7 @@ impl Entry<'_> {
     /// Returns the key of the pipeline in the cache; `None` for WGSL, which is not cached.
     pub fn key(&self, bound: &Bound) -> Option<PipelineKey> {
         match &self.told {
-            Told::Words(words) => Some((words.clone(), bound.entries.clone())),
+            Told::Words(words) => Some((words.clone(), bound.entries.clone(), bound.variables.clone())),
             Told::Text(_) => None,
         }
     }

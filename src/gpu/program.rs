@@ -70,7 +70,7 @@ impl Compiled {
 pub(super) type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 /// Key of a pipeline: its SPIR-V and the layout of its bindings.
-pub(super) type PipelineKey = (Vec<u32>, Vec<wgpu::BindGroupLayoutEntry>);
+pub(super) type PipelineKey = (Vec<u32>, Vec<wgpu::BindGroupLayoutEntry>, Vec<(String, u32)>);
 
 /// A render pipeline to compile: the rasteriser's part of a program.
 #[derive(Debug)]

@@ -16,9 +16,9 @@ pub struct Timing {
     stamps: Option<Vec<Stamps>>,
     stages: Vec<&'static str>,
     /// The commands that are recorded and not yet submitted. They are submitted when the host next
-    /// reads device memory.
+    /// reads device memory, or, where wall time is measured, at the end of each stage.
     encoder: Option<wgpu::CommandEncoder>,
-    /// The timestamps that were read last.
+    /// The timestamps that were read so far.
     ticks: Vec<u64>,
     wall: BTreeMap<&'static str, f64>,
     spare: Arc<Spare>,
@@ -171,7 +171,7 @@ impl Timing {
     }
 
     /// Submits all recorded commands, and reads `counts` as [`counts`](Self::counts) does, the
-    /// `image` and the times of all stages. Waits once, and once more for each further piece of the
+    /// `image` and the times of the stages since the last call. Waits once, and once more for each further piece of the
     /// image.
     pub(crate) fn read(
         &mut self,
@@ -182,14 +182,17 @@ impl Timing {
         let mut encoder = self.encoder.take().unwrap_or_else(|| gpu.encoder());
         let counted = counts.iter().map(|(buffer, word)| Words { buffer: &buffer.raw, first: 4 * word, count: 1 });
         let mut words: Vec<_> = counted.collect();
-        let stamps = self.stamps.as_deref().unwrap_or_default();
-        for (stamps, stages) in stamps.iter().zip(self.stages.chunks(PASSES)) {
-            let count = 2 * stages.len() as u32;
-            encoder.resolve_query_set(&stamps.queries, 0..count, &stamps.resolved, 0);
-            words.push(Words { buffer: &stamps.resolved, first: 0, count: count.into() });
+        let (done, all) = (self.ticks.len() / 2, self.stages.len());
+        for (stamps, first) in self.stamps.iter().flatten().zip((0..all).step_by(PASSES)) {
+            let new = done.clamp(first, first + PASSES) - first..all.min(first + PASSES) - first;
+            if !new.is_empty() {
+                let queries = 2 * new.start as u32..2 * new.end as u32;
+                encoder.resolve_query_set(&stamps.queries, queries, &stamps.resolved, 0);
+                words.push(Words { buffer: &stamps.resolved, first: 0, count: 2 * new.len() as u64 });
+            }
         }
         let mut values = read(gpu, encoder, &words, image)?;
-        self.ticks = values.split_off(counts.len());
+        self.ticks.extend(values.split_off(counts.len()));
         Ok(values.into_iter().map(bytemuck::cast).collect())
     }
 

@@ -23,8 +23,8 @@ pub struct Traffic {
 }
 
 thread_local! {
-    /// The traffic of this thread so far. A frame runs on one thread, so threads that compile or
-    /// draw beside it do not count.
+    /// The traffic of this thread so far. A frame runs on one thread, so other threads that compile
+    /// or draw do not count.
     static SO_FAR: Cell<Traffic> = const { Cell::new(Traffic::ZERO) };
 }
 

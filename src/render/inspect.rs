@@ -145,11 +145,11 @@ pub fn evaluate<I: Pod + Send + Sync, O: Pod>(
         let (_, buffer) = buffers.iter().find(|(given, _)| *given == name)?;
         Some(buffer.as_entire_binding())
     };
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut encoder = gpu.encoder();
     let mut pass = encoder.begin_compute_pass(&Default::default());
     program.dispatch(gpu, &mut pass, ENTRY, &binding, Grid::Of(grid(gpu, inputs.len() as u64)?))?;
     drop(pass);
-    gpu.queue.submit([encoder.finish()]);
+    gpu.submit(encoder);
     gpu.wait()?;
     target.read(gpu, output_len)
 }

@@ -121,7 +121,11 @@ impl Kept {
     ) -> Result<()> {
         let surfels = self.facts.surfels;
         let kernels = self.kernels.take().filter(|kernels| kernels.serve(plan, &self.options, surfels));
-        let kernels = kernels.unwrap_or_else(|| Kernels::new(sources, plan, &self.options, surfels));
+        let kernels = kernels.unwrap_or_else(|| {
+            // Bind groups keep pipelines, which take memory.
+            self.store.iter().for_each(|store| store.groups.forget());
+            Kernels::new(sources, plan, &self.options, surfels)
+        });
         if self.store.as_ref().is_some_and(|store| !store.serves(&plan.needs)) {
             // Frees the old buffers before new ones are allocated.
             self.store = None;

@@ -115,7 +115,7 @@ fn f32_raised(whole: f32, f: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(y) + (bitcast<u32>(whole) << 23u));
 }
 
-// 2^x. Outside the range of f32 it is the least or the largest normal number.
+// 2^x. Below -125.9999 and above 127.99999 it is the value there.
 fn f32_exp2(x: f32) -> f32 {
     let bounded = f32_bounded(x);
     let whole = bounded + F32_WHOLE;

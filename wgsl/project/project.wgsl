@@ -25,7 +25,8 @@
 // The queue of large splats. Word 0 counts them; word 1 counts all surfels out of view. The three
 // words from QUEUE_GRID on are a grid with one workgroup per large splat. The three from
 // QUEUE_LISTING on are a grid with one workgroup per LISTED_AT_ONCE large splats. The splats' slots
-// follow from QUEUE_START on. Both grids grow with the queue, so that no dispatch has to write them.
+// follow from QUEUE_START on. Both grids grow with the queue, so that no dispatch has to write
+// them; beyond GRID_ROW workgroups their last row has spare ones.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 // The queue of rare surfels, in the same layout; its grid is that of project_rare(). `listed` is

@@ -2,11 +2,11 @@
 //! bits of all adapters.
 //!
 //! It runs the modules that devices run, after [`super::exact`] has put functions in place of the
-//! operations that drivers compute differently. What is left are sums and products of f32, each
-//! rounded to nearest, comparisons and integers. A workgroup's invocations run in step, so a
-//! barrier needs no work. Workgroups run on all threads, in any order; the kernels' results do not
-//! depend on it. It knows what the built-in kernels use on core
-//! WebGPU: no 64-bit integers, textures, matrices, nor functions that `arithmetic.wgsl` lacks.
+//! operations that drivers compute differently. Sums and products of f32, each rounded to nearest,
+//! comparisons and integers are left. A workgroup's invocations run in step, so a barrier needs no
+//! work. Workgroups run on all threads, in any order, on which the kernels' results do not depend.
+//! The twin knows what the built-in kernels use on core WebGPU: no 64-bit integers, textures,
+//! matrices, nor functions that `arithmetic.wgsl` lacks.
 
 mod commands;
 mod device;

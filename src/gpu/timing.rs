@@ -171,8 +171,8 @@ impl Timing {
     }
 
     /// Submits all recorded commands, and reads `counts` as [`counts`](Self::counts) does, the
-    /// `image` and the times of the stages since the last call. Waits once, and once more for each further piece of the
-    /// image.
+    /// `image` and the times of the stages since the last call. Waits once, and once more for each
+    /// further piece of the image.
     pub(crate) fn read(
         &mut self,
         gpu: &Gpu,

@@ -3,7 +3,7 @@
 // depth). Queued ones are processed together later, so that the other invocations of a subgroup
 // need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xc63bbcb19e997a9e
+// All loops end, by 1 of src/gpu/loops.rs: 0x3de544e197f6d12a
 // #import axes_*::{half_axes}
 // #import camera_*::{homography}
 // #import center|center_doubled::{relative_center}
@@ -42,8 +42,8 @@ const QUEUE_LISTING: u32 = 5u;
 // Large splats that one workgroup lists (bin.wgsl).
 const LISTED_AT_ONCE: u32 = 8u;
 const MOST_GROUPS: u32 = 65535u;
-// Workgroups in a row of a grid that grows with its list.
-const GRID_ROW: u32 = 1024u;
+// Workgroups in a row of a grid that grows with its list. Long rows have more spare workgroups.
+const GRID_ROW: u32 = 128u;
 
 var<workgroup> group_unseen: atomic<u32>;
 

@@ -156,7 +156,7 @@ fn a_card_is_timed_by_its_own_clock_and_draws_the_same() {
             });
             let [(expected, wall), (own, timed), (paged, pages)] = &frames;
             assert!(bits(own) == bits(expected) && bits(paged) == bits(expected), "{organisation:?}");
-            // A software adapter's passes are timed by the host once the device has drawn triangles.
+            // The host times a software adapter's passes once the device has drawn triangles.
             assert!(["wall", "timestamps"].contains(&wall.clock), "{}", wall.clock);
             assert_eq!((timed.clock, pages.clock), ("timestamps", "timestamps"));
             assert!(timed.passes.values().all(|ms| ms.is_finite()), "{:?}", timed.passes);

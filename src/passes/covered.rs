@@ -13,7 +13,7 @@ use crate::plan::{Band, Plan};
 pub const PASS: Pass = Pass {
     name: "covered",
     files: |_| vec!["covered.wgsl"],
-    kernels: |_| vec![LIST],
+    kernels: |_| vec![LIST, ARRANGE],
     constants: |making| {
         // With depth peeling the last layer may be empty, so its nearest depths do not show which
         // tiles have earlier layers.
@@ -28,6 +28,7 @@ pub const PASS: Pass = Pass {
 };
 
 const LIST: Kernel = Kernel::new("list_covered");
+const ARRANGE: Kernel = Kernel::of("arrange_covered", [1; 3]);
 
 /// The most words that a band's list can take.
 pub fn words(band: &Band) -> u64 {
@@ -59,3 +60,9 @@ pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
 
 /// The dispatch that lists the tiles with a nearest depth.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
+
+/// The dispatches that make the list: `lists`, which lists the tiles, and one that writes the
+/// numbers of workgroups of the dispatches over the list.
+pub fn runs(lists: Run) -> [Run; 2] {
+    [lists, Run { kernel: ARRANGE, over: Over::Once }]
+}

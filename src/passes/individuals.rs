@@ -36,7 +36,8 @@ pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 /// The stage that shades the sums of an input and keeps its surface at the pixels where that is the
 /// nearest so far.
 pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
-    let runs = vec![covered::LISTS, Run { kernel: KEEP, over: Over::Covered }];
+    let mut runs = covered::runs(covered::LISTS).to_vec();
+    runs.push(Run { kernel: KEEP, over: Over::Covered });
     Stage::new("resolve", band, runs).after(clears(plan, band, first))
 }
 

@@ -276,7 +276,7 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 /// The stage that resolves the covered tiles.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
     let lists = if plan.needs.surface.separate() { individuals::LISTS } else { covered::LISTS };
-    let mut runs = vec![lists];
+    let mut runs = covered::runs(lists).to_vec();
     runs.extend(long_lists::composites(plan));
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
     let twin = match plan.needs.surface.lists() {

@@ -174,7 +174,8 @@ pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
 /// The attribute pass of all splats of a page, which also resolves the sums: to the image, or to
 /// the surfaces of a separate input.
 pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
-    let runs = vec![covered::LISTS, Run { kernel: RESOLVE, over: Over::CoveredEights }];
+    let mut runs = covered::runs(covered::LISTS).to_vec();
+    runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
     let separate = plan.needs.surface.separate();
     let clears = if separate { individuals::clears(plan, band, page == 0) } else { covered::clears(plan, band) };
     let stage = Stage::new("accumulate", band, runs).of_page(page).after(clears);

@@ -71,7 +71,7 @@ fn lines(plan: &Plan) -> Vec<String> {
 }
 
 const PROJECT: &str = "project: project/Slots(All), project_rare/Rare";
-const RESOLVE: &str = "resolve: list_covered/Occlusion, resolve/Covered";
+const RESOLVE: &str = "resolve: list_covered/Occlusion, arrange_covered, resolve/Covered";
 
 /// The steps of scatter.
 fn scattered() -> [&'static str; 8] {
@@ -170,7 +170,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
         [
             "look for lists of Small",
             "bin: bin_count/Slots(All), bin_scan, bin_place/Slots(All) page 0",
-            "accumulate: list_covered/Occlusion, tile_resolve/CoveredEights page 0",
+            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights page 0",
             "read back 0",
         ]
     );

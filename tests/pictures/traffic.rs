@@ -38,7 +38,7 @@ fn a_frame_is_one_submission() {
             assert!(common::bits(&frame) == common::bits(&first.0));
             let Traffic { submits, waits, dispatches, bind_groups, bytes_written, bytes_read } = report.traffic;
             assert_eq!((submits, waits, bind_groups), (1, 1, 0), "{organisation:?}: {:?}", report.traffic);
-            let most = if organisation == Organisation::Tile { 19 } else { 15 };
+            let most = if organisation == Organisation::Tile { 20 } else { 16 };
             assert!((5..=most).contains(&dispatches), "{organisation:?}: {:?}", report.traffic);
             assert_eq!(bytes_written, size_of::<View>() as u64);
             let image = 16 * camera.pixels() as u64;

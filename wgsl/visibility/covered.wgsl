@@ -1,10 +1,11 @@
 // The start of stage 4: lists the tiles of the image that are not empty. Empty tiles keep the
 // cleared values, and no invocation visits their pixels. Host side: src/passes/covered.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xd09eb1f53779705e
 // #import accumulator_raster|front::{visible}
 // #import accumulator_raster|occlusion::{covered_start, has_any}
 // #import accumulator_raster|visibility::{nearest}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
-// #import project::{GRID_ROW}
+// #import project::{rows_of}
 // #import triangles_tiles::{has_triangles}
 
 // The size of a tile, pixels.
@@ -18,8 +19,7 @@ override LIST_EMPTY: u32;
 override LIST_APART: u32;
 
 // The list lies in `nearest`, from covered_start() on: the number of listed tiles; a grid with one
-// workgroup per tile; a grid with one per eight tiles; and, from COVERED_LIST on, the tiles. Both
-// grids grow with the list.
+// workgroup per tile; a grid with one per eight tiles; and, from COVERED_LIST on, the tiles.
 const COVERED_GRID: u32 = 1u;
 const COVERED_GRID_OF_EIGHTS: u32 = 4u;
 const COVERED_LIST: u32 = 8u;
@@ -34,28 +34,6 @@ fn tiles_in_band() -> u32 {
     return tiles_across() * ((held_band.rows + TILE_ROWS - 1u) / TILE_ROWS);
 }
 
-// The order of the list depends on the schedule, but tiles share no pixel.
-fn list_tile(tile: u32) {
-    let start = covered_start();
-    let place = atomicAdd(&nearest[start], 1u);
-    atomicStore(&nearest[start + COVERED_LIST + place], tile);
-    if (place < GRID_ROW) {
-        atomicMax(&nearest[start + COVERED_GRID], place + 1u);
-    }
-    if (place % GRID_ROW == 0u) {
-        atomicMax(&nearest[start + COVERED_GRID + 1u], place / GRID_ROW + 1u);
-        atomicStore(&nearest[start + COVERED_GRID + 2u], 1u);
-    }
-    let eight = place / 8u;
-    if (place % 8u == 0u && eight < GRID_ROW) {
-        atomicMax(&nearest[start + COVERED_GRID_OF_EIGHTS], eight + 1u);
-    }
-    if (place % (8u * GRID_ROW) == 0u) {
-        atomicMax(&nearest[start + COVERED_GRID_OF_EIGHTS + 1u], eight / GRID_ROW + 1u);
-        atomicStore(&nearest[start + COVERED_GRID_OF_EIGHTS + 2u], 1u);
-    }
-}
-
 // One invocation per tile.
 @compute @workgroup_size(WORKGROUP)
 fn list_covered(
@@ -67,7 +45,21 @@ fn list_covered(
     let tile = linear_index(workgroup, workgroups, local);
     let of_others = LIST_APART == 0u && (LIST_EMPTY != 0u || has_triangles(tile));
     if (tile < tiles_in_band() && (of_others || has_any(tile))) {
-        list_tile(tile);
+        // The order of the list depends on the schedule, but tiles share no pixel.
+        let place = atomicAdd(&nearest[covered_start()], 1u);
+        atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
+    }
+}
+
+@compute @workgroup_size(1)
+fn arrange_covered() {
+    hold();
+    let listed = atomicLoad(&nearest[covered_start()]);
+    let grid = rows_of(listed);
+    let eighths = rows_of((listed + 7u) / 8u);
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&nearest[covered_start() + COVERED_GRID + k], grid[k]);
+        atomicStore(&nearest[covered_start() + COVERED_GRID_OF_EIGHTS + k], eighths[k]);
     }
 }
 

@@ -1,9 +1,11 @@
 // Inputs that are blended separately, the individuals of Tien 2008. They are drawn one after the
 // other, and each pixel keeps the nearest of their blended surfaces, compared by blended depth
 // (section 5.3). Twin: src/passes/individuals.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x67575d675ce753a9
+// All loops end, by 1 of src/gpu/loops.rs: 0x4f9b625f5cb1d36b
 // #import *::{front_at}
-// #import covered::{LIST_EMPTY, TILE_ROWS, TILE_WIDTH, covered_tile, list_tile, tiles_across}
+// #import accumulator_raster|occlusion::{covered_start}
+// #import accumulator_raster|visibility::{nearest}
+// #import covered::{COVERED_LIST, LIST_EMPTY, TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across}
 // #import covered::{tiles_in_band}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
 // #import resolve_surface::{Surface, surface_of}
@@ -112,7 +114,8 @@ fn list_individuals(
         }
     }
     if (tile < tiles_in_band() && (any_shows || has_triangles(tile))) {
-        list_tile(tile);
+        let place = atomicAdd(&nearest[covered_start()], 1u);
+        atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
     }
 }
 

@@ -37,9 +37,9 @@ pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu wit
 /// of small cuts of levels of detail (1.9 ms instead of 1.5). No workgroup count of the renderer is
 /// too large. Grids that `rows_of` makes (`wgsl/project/project.wgsl`) are for lists shorter than
 /// 2^30, so they have at most 65,535 groups per row and 2^14 rows. Grids that grow with a page's
-/// queue have 128 groups per row and at most 2^15 rows. The others have one row per batch of a page,
-/// and a page has at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows validation
-/// stays on: Direct3D 12 passes the counts to kernels only if they are validated.
+/// queue have 128 groups per row and at most 2^15 rows. The others have one row per batch of a
+/// page, and a page has at most [`MOST_GROUPS`](super::layout::MOST_GROUPS) batches. On Windows
+/// validation stays on: Direct3D 12 passes the counts to kernels only if they are validated.
 fn counts_are_checked() -> bool {
     cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")
 }

@@ -98,6 +98,9 @@ pub const LIST_START: u32 = 6;
 /// First word of the grid over the far batches, in a list of batches.
 pub const LIST_FAR: u32 = 3;
 
+/// Words of the box around a batch of a cut (`wgsl/levels/balls_cut.wgsl`).
+pub const BOX_WORDS: u32 = 6;
+
 /// Side of the tiles of the occlusion test, pixels (`wgsl/visibility/occlusion.wgsl`).
 pub const OCCLUSION_TILE: u32 = 8;
 

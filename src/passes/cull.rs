@@ -89,7 +89,8 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
 pub const PASS: Pass = Pass {
     name: "cull",
     files: |needs| match (needs.cull, needs.levels) {
-        (true, _) => vec!["ball.wgsl", "cull.wgsl"],
+        (true, true) => vec!["ball.wgsl", "cull.wgsl"],
+        (true, false) => vec!["ball.wgsl", "cull.wgsl", "balls_own.wgsl"],
         (false, true) => vec!["ball.wgsl", "cull_absent.wgsl"],
         (false, false) => vec!["cull_absent.wgsl"],
     },

@@ -10,7 +10,7 @@ use super::source::{self, Source};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{self, QUEUE_START, TreeNode};
+use crate::gpu::layout::{self, BATCH, BOX_WORDS, QUEUE_START, TreeNode};
 use crate::passes::triangles::CORNER_WORDS;
 use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
@@ -93,7 +93,12 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
         let chosen = (records * words) as u32;
         let whole = whole.into();
         let own = layout::Branch { surfels, roots, first_root, whole, chosen, small_levels, ..Zeroable::zeroed() };
-        let mut buffers = vec![("branch", Buffer::uniform(gpu, "branch", &own)?.words()), ("tree_nodes", tree_nodes)];
+        let boxes = records.div_ceil(BATCH as usize) as u64 * u64::from(BOX_WORDS);
+        let mut buffers = vec![
+            ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
+            ("boxes", Buffer::storage(gpu, "batches of a cut", boxes)?),
+            ("tree_nodes", tree_nodes),
+        ];
         buffers.extend(RECORDS.into_iter().zip(records_of(
             gpu,
             (&*page, records),

@@ -126,7 +126,6 @@ fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &Settings) ->
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
         && tuning::PIXELS_A_CULLED_SURFEL * drawn > camera.pixels() as u64
-        && !needs.levels
         && !needs.surface.copies()
         && needs.surface.lists().is_none()
         && needs.surface.oit().is_none()

@@ -18,7 +18,8 @@ impl Run<'_> {
         for (number, branch) in store.branches.iter().enumerate() {
             let clears = |encoder: &mut wgpu::CommandEncoder| {
                 let of_all = store.buffer("reached").filter(|_| number == 0);
-                of_all.into_iter().for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
+                let boxes = branch.buffers.get("boxes");
+                of_all.into_iter().chain(boxes).for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
             };
             self.timing.pass(gpu, "select", clears, |pass| {
                 for run in select::choose(branch.large_levels) {

@@ -56,8 +56,7 @@ impl Page {
     ) -> Result<Self> {
         let surfels = u64::from(own.surfels);
         buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
-        // Batches of a cut are not culled.
-        let batches = if branch.is_some() { 0 } else { surfels.div_ceil(BATCH.into()) };
+        let batches = surfels.div_ceil(BATCH.into());
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
         // One row of the dispatch grid is one batch.
         drawn.put(gpu, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
@@ -119,8 +118,7 @@ pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers], needs: &SceneN
         ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(SPREAD_GRID) + 3)?),
         ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", halves * nodes)?),
         ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
-        ("run_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a level", runs)?.words()),
-        ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
+        ("counts_of", Buffer::<[u32; 2]>::storage(gpu, "counts of a level", groups + runs)?.words()),
         ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
     ]))
 }

@@ -22,13 +22,14 @@ use crate::scene::Samples;
 
 /// Aliases of buffers: the WGSL name where kernels access a buffer in another mode (read or write),
 /// and the name under which it is stored.
-const ALIASES: [(&str, &str); 19] = [
+const ALIASES: [(&str, &str); 20] = [
     ("selected", "selection"),
     ("chosen", "attributes"),
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
     ("surviving", "drawn"),
+    ("boxed", "boxes"),
     ("visible", "nearest"),
     ("added", "sums"),
     ("winners", "sums"),
@@ -45,7 +46,7 @@ const ALIASES: [(&str, &str); 19] = [
 ];
 
 /// Names of the buffers that each page, or its branch, has of its own.
-const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
+const PAGED: [&str; 10] = ["attributes", "balls", "boxes", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
 /// Returns the name under which a buffer is stored.
 pub(super) fn kept(name: &str) -> &str {

@@ -355,7 +355,7 @@ fn broken_kernels_are_noticed() {
         ("select.wgsl", "return drawn_at(place) < attributes", "return drawn_at(place) + 99u < attributes"),
         ("select.wgsl", "return page.first + select(run", "return select(run"),
         ("select.wgsl", "return page.surfels;", "return page.surfels - 1u;"),
-        ("select.wgsl", "run_counts[run] = before;", "run_counts[run] = vec2<u32>(0u);"),
+        ("select.wgsl", "[runs_start() + run] = before;", "[runs_start() + run] = vec2<u32>(0u);"),
         ("select.wgsl", "counts += left_by", "counts = left_by"),
         ("judge.wgsl", "cuts_that_divide(seen_disk(nearest, radius)) == 0u", "true"),
         ("select.wgsl", "node.first + select(0u, branch.surfels, kind_of(node) == INNER);", "node.first;"),

@@ -8,11 +8,12 @@
 // the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
 // other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x1286befc94e21e37
+// All loops end, by 1 of src/gpu/loops.rs: 0x5077b427ce7b2437
 // #import attributes::{attribute_word, attributes}
+// #import balls_cut::{enclose}
 // #import judge::{CHILDREN_DRAWN, COUNT_MASK, INNER, OTHER_BRANCH, UNSEEN, cuts_of, fate_of}
 // #import judge::{is_last, kind_of}
-// #import layout::{Branch, TreeNode, WORKGROUP, hold_view, linear_index, page}
+// #import layout::{BATCH, Branch, TreeNode, WORKGROUP, hold_view, linear_index, page}
 // #import low_part::{low_part}
 // #import project::{groups_of, rows_of}
 // #import select_fades::{ALL_CUTS, CHOSEN_WORDS, choose, cuts_that_reach, set_cuts_that_reach}
@@ -24,12 +25,11 @@
 // half of `frontier` stores how many cuts reach each node (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
 @group(0) @binding(76) var<storage, read_write> fates: array<u32>;
-// For each invocation of a level: how many surfels and nodes to draw, and how many children, come
-// from the invocations before it in its workgroup.
-@group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
-// For each workgroup: the same two counts for all its nodes; after select_sum(), the two places
-// where the workgroup starts to write.
-@group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
+// Two counts: how many surfels and nodes to draw, and how many children to judge. First for all
+// nodes of each workgroup of a level; after select_sum(), the two places where the workgroup starts
+// to write. From runs_start() on for each invocation of a level: those of the invocations before it
+// in its workgroup.
+@group(0) @binding(82) var<storage, read_write> counts_of: array<vec2<u32>>;
 // The attributes of this branch; then, from branch.chosen on, the number of chosen surfels and
 // nodes, and their indices. Attributes and list share a buffer, because core WebGPU grants a kernel
 // only eight storage buffers.
@@ -92,6 +92,14 @@ fn is_filled(place: u32) -> bool {
     return drawn_at(place) < attributes[page.chosen];
 }
 
+// The number of surfels in a batch of the page. Batches are parts of runs, so their entries in the
+// list of chosen surfels follow each other.
+fn held_in(batch: u32) -> u32 {
+    let first = drawn_at(batch * BATCH);
+    let cut = attributes[page.chosen];
+    return min(min(cut - min(first, cut), BATCH), page.surfels - min(batch * BATCH, page.surfels));
+}
+
 // The word of a surfel's attributes that holds its rank.
 override NUMBER_WORD: u32;
 
@@ -134,6 +142,11 @@ fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
         before += eights[k];
     }
     return before;
+}
+
+// There is one workgroup for every WORKGROUP invocations.
+fn runs_start() -> u32 {
+    return (arrayLength(&counts_of) + WORKGROUP) / (WORKGROUP + 1u);
 }
 
 // The number of invocations that judge this many nodes.
@@ -192,6 +205,7 @@ fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32>
         frontier[start.y + k] = node.first + k;
         set_cuts_that_reach(start.y + k, cuts);
     }
+    enclose(node, fate, start.x, start.x + counts.x);
     return counts;
 }
 
@@ -267,10 +281,10 @@ fn select_judge(
     let counts = judge_run(first, end);
     let before = sum_before(counts, local);
     if (first < end) {
-        run_counts[run] = before;
+        counts_of[runs_start() + run] = before;
     }
     if (local == WORKGROUP - 1u) {
-        group_counts[workgroup.y * workgroups.x + workgroup.x] = before + counts;
+        counts_of[workgroup.y * workgroups.x + workgroup.x] = before + counts;
     }
 }
 
@@ -286,13 +300,13 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     let stop = min((local + 1u) * each, groups);
     var own = vec2<u32>(0u);
     for (var group = local * each; group < stop; group++) {
-        own += group_counts[group];
+        own += counts_of[group];
     }
     let before = sum_before(own, local);
     var start = before + vec2<u32>(here, end);
     for (var group = local * each; group < stop; group++) {
-        let counts = group_counts[group];
-        group_counts[group] = start;
+        let counts = counts_of[group];
+        counts_of[group] = start;
         start += counts;
     }
     // All invocations have read the old words before the barriers above.
@@ -321,5 +335,5 @@ fn select_spread(
     if (first >= end) {
         return;
     }
-    spread_run(first, end, group_counts[workgroup.y * workgroups.x + workgroup.x] + run_counts[run]);
+    spread_run(first, end, counts_of[workgroup.y * workgroups.x + workgroup.x] + counts_of[runs_start() + run]);
 }

@@ -1,5 +1,5 @@
 // All surfels are drawn. Same interface as select.wgsl.
-// #import layout::{page}
+// #import layout::{BATCH, page}
 // #import words|words_long::{surfels_held}
 
 fn places_held() -> u32 {
@@ -12,6 +12,11 @@ fn surfel_of(place: u32) -> u32 {
 
 fn is_filled(place: u32) -> bool {
     return true;
+}
+
+// The number of surfels in a batch of the page.
+fn held_in(batch: u32) -> u32 {
+    return min(BATCH, surfels_held() - batch * BATCH);
 }
 
 fn rank_of(index: u32) -> u32 {

@@ -5,9 +5,10 @@
 // of the listed batches are stored in slots, one batch after the other: batches that are left out
 // take no memory.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x116791cebd55d876
+// All loops end, by 1 of src/gpu/loops.rs: 0x415c0fee9351bae2
 // #import accumulator_raster|front::{visible}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
+// #import balls_*::{batches_held, sphere_of}
 // #import camera_*::{ball_extent}
 // #import epsilon_*::{deepest_accepted}
 // #import footprint::{Rectangle, band_pixels}
@@ -15,12 +16,10 @@
 // #import occlusion::{OCCLUSION_TILE, farthest_in, occlusion_tiles}
 // #import project::{queue}
 // #import records::{SplatRecord}
-// #import select::{surfel_of}
+// #import select::{held_in, surfel_of}
 // #import vectors::{norm3}
-// #import words|words_long::{each_word, surfels_held}
+// #import words|words_long::{each_word}
 
-// The bounding balls of batches: centre and radius, world units relative to the scene's origin.
-@group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
 // From word 0 on, the grid of workgroups over all listed batches, whose word 1 is their number.
 // From LIST_FAR on, the grid over the far batches. From LIST_START on, the numbers of the batches,
 // the near ones first. `drawn` is the same buffer, read-only.
@@ -38,10 +37,12 @@ const MOST_TILES: u32 = 4096u;
 // A relative margin on depths for the rounding of rows c (src/passes/cull.rs).
 const DEPTH_SLACK: f32 = 1e-3;
 
-// The slot of this invocation's splat. Each row of the dispatch is a batch, and the last row is the
-// batch that was listed last.
+// The slot of this invocation's splat. Each row of the dispatch is a batch. The dispatch has the
+// batches that were listed last, by turns from their first and their second half: the near half
+// takes longer, and a CPU adapter gives each of its threads a range of rows.
 fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
-    return (drawn[1] - workgroups.y + workgroup.y) * BATCH + workgroup.x * WORKGROUP + local;
+    let turn = select(0u, (workgroups.y + 1u) / 2u, workgroup.y % 2u == 1u) + workgroup.y / 2u;
+    return (drawn[1] - workgroups.y + turn) * BATCH + workgroup.x * WORKGROUP + local;
 }
 
 // The place in its page of the surfel whose splat has this slot. Some slots of the last batch have
@@ -72,7 +73,7 @@ fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
 }
 
 fn ball_of_batch(batch: u32) -> Ball {
-    let sphere = balls[batch];
+    let sphere = sphere_of(batch);
     let relative = sphere.xyz * held.unit - held.eye.xyz;
     // The margin covers ten f32 roundings of these lengths.
     return ball_at(relative, sphere.w * held.unit + 1e-6 * (norm3(relative) + norm3(held.eye.xyz)));
@@ -97,7 +98,7 @@ fn list(batch: u32) {
 }
 
 fn leave_out(batch: u32) {
-    atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
+    atomicAdd(&queue[1], held_in(batch));
 }
 
 // One invocation per batch.
@@ -109,7 +110,7 @@ fn cull_near(
 ) {
     hold();
     let batch = linear_index(workgroup, workgroups, local);
-    if (batch >= arrayLength(&balls)) {
+    if (batch >= batches_held() || held_in(batch) == 0u) {
         return;
     }
     let ball = ball_of_batch(batch);

@@ -119,13 +119,12 @@ fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     needs.may_gather() && pays && !known.crowded && options.has(Optimisation::Gathering)
 }
 
-/// Whether batches that are hidden or out of view are culled. Batches of cuts are not culled. A cut
-/// has no nodes out of view. The bounds of its batches would have to be recomputed in each frame,
-/// which takes longer than drawing the hidden batches, unless most are hidden.
+/// Whether batches that are hidden or out of view are culled.
 fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &Settings) -> bool {
+    let worth = if needs.levels { tuning::PIXELS_A_CULLED_CHOICE } else { tuning::PIXELS_A_CULLED_SURFEL };
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
-        && tuning::PIXELS_A_CULLED_SURFEL * drawn > camera.pixels() as u64
+        && worth * drawn > camera.pixels() as u64
         && !needs.surface.copies()
         && needs.surface.lists().is_none()
         && needs.surface.oit().is_none()

@@ -1,7 +1,7 @@
 // The bounding balls of the batches of a cut, by which cull.wgsl leaves out hidden ones. A cut
-// changes from view to view, so select.wgsl encloses the balls of the nodes from which it chooses.
+// changes from view to view, so select.wgsl encloses the balls of the nodes that it draws.
 // Same interface as balls_own.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0x1f9e3b8ae6675720
+// All loops end, by 1 of src/gpu/loops.rs: 0x531fb7975f5218d4
 // #import judge::{CHILDREN_DRAWN}
 // #import layout::{BATCH, TreeNode, page}
 // #import select::{drawn_at}
@@ -25,16 +25,21 @@ fn number_of(word: u32) -> f32 {
     return bitcast<f32>(select(~word, word ^ SIGN, (word & SIGN) != 0u));
 }
 
-// Encloses what is drawn for a node, the entries from `first` to before `end` of the list.
-fn enclose(node: TreeNode, fate: u32, first: u32, end: u32) {
-    // The balls of children that are drawn may stick out of the node's ball.
-    let radius = node.radius + select(0.0, max(node.children, 0.0), (fate & CHILDREN_DRAWN) != 0u);
+// Encloses the balls of nodes for which the entries from `first` to before `end` are drawn. `high`
+// are the greatest coordinates of the balls, `low` the least ones, negated.
+fn enclose(high: vec3<f32>, low: vec3<f32>, first: u32, end: u32) {
     for (var box = first / BATCH; first < end && box * BATCH < end; box++) {
         for (var k = 0u; k < 3u; k++) {
-            atomicMax(&boxes[box * BOX_WORDS + k], ordered(node.center[k] + radius));
-            atomicMax(&boxes[box * BOX_WORDS + 3u + k], ordered(radius - node.center[k]));
+            atomicMax(&boxes[box * BOX_WORDS + k], ordered(high[k]));
+            atomicMax(&boxes[box * BOX_WORDS + 3u + k], ordered(low[k]));
         }
     }
+}
+
+// The radius of a ball around the node's centre that holds what is drawn for the node: the balls of
+// its children may stick out of its own.
+fn drawn_radius(node: TreeNode, fate: u32) -> f32 {
+    return node.radius + select(0.0, max(node.children, 0.0), (fate & CHILDREN_DRAWN) != 0u);
 }
 
 fn batches_held() -> u32 {

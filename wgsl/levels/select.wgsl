@@ -8,11 +8,11 @@
 // the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
 // other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x5077b427ce7b2437
+// All loops end, by 1 of src/gpu/loops.rs: 0xc4d6f253eded2d2d
 // #import attributes::{attribute_word, attributes}
-// #import balls_cut::{enclose}
+// #import balls_cut::{drawn_radius, enclose}
 // #import judge::{CHILDREN_DRAWN, COUNT_MASK, INNER, OTHER_BRANCH, UNSEEN, cuts_of, fate_of}
-// #import judge::{is_last, kind_of}
+// #import judge::{is_last, kind_of, vector}
 // #import layout::{BATCH, Branch, TreeNode, WORKGROUP, hold_view, linear_index, page}
 // #import low_part::{low_part}
 // #import project::{groups_of, rows_of}
@@ -184,9 +184,8 @@ fn judge_run(first: u32, end: u32) -> vec2<u32> {
 
 // Writes the surfels and nodes that are chosen for a node into the list, from `start.x` on, and the
 // children to judge into the frontier, from `start.y` on. Returns left_by().
-fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
+fn spread(node: TreeNode, index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
     let cuts = cuts_of(fate);
-    let node = tree_nodes[index];
     let counts = left_by(node, fate, reached_in);
     var at = start.x;
     if (cuts < reached_in) {
@@ -205,16 +204,25 @@ fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32>
         frontier[start.y + k] = node.first + k;
         set_cuts_that_reach(start.y + k, cuts);
     }
-    enclose(node, fate, start.x, start.x + counts.x);
     return counts;
 }
 
 // Calls spread() for the nodes of a range of the frontier, one after the other, from `start` on.
 fn spread_run(first: u32, end: u32, start: vec2<u32>) {
     var at = start;
+    var high = vec3<f32>(-1e30);
+    var low = vec3<f32>(-1e30);
     for (var place = first; place < end; place++) {
-        at += spread(frontier[place], fates[place], cuts_that_reach(place), at);
+        let index = frontier[place];
+        let node = tree_nodes[index];
+        let fate = fates[place];
+        let counts = spread(node, index, fate, cuts_that_reach(place), at);
+        let radius = select(-1e30, drawn_radius(node, fate), counts.x > 0u);
+        high = max(high, vector(node.center) + radius);
+        low = max(low, radius - vector(node.center));
+        at += counts;
     }
+    enclose(high, low, start.x, at.x);
 }
 
 // Makes the reached roots of a branch its first level, and returns their number.

@@ -21,16 +21,9 @@ pub const QUEUE_GRID: u32 = 2;
 /// workgroup.
 pub const QUEUE_LISTING: u32 = 5;
 
-/// Width of a tile, pixels (`wgsl/visibility/covered.wgsl`).
+/// Width of a tile, pixels, whose invocations share the splats that they fetch by subgroups
+/// (`wgsl/tiles/splat_shared.wgsl`); also the number of these invocations.
 pub const TILE_WIDTH: u32 = 8;
-
-/// Height of a tile, pixels, if its invocations share the splats that they fetch
-/// (`wgsl/project/splat_shared.wgsl`). The taller the tiles, the fewer of them fetch the same
-/// splat.
-pub const TILE_ROWS_SHARED: u32 = 16;
-
-/// Height of a tile, pixels, if its invocations do not share splats.
-pub const TILE_ROWS_PLAIN: u32 = 8;
 
 /// Words at the start of the list of covered tiles: the number of tiles, and two grids of
 /// workgroups (`wgsl/visibility/covered.wgsl`).

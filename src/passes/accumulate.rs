@@ -53,6 +53,7 @@ use super::attributes;
 use super::footprint::footprint;
 use super::join;
 use super::splat::{Intersection, Splat};
+use super::tiles;
 use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
@@ -101,7 +102,7 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     [
         terms_file(needs),
         "tile_add.wgsl",
-        "tile_sums.wgsl",
+        if tiles::staged(needs) { "staged_sums.wgsl" } else { "tile_sums.wgsl" },
         if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
     ]
 }

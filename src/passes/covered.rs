@@ -19,10 +19,12 @@ pub const PASS: Pass = Pass {
         // tiles have earlier layers.
         let needs = making.needs;
         let list_empty = making.options.shows_where_nothing_is() || needs.surface.peels().is_some();
+        let [width, rows] = super::tiles::size(needs);
         vec![
             ("LIST_EMPTY", u32::from(list_empty).into()),
             ("LIST_APART", u32::from(needs.surface.separate()).into()),
-            ("TILE_ROWS", super::tiles::rows(needs).into()),
+            ("TILE_WIDTH", width.into()),
+            ("TILE_ROWS", rows.into()),
         ]
     },
 };

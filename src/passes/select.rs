@@ -36,7 +36,11 @@ pub const PASS: Pass = Pass {
     files: |needs| {
         let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
         let fades = if needs.fades { "select_fades.wgsl" } else { "select_fades_absent.wgsl" };
-        if needs.levels { vec!["select.wgsl", "judge.wgsl", "balls_cut.wgsl", fades, low] } else { vec!["select_absent.wgsl"] }
+        if needs.levels {
+            vec!["select.wgsl", "judge.wgsl", "balls_cut.wgsl", fades, low]
+        } else {
+            vec!["select_absent.wgsl"]
+        }
     },
     kernels: |_| Vec::new(),
     constants: |making| match making.needs.levels {

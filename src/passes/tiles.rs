@@ -23,11 +23,11 @@ use std::ops::Range;
 
 use super::lowpass::Design;
 use super::{accumulate, covered, individuals, project};
-use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH};
+use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, OCCLUSION_TILE, TILE_WIDTH};
 use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
-use crate::plan::{Band, ColorNeed, Facts, Plan, SceneNeeds, Settings};
+use crate::plan::{Band, ColorNeed, Facts, Fetch, Plan, SceneNeeds, Settings};
 use crate::scene::{Camera, LowPass, Samples};
 
 /// The files and kernels that the tiles' module adds to those of every module.
@@ -35,29 +35,46 @@ pub const PASS: Pass = Pass {
     name: "tiles",
     files: |needs| {
         let pick = |needed, file, absent| if needed { file } else { absent };
+        let one_sample = needs.samples == Samples::ONE;
         let mut files = vec![
             "bin.wgsl",
-            "tile.wgsl",
+            "column.wgsl",
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
-            pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
-            pick(needs.fades, "tile_fade.wgsl", "tile_fade_absent.wgsl"),
-            pick(needs.color == ColorNeed::Textured, "tile_texture.wgsl", "tile_plain.wgsl"),
             pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
             pick(needs.surface.gathers(), "tile_small.wgsl", "tile_small_absent.wgsl"),
             match needs.surface.separate() {
                 true => "tile_individuals.wgsl",
-                false => pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
+                false if one_sample => "tile_pixels.wgsl",
+                false => pick(staged(needs), "staged_samples.wgsl", "tile_samples.wgsl"),
             },
-            pick(needs.surface.subgroups(), "splat_shared.wgsl", "splat_plain.wgsl"),
         ];
         files.extend(accumulate::tile_files(needs));
+        match staged(needs) {
+            true => files.push("staged.wgsl"),
+            false => files.extend([
+                "tile.wgsl",
+                pick(needs.surface.fetch() == Some(Fetch::Shared), "splat_shared.wgsl", "splat_plain.wgsl"),
+                pick(needs.low_pass == LowPass::None, "hand_filter_absent.wgsl", "hand_filter.wgsl"),
+                pick(needs.clips, "hand_clip.wgsl", "hand_clip_absent.wgsl"),
+                pick(needs.fades, "hand_fade.wgsl", "hand_fade_absent.wgsl"),
+                pick(needs.color == ColorNeed::Textured, "hand_texture.wgsl", "hand_plain.wgsl"),
+                pick(needs.color == ColorNeed::Textured, "tile_texture.wgsl", "tile_plain.wgsl"),
+                pick(
+                    needs.facing.is_some(),
+                    "hand_facing.wgsl",
+                    pick(needs.curved, "hand_curved.wgsl", "hand_flat.wgsl"),
+                ),
+            ]),
+        }
         files
     },
     kernels: |needs| {
-        let large = [COUNT_LARGE, SCAN_LARGE, PLACE_LARGE, VISIBILITY];
-        let rest: &[Kernel] = if needs.surface.gathers() { &[COUNT, SCAN, PLACE, RESOLVE] } else { &[ACCUMULATE] };
-        large.into_iter().chain(rest.iter().copied()).collect()
+        let gathers = needs.surface.gathers();
+        let mut kernels = vec![COUNT_LARGE, SCAN_LARGE, PLACE_LARGE, drawing(needs, VISIBILITY)];
+        kernels.extend(gathers.then_some([COUNT, SCAN, PLACE]).into_iter().flatten());
+        kernels.push(drawing(needs, if gathers { RESOLVE } else { ACCUMULATE }));
+        kernels
     },
     constants: |_| Vec::new(),
 };
@@ -68,16 +85,50 @@ const PLACE_LARGE: Kernel = Kernel::listing("bin_place_large", [8, 8, 1], Listed
 const COUNT: Kernel = Kernel::listing("bin_count", [64, 1, 1], Listed::Small);
 const SCAN: Kernel = Kernel::listing("bin_scan", [256, 1, 1], Listed::Small);
 const PLACE: Kernel = Kernel::listing("bin_place", [64, 1, 1], Listed::Small);
-const VISIBILITY: Kernel = Kernel::new("tile_visibility");
-const ACCUMULATE: Kernel = Kernel::new("tile_accumulate");
-const RESOLVE: Kernel = Kernel::new("tile_resolve");
+const VISIBILITY: &str = "tile_visibility";
+const ACCUMULATE: &str = "tile_accumulate";
+const RESOLVE: &str = "tile_resolve";
 
-/// The height of a tile, pixels.
-pub fn rows(needs: &SceneNeeds) -> u32 {
-    if needs.surface.subgroups() { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN }
+/// The kernel `name`, which draws tiles: eight tiles a workgroup with eight invocations each
+/// (`wgsl/tiles/tile.wgsl`), or one tile with an invocation for each pixel
+/// (`wgsl/tiles/staged.wgsl`).
+fn drawing(needs: &SceneNeeds, name: &'static str) -> Kernel {
+    let [width, rows] = STAGED;
+    if staged(needs) { Kernel::of(name, [width * rows, 1, 1]) } else { Kernel::new(name) }
 }
 
-/// The mean number of tiles of [`TILE_ROWS_SHARED`] rows that a splat touches in the view of
+/// Whether tiles have an invocation for each pixel.
+pub fn staged(needs: &SceneNeeds) -> bool {
+    needs.surface.fetch() == Some(Fetch::Staged)
+}
+
+/// Width and height in pixels of tiles whose invocations share what they fetch. The taller they
+/// are, the fewer of them fetch the same splat.
+const SHARED: [u32; 2] = [TILE_WIDTH, 16];
+
+/// The same of tiles with an invocation for each pixel.
+const STAGED: [u32; 2] = [BLOCK_SIDE; 2];
+
+/// The same of other tiles, and where no tiles are drawn and only the list of covered tiles uses
+/// them.
+const PLAIN: [u32; 2] = [TILE_WIDTH, OCCLUSION_TILE];
+
+/// The width and height of a tile, pixels.
+pub fn size(needs: &SceneNeeds) -> [u32; 2] {
+    match needs.surface.fetch() {
+        Some(Fetch::Shared) => SHARED,
+        Some(Fetch::Staged) => STAGED,
+        Some(Fetch::Alone) | None => PLAIN,
+    }
+}
+
+/// The number of tiles in `band`, of an image of `width` samples.
+pub fn tiles_in(needs: &SceneNeeds, width: u32, band: &Band) -> u64 {
+    let [across, down] = size(needs);
+    u64::from(width.div_ceil(across)) * u64::from(band.rows.div_ceil(down))
+}
+
+/// The mean number of tiles of a processor that a splat touches in the view of
 /// `camera`, estimated from the sample in `facts`.
 ///
 /// Infinite if the view shows no splat of the sample.
@@ -91,7 +142,7 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     let across = |first: u32, last: u32, size: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(size);
     let touched = splats.map(|splat| {
         let ([left, top], [right, bottom]) = (splat.first, splat.last);
-        across(left, right, TILE_WIDTH) * across(top, bottom, TILE_ROWS_SHARED)
+        across(left, right, SHARED[0]) * across(top, bottom, SHARED[1])
     });
     let (sum, count) = touched.fold((0.0, 0.0), |(sum, count), tiles| (sum + tiles, count + 1.0));
     if count > 0.0 { sum / count } else { f64::INFINITY }
@@ -107,11 +158,10 @@ pub const LONGEST: u64 = 8_000;
 /// Words of the lists of a kind before their entries: the sizes that the frame needs, and the end
 /// of each list (`wgsl/tiles/bin.wgsl`).
 pub fn list_words(plan: &Plan, of: Listed, band: &Band) -> u64 {
-    let [across, down] = match of {
-        Listed::Large => [BLOCK_SIDE; 2],
-        Listed::Small => [TILE_WIDTH, rows(&plan.needs)],
+    let cells = match of {
+        Listed::Large => u64::from(plan.width.div_ceil(BLOCK_SIDE)) * u64::from(band.rows.div_ceil(BLOCK_SIDE)),
+        Listed::Small => tiles_in(&plan.needs, plan.width, band),
     };
-    let cells = u64::from(plan.width.div_ceil(across)) * u64::from(band.rows.div_ceil(down));
     u64::from(LIST_ENDS) + 1 + cells
 }
 
@@ -152,7 +202,8 @@ pub fn look(plan: &Plan, of: Listed, band: usize, pages: Range<usize>) -> Step {
 /// The visibility pass of the large splats of some pages.
 pub fn visibility(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
     let draw = |page| {
-        let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Tiles }]);
+        let stage =
+            Stage::new("visibility", band, vec![Run { kernel: drawing(&plan.needs, VISIBILITY), over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
     let fresh = |page| plan.projects_in(band) && page == 0;
@@ -162,7 +213,8 @@ pub fn visibility(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
 /// The attribute pass of the large splats of some pages.
 pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
     let draw = |page| {
-        let stage = Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Tiles }]);
+        let stage =
+            Stage::new("accumulate", band, vec![Run { kernel: drawing(&plan.needs, ACCUMULATE), over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
     // With one page the lists of the first pass are still there in the second.
@@ -175,7 +227,8 @@ pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
 /// the surfaces of a separate input.
 pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
     let mut runs = covered::runs(covered::LISTS).to_vec();
-    runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
+    let over = if staged(&plan.needs) { Over::Covered } else { Over::CoveredEights };
+    runs.push(Run { kernel: drawing(&plan.needs, RESOLVE), over });
     let separate = plan.needs.surface.separate();
     let clears = if separate { individuals::clears(plan, band, page == 0) } else { covered::clears(plan, band) };
     let stage = Stage::new("accumulate", band, runs).of_page(page).after(clears);

@@ -35,7 +35,7 @@ pub use optimisation::Optimisation;
 pub use pixel::{COLOR_CHANNEL, NO_MAP, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use settings::{BackendName, Organisation, Settings};
-pub use surface::{Rasterised, Splats, Surface, Winner};
+pub use surface::{Fetch, Rasterised, Splats, Surface, Winner};
 pub use surfel::{SurfelLayout, splat_words};
 pub use view::{depths, device_unit, farthest};
 
@@ -112,7 +112,9 @@ fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
 /// Whether tiles sum all splats, if those that blend with each other fit one page.
 fn gathers(needs: &SceneNeeds, options: &Settings, known: &Known) -> bool {
     let pays = match options.organisation {
-        Organisation::Auto => needs.surface.subgroups() && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
+        Organisation::Auto => {
+            needs.surface.fetch() == Some(Fetch::Shared) && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES
+        }
         Organisation::Tile => true,
         Organisation::Scatter => false,
     };

@@ -246,8 +246,8 @@ impl SceneNeeds {
                 Surface::Blended { splats: Splats::Copies, separate: false }
             }
             Surface::Blended { splats: Splats::Tiles { gather, .. }, separate } => {
-                let subgroups = tuning::shares(adapter) && options.has(Optimisation::Sharing);
-                Surface::Blended { splats: Splats::Tiles { gather, subgroups }, separate }
+                let fetch = tuning::fetch(adapter, options.has(Optimisation::Sharing));
+                Surface::Blended { splats: Splats::Tiles { gather, fetch }, separate }
             }
             Surface::Raster { raster, shown, .. } => {
                 let triangles = tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64;

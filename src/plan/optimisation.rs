@@ -27,7 +27,7 @@ pub enum Optimisation {
     LongWords,
     /// Tiles sum small splats too (`passes/tiles.rs`).
     Gathering,
-    /// The invocations of a tile share what they fetch (`wgsl/project/splat_shared.wgsl`).
+    /// The invocations of a tile share what they fetch (`wgsl/tiles/splat_shared.wgsl`).
     Sharing,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,

@@ -79,7 +79,8 @@ pub enum Over {
     Pixels,
     /// One invocation per tile of the occlusion test.
     Occlusion,
-    /// Eight invocations (one row of pixels) per tile of the large splats.
+    /// All tiles of the large splats: eight invocations for each, or one workgroup where a tile has
+    /// an invocation for each pixel.
     Tiles,
     /// One invocation per list that may be processed in rounds; there may be fewer such lists.
     LongLists,

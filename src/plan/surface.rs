@@ -59,10 +59,23 @@ pub enum Splats {
         /// Tiles sum all splats, large and small, and resolve their pixels directly, so no sums are
         /// stored. With separate inputs they keep what the input shows instead.
         gather: bool,
-        /// The invocations of a subgroup read a splat's record together. A software adapter would
-        /// otherwise read the record once per invocation.
-        subgroups: bool,
+        /// The invocations of a tile, and how they get the splats that they draw.
+        fetch: Fetch,
     },
+}
+
+/// The invocations of a tile, and how they get the splats that they draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fetch {
+    /// Eight invocations, each with a column of pixels, fetch eight splats and exchange them by
+    /// subgroup operations (`wgsl/tiles/tile.wgsl`, `splat_shared.wgsl`).
+    Shared,
+    /// Eight invocations, each with a column of pixels, fetch each splat for themselves
+    /// (`splat_plain.wgsl`).
+    Alone,
+    /// An invocation for each pixel; all of them read splats that were copied to workgroup memory
+    /// (`wgsl/tiles/staged.wgsl`).
+    Staged,
 }
 
 /// How compute kernels find the only fragment that shows at a pixel
@@ -115,7 +128,7 @@ impl Surface {
             None => Self::Blended {
                 splats: match options.accumulator {
                     Accumulator::Fixed if options.organisation != Organisation::Scatter => {
-                        Splats::Tiles { gather: false, subgroups: false }
+                        Splats::Tiles { gather: false, fetch: Fetch::Alone }
                     }
                     _ => Splats::Scattered,
                 },
@@ -215,9 +228,12 @@ impl Surface {
         matches!(self, Self::Blended { splats: Splats::Tiles { gather: true, .. }, .. })
     }
 
-    /// Whether the invocations of a subgroup read a splat's record together.
-    pub fn subgroups(&self) -> bool {
-        matches!(self, Self::Blended { splats: Splats::Tiles { subgroups: true, .. }, .. })
+    /// How the invocations of a tile get splats; `None` if no tiles are drawn.
+    pub fn fetch(&self) -> Option<Fetch> {
+        match self {
+            Self::Blended { splats: Splats::Tiles { fetch, .. }, .. } => Some(*fetch),
+            _ => None,
+        }
     }
 
     /// The surface without the properties that depend on the number of drawn surfels.
@@ -230,8 +246,8 @@ impl Surface {
     /// ignores properties that it does not have.
     pub fn sized(self, gather: bool, veils: bool, long_lists: bool) -> Self {
         match self {
-            Self::Blended { splats: Splats::Tiles { subgroups, .. }, separate } => {
-                Self::Blended { splats: Splats::Tiles { gather, subgroups }, separate }
+            Self::Blended { splats: Splats::Tiles { fetch, .. }, separate } => {
+                Self::Blended { splats: Splats::Tiles { gather, fetch }, separate }
             }
             Self::Layers { .. } => Self::Layers { long_lists },
             Self::Sorted { .. } => Self::Sorted { long_lists, veils },

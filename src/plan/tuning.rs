@@ -3,6 +3,7 @@
 //! All were measured on Mesa 22.3's llvmpipe, a software adapter, at 1024x1024. None was measured
 //! on a graphics card yet.
 
+use super::Fetch;
 use crate::gpu::adapter::AdapterDescription;
 
 /// Batches are culled if there is more than one surfel per this many pixels. With culling, frames
@@ -39,9 +40,14 @@ pub const MOST_FRAGMENT_BYTES: u64 = 1 << 29;
 /// Rows per strip, which one thread of the f64 reference renders at a time.
 pub const REFERENCE_ROWS: u32 = 8;
 
-/// Whether the invocations of a tile share what they fetch. A software adapter would otherwise
-/// fetch the same data for each invocation. A graphics card has caches for that, and sharing has
-/// not been measured there.
-pub fn shares(adapter: &AdapterDescription) -> bool {
-    adapter.subgroups && adapter.is_software()
+/// How the invocations of a tile get splats. A processor draws eight pixels of a splat with the
+/// registers of one core, and should fetch it once for all of them. On the bunny a graphics card
+/// (RDNA 2) keeps 4 of 32 waves with the registers of such a tile, and 16 or more with those of one
+/// pixel; a processor takes 30 times as long with one pixel an invocation.
+pub fn fetch(adapter: &AdapterDescription, shares: bool) -> Fetch {
+    match (adapter.is_software(), adapter.subgroups && shares) {
+        (false, _) => Fetch::Staged,
+        (true, true) => Fetch::Shared,
+        (true, false) => Fetch::Alone,
+    }
 }

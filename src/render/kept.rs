@@ -18,7 +18,7 @@ use crate::passes::source::Source;
 use crate::passes::upload::upload;
 use crate::passes::{asks_for_order, finish, tiles};
 use crate::plan::known::MOST_TRIES;
-use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, Settings, tuning};
+use crate::plan::{Facts, Fetch, Known, Optimisation, Organisation, Plan, Settings, tuning};
 use crate::progress::Progress;
 use crate::scene::Camera;
 
@@ -103,8 +103,8 @@ impl Kept {
             self.size = size;
         }
         let options = &self.options;
-        let matters = options.organisation == Organisation::Auto && tuning::shares(&gpu.adapter);
-        if matters && options.has(Optimisation::Gathering) && options.has(Optimisation::Sharing) {
+        let shares = tuning::fetch(&gpu.adapter, options.has(Optimisation::Sharing)) == Fetch::Shared;
+        if shares && options.organisation == Organisation::Auto && options.has(Optimisation::Gathering) {
             self.known.touched_tiles = tiles::touched(&self.facts, camera, options);
         }
     }

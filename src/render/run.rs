@@ -10,7 +10,7 @@ use crate::gpu::buffers::{Buffer, Image};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
     BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID,
-    TILE_WIDTH,
+    TILE_WIDTH, WORKGROUP,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
@@ -373,8 +373,8 @@ pub(super) fn over<'a>(
         Over::Pixels => plan.bands[band].pixels,
         Over::LongLists => store.buffer("long_lists").map_or(0, |kept| long_lists::room(kept.len)),
         Over::Tiles => {
-            let rows = plan.bands[band].rows.div_ceil(tiles::rows(&plan.needs));
-            u64::from(plan.width.div_ceil(TILE_WIDTH)) * u64::from(rows) * u64::from(TILE_WIDTH)
+            let each = if tiles::staged(&plan.needs) { WORKGROUP } else { TILE_WIDTH };
+            tiles::tiles_in(&plan.needs, plan.width, &plan.bands[band]) * u64::from(each)
         }
     };
     Ok(Grid::Of(grid(gpu, invocations)?))

@@ -46,7 +46,8 @@ const ALIASES: [(&str, &str); 20] = [
 ];
 
 /// Names of the buffers that each page, or its branch, has of its own.
-const PAGED: [&str; 10] = ["attributes", "balls", "boxes", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
+const PAGED: [&str; 10] =
+    ["attributes", "balls", "boxes", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
 /// Returns the name under which a buffer is stored.
 pub(super) fn kept(name: &str) -> &str {

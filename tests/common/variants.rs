@@ -73,7 +73,7 @@ fn values(needs: &SceneNeeds) -> Vec<String> {
         format!("epsilon {:?}", needs.epsilon),
         format!("sides {:?}", needs.sides),
         format!("winner {:?}", surface.winner()),
-        format!("subgroups {}", surface.subgroups()),
+        format!("fetch {:?}", surface.fetch()),
         format!("triangle per splat {}", surface.by_triangles()),
         format!("once {:?}", needs.mesh.map(|mesh| mesh.once)),
     ];

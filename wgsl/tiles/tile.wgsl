@@ -1,65 +1,35 @@
-// Stages 2 to 4 by tiles of the image, from the lists that bin.wgsl made. Each tile has eight
-// invocations, and each of them keeps one column of the tile's pixels in registers. Where fetching
-// a splat costs as much as drawing its pixels, tiles are twice as high as wide; the upper and the
-// lower eight rows are then drawn separately, each half with the splats that reach it. Every bit of
-// the result is that of visibility.wgsl and accumulate.wgsl.
-// Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x123395bc59143c44
-// #import *::{Term, front_at, show}
+// Stages 2 to 4 by tiles of the image on a processor, from the lists that bin.wgsl made. Each tile
+// has eight invocations, and each of them keeps one column of the tile's pixels in registers.
+// Fetching a splat costs as much as drawing its pixels, so tiles are twice as high as wide; the
+// upper and the lower eight rows are drawn separately, each half with the splats that reach it.
+// Every bit of the result is that of visibility.wgsl and accumulate.wgsl.
+// Same interface as staged.wgsl. Host side: src/passes/tiles.rs.
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xa5d29f85787a0471
+// #import *::{show}
 // #import accumulator_raster|visibility::{nearest}
-// #import bin::{BLOCK_SIDE, BLOCK_SIZE, LIST_ENDS, cells_across, lists_start}
-// #import blend::{blend_weighted, weight_of}
 // #import blend|winner::{Attributes, attributes_of}
-// #import covered::{TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across, tiles_in_band}
+// #import column::{Column, all_listed, column_at, front_of, gather, large_listed, listed_slot}
+// #import covered::{TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across}
 // #import cull::{surfel_in}
 // #import epsilon_*::{deepest_accepted}
 // #import fade::{takes_sample}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{footprint}
-// #import layout::{NOTHING, Splat, WORKGROUP, held, held_band, hold, kept_depth, linear_index}
-// #import normal_*::{normal_at}
+// #import hand_*::{handed_bend, handed_cap, handed_clip, handed_fade, handed_filter, handed_place}
+// #import hand_*::{handed_side}
+// #import layout::{Splat, WORKGROUP, held, hold, kept_depth, linear_index}
 // #import raster|visibility::{projected}
 // #import records::{splat_of}
-// #import side::{is_shown}
 // #import splat_*::{FETCHED, farthest_in_tile, fetcher, handed, hold_lane, offered}
-// #import texture::{accumulate_place}
-// #import tile_*::{handed_bend, handed_cap, handed_place, handed_side, resolve_column}
-// #import tile_clip::{handed_clip}
-// #import tile_fade::{handed_fade}
-// #import tile_filter::{handed_filter}
+// #import tile_*::{resolve_column}
 // #import tile_reach::{reaches}
-// #import tile_small::{small_entry, small_list}
 // #import tile_sums::{deposit}
 
-// The lists of the large splats.
-@group(0) @binding(27) var<storage, read> large_lists: array<u32>;
-
-// The pixels of this invocation, from (x, y) down. `pixel` is the index of the first one in the
-// band, `pixels` is their number, without those past the edge of the image. `large` and `small` are
-// the start and the end of the tile's list of large and of small splats.
-struct Column {
-    x: u32,
-    y: u32,
-    pixel: u32,
-    pixels: u32,
-    large: vec2<u32>,
-    small: vec2<u32>,
-}
-
 // The column of `tile` that invocation `local` draws: a workgroup has eight tiles, of eight
-// invocations each. A number that is no tile gives a column without pixels.
+// invocations each.
 fn column_of(tile: u32, local: u32) -> Column {
     let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
-    let row = tile / tiles_across() * TILE_ROWS;
-    var column = Column(x, row + held_band.first_row, row * held.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
-    if (tile < tiles_in_band()) {
-        let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIZE) + x / BLOCK_SIDE;
-        let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIZE);
-        column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
-        column.small = small_list(tile);
-        column.pixels = select(0u, min(TILE_ROWS, held_band.rows - row), x < held.width);
-    }
-    return column;
+    return column_at(tile, x, tile / tiles_across() * TILE_ROWS, TILE_ROWS);
 }
 
 // The column of this invocation in a dispatch over all tiles.
@@ -77,21 +47,16 @@ var<private> own_filter: Filter;
 // that may have a fragment no deeper than `deepest`.
 fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u32> {
     let at = place + fetcher();
-    let large = column.large.y - column.large.x;
+    let first = vec2<u32>(column.x / TILE_WIDTH * TILE_WIDTH, column.y);
     var wanted = vec2<bool>(false);
     if (at < listed) {
-        var slot: u32;
-        if (at < large) {
-            slot = large_lists[column.large.x + at];
-        } else {
-            slot = small_entry(column.small.x + (at - large));
-        }
+        let slot = listed_slot(column, at);
         let record = projected[slot];
         own_surfel = surfel_in(record, slot);
         own_splat = splat_of(record);
         own_filter = filter_in(record);
-        wanted.x = reaches(own_splat, own_filter, column, 0u, deepest.x);
-        wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, column, 8u, deepest.y);
+        wanted.x = reaches(own_splat, own_filter, first, 8u, deepest.x);
+        wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, first + vec2<u32>(0u, 8u), 8u, deepest.y);
     }
     return vec2<u32>(offered(wanted.x), offered(wanted.y));
 }
@@ -193,7 +158,7 @@ fn tile_visibility(
     hold();
     hold_lane();
     let column = column_of_all(workgroup, workgroups, local);
-    let listed = column.large.y - column.large.x;
+    let listed = large_listed(column);
     if (listed == 0u) {
         return;
     }
@@ -226,31 +191,8 @@ fn tile_visibility(
     store(column, 12u, d);
 }
 
-// The nearest depth at pixel `k` of the column; 0, in front of every fragment, if the pixel is
-// empty or past the end of the column.
-fn front_of(column: Column, k: u32) -> f32 {
-    if (k >= column.pixels) {
-        return 0.0;
-    }
-    let front = front_at(column.pixel + k * held.width);
-    return select(front, 0.0, bitcast<u32>(front) == NOTHING);
-}
-
 fn fronts_of(column: Column, k: u32) -> vec4<f32> {
     return vec4<f32>(front_of(column, k), front_of(column, k + 1u), front_of(column, k + 2u), front_of(column, k + 3u));
-}
-
-fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
-    let fragment = footprint(splat, filter_, column.x, column.y + slot);
-    // A rejected fragment adds a weight of 0. For a branch, a compiler would emit a select for each
-    // stored sum instead.
-    let at = vec2<u32>(column.x, column.y + slot);
-    let accepted = is_shown(fragment, front, attributes.radius, at);
-    let weight = select(Term(0), weight_of(fragment), accepted);
-    let depth = select(front, fragment.depth, accepted);
-    let normal = normal_at(attributes, fragment.spot);
-    accumulate_place(slot, weight, attributes.place, at, depth);
-    blend_weighted(slot, weight, depth, front, normal, attributes);
 }
 
 // Sums the fragments of a splat at eight pixels of the column, from `slot` on; `a` and `b` have the
@@ -277,7 +219,7 @@ fn sum_tile(column: Column) {
     let c = fronts_of(column, 8u);
     let d = fronts_of(column, 12u);
     let deepest = vec2<f32>(deepest_accepted(farthest_of(a, b)), deepest_accepted(farthest_of(c, d)));
-    let listed = (column.large.y - column.large.x) + (column.small.y - column.small.x);
+    let listed = all_listed(column);
     for (var place = 0u; place < listed; place += FETCHED) {
         var wanted = fetch(place, listed, column, deepest);
         let own_attributes = attributes_of(own_surfel, own_splat);
@@ -304,7 +246,7 @@ fn tile_accumulate(
     hold();
     hold_lane();
     let column = column_of_all(workgroup, workgroups, local);
-    if (column.large.x == column.large.y) {
+    if (large_listed(column) == 0u) {
         return;
     }
     sum_tile(column);

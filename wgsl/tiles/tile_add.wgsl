@@ -3,7 +3,7 @@
 // is the pixel's slot in the column.
 // #import *::{Term}
 // #import terms|terms_wide::{term_words}
-// #import tile_sums::{add_words}
+// #import staged_sums|tile_sums::{add_words}
 
 @group(0) @binding(8) var<storage, read_write> sums: array<u32>;
 

@@ -1,39 +1,10 @@
-// Caps in tiles: the cap of a splat that another invocation fetched (tile.wgsl). Same interface as
-// tile_flat.wgsl.
+// Caps in tiles. Same interface as tile_flat.wgsl.
 // #import curved::{extremes}
-// #import curved|facing|flat::{Bend, Cap}
-// #import filter|lowpass_none::{FILTERED, Filter}
+// #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle}
 // #import layout::{Splat}
-// #import splat_*::{handed}
-// #import tile::{handed_number, handed_vector}
 // #import tile_filter::{filter_misses}
 // #import tile_reach::{exceeds, longest, span}
-
-// bounds_last, whose AWAY bit softened() reads if there is a low-pass. Without one the root of the
-// intersection tells the side.
-fn handed_side(own: u32, from_: u32) -> u32 {
-    var last = 0u;
-    if (FILTERED) {
-        last = handed(own, from_);
-    }
-    return last;
-}
-
-fn handed_cap(own: Cap, from_: u32) -> Cap {
-    return Cap(
-        handed_vector(own.heights, from_),
-        handed_number(own.spread, from_),
-        handed_number(own.radius, from_),
-        handed_number(own.depth, from_),
-        // Only the invocation that fetched the splat reads `nearest`.
-        0.0,
-    );
-}
-
-fn handed_bend(own: Bend, from_: u32) -> Bend {
-    return Bend(handed_vector(own.u, from_), handed_vector(own.v, from_));
-}
 
 // Whether the splat has no fragment at `pixels`, which lie in its bounds. A ray meets the plane of
 // a height h over the disk's plane where (u, v) (D_w + spread W) = (U, V) D_w - W (D_u, D_v) + h N,

@@ -1,6 +1,6 @@
 // Stored sums of two words each, low and high. Same interface as tile_deposit_pairs.wgsl.
 // #import *::{CHANNELS, sums}
-// #import tile_sums::{sum_words}
+// #import staged_sums|tile_sums::{sum_words}
 
 fn deposit_one(word: u32, value: vec2<u32>) {
     let sum = sum_words(vec2<u32>(sums[word], sums[word + 1u]), value);

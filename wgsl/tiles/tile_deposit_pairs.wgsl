@@ -1,7 +1,7 @@
 // Stored sums in the layout of accumulator_fixed_pairs.wgsl: one u64 has the low words of two sums,
 // the next one counts the carries of each. The second sum also includes the carries of the first.
 // #import *::{CHANNELS, sums}
-// #import tile_sums::{sum_words}
+// #import staged_sums|tile_sums::{sum_words}
 
 fn deposit_sums(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>) {
     let word = 2u * (pixel * CHANNELS + channel);

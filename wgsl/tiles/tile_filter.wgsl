@@ -1,21 +1,6 @@
-// The low-pass in tiles: the filter of a splat that another invocation fetched (tile.wgsl), and the
-// pixels where it adds nothing (tile_reach.wgsl).
+// The low-pass in tiles: the pixels where it adds nothing (tile_reach.wgsl).
 // #import filter|lowpass_none::{Filter}
-// #import tile::{handed_number}
 // #import tile_reach::{exceeds, span}
-
-fn handed_filter(own: Filter, from_: u32) -> Filter {
-    return Filter(
-        handed_number(own.center_x, from_),
-        handed_number(own.center_y, from_),
-        handed_number(own.depth_low, from_),
-        handed_number(own.depth_high, from_),
-        handed_number(own.r_xx, from_),
-        handed_number(own.r_xy, from_),
-        handed_number(own.r_yy, from_),
-        handed_number(own.gain, from_),
-    );
-}
 
 // Whether the filter adds no fragment between the pixels `low` and `high`, relative to the anchor.
 fn filter_misses(filter_: Filter, low: vec2<f32>, high: vec2<f32>) -> bool {

@@ -1,30 +1,10 @@
 // Disks in tiles. Same interface as tile_curved.wgsl.
 // #import camera_*::{rim}
-// #import curved|facing|flat::{Bend, Cap}
 // #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle}
 // #import layout::{Splat}
-// #import side::{SIDES}
-// #import splat_*::{handed}
 // #import tile_filter::{filter_misses}
 // #import tile_reach::{exceeds, span}
-
-// bounds_last, whose AWAY bit is_away() reads if a pixel shows one side.
-fn handed_side(own: u32, from_: u32) -> u32 {
-    var last = 0u;
-    if (SIDES) {
-        last = handed(own, from_);
-    }
-    return last;
-}
-
-fn handed_cap(own: Cap, from_: u32) -> Cap {
-    return own;
-}
-
-fn handed_bend(own: Bend, from_: u32) -> Bend {
-    return own;
-}
 
 // Whether the splat has no fragment at `pixels`, which lie in its bounds: the splat's ellipse
 // misses the corners of its bounds.

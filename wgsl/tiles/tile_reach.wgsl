@@ -1,11 +1,8 @@
-// Decides whether a splat may have fragments in the upper or the lower rows of a tile. The tests
-// are conservative, so no image depends on them.
-// #import covered::{TILE_WIDTH}
+// Decides whether a splat may have fragments in a square of pixels. The tests are conservative, so no image depends on them.
 // #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle, reach}
 // #import layout::{Splat}
 // #import occlusion::{HIDES, nearest_reached}
-// #import tile::{Column}
 // #import tile_*::{misses}
 // #import vectors::{dot2}
 
@@ -46,12 +43,11 @@ fn exceeds(s: Span, length: f32) -> bool {
     return dot2(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
 }
 
-// Whether the splat may have a fragment no deeper than `deepest` in the eight rows of the tile from
-// `row` on.
-fn reaches(splat: Splat, filter_: Filter, column: Column, row: u32, deepest: f32) -> bool {
+// Whether the splat may have a fragment no deeper than `deepest` in the square of `side` pixels
+// whose first pixel is `first`.
+fn reaches(splat: Splat, filter_: Filter, first: vec2<u32>, side: u32, deepest: f32) -> bool {
     let extent = reach(splat);
-    let first = vec2<u32>(column.x / TILE_WIDTH * TILE_WIDTH, column.y + row);
-    let pixels = Rectangle(max(extent.first, first), min(extent.last, first + 7u));
+    let pixels = Rectangle(max(extent.first, first), min(extent.last, first + (side - 1u)));
     return all(pixels.first <= pixels.last)
         && (HIDES == 0u || nearest_reached(splat, filter_, pixels) <= deepest)
         && !misses(splat, filter_, pixels);

@@ -1,11 +1,11 @@
 // Resolves the samples of a tile's column. A pixel may have samples in several columns; they are
 // added in the order of resolve_samples.wgsl. Same interface as tile_pixels.wgsl.
 // All loops end, by 1 of src/gpu/loops.rs: 0xe8f9843fa8bb0301
+// #import column::{Column}
 // #import covered::{TILE_ROWS}
 // #import layout::{WORKGROUP, held, held_band}
 // #import resolve_*::{sample_color}
 // #import resolve_samples::{SAMPLES_ACROSS, SAMPLES_DOWN, write_mean}
-// #import tile::{Column}
 
 var<workgroup> of_column: array<vec4<f32>, WORKGROUP>;
 

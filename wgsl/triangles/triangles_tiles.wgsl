@@ -1,8 +1,8 @@
 // The list of image tiles in which triangles show. Pixels of other tiles are not shaded, nor read
 // when splats and triangles are joined. Same interface as triangles_tiles_absent.wgsl.
 // Host side: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x5a024c5f69138886
-// #import covered::{TILE_ROWS}
+// All loops end, by 1 of src/gpu/loops.rs: 0x739883655b001de7
+// #import covered::{TILE_ROWS, TILE_WIDTH, tiles_across}
 // #import footprint::{band_pixels}
 // #import join::{beside}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
@@ -77,11 +77,17 @@ fn shows_triangles(x: u32, row: u32) -> bool {
     return tile_has_triangles(row / TRIANGLE_TILE * triangle_tiles_across() + x / TRIANGLE_TILE);
 }
 
-// Whether triangles show in a tile of covered.wgsl. Such a tile consists of one tile of this file,
-// or of two, one above the other.
+// Whether triangles show in a tile of covered.wgsl, which consists of whole tiles of this file.
 fn has_triangles(tile: u32) -> bool {
-    let upper = tile / triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE) * triangle_tiles_across() + tile % triangle_tiles_across();
-    let below = upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u);
-    let lower = select(upper, below, below < triangle_tiles_in_band());
-    return tile_has_triangles(upper) || tile_has_triangles(lower);
+    let across = triangle_tiles_across();
+    let size = vec2<u32>(TILE_WIDTH, TILE_ROWS) / TRIANGLE_TILE;
+    let first = vec2<u32>(tile % tiles_across(), tile / tiles_across()) * size;
+    let end = min(first + size, vec2<u32>(across, triangle_tiles_in_band() / across));
+    var shows = false;
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            shows = shows || tile_has_triangles(y * across + x);
+        }
+    }
+    return shows;
 }

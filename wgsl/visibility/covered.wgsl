@@ -1,6 +1,6 @@
 // The start of stage 4: lists the tiles of the image that are not empty. Empty tiles keep the
 // cleared values, and no invocation visits their pixels. Host side: src/passes/covered.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd09eb1f53779705e
+// All loops end, by 1 of src/gpu/loops.rs: 0x19e76a958fe8075b
 // #import accumulator_raster|front::{visible}
 // #import accumulator_raster|occlusion::{covered_start, has_any}
 // #import accumulator_raster|visibility::{nearest}
@@ -8,8 +8,8 @@
 // #import project::{rows_of}
 // #import triangles_tiles::{has_triangles}
 
-// The size of a tile, pixels.
-const TILE_WIDTH: u32 = 8u;
+// The size of a tile, pixels: multiples of OCCLUSION_TILE.
+override TILE_WIDTH: u32;
 override TILE_ROWS: u32;
 
 // 1 if all tiles are listed, because empty pixels of the image differ from 0 or layers are peeled.

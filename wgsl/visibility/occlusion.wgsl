@@ -1,11 +1,11 @@
 // The end of stage 2: stores the farthest of the nearest depths in each tile of pixels. With these,
 // stage 3 skips completely hidden splats without reading their pixels. Skipping changes no image.
 // Host side: src/passes/visibility.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xc48f03445918a49c
+// All loops end, by 1 of src/gpu/loops.rs: 0x144ee753078b142b
 // #import *::{nearest_at}
 // #import accumulator_raster|front::{visible}
 // #import accumulator_raster|visibility::{nearest}
-// #import covered::{TILE_ROWS}
+// #import covered::{TILE_ROWS, TILE_WIDTH, tiles_across}
 // #import curved|facing|flat::{nearest_on}
 // #import epsilon_*::{farthest_accepted}
 // #import filter|lowpass_none::{Filter, least_filtered}
@@ -43,15 +43,17 @@ fn covered_start() -> u32 {
     return band_pixels() + tiles.x * tiles.y;
 }
 
-// Whether a tile of covered.wgsl has a fragment. Such a tile consists of one occlusion tile, or of
-// two, one above the other.
+// Whether a tile of covered.wgsl, which consists of whole occlusion tiles, has a fragment.
 fn has_any(tile: u32) -> bool {
     let tiles = occlusion_tiles();
-    let y = tile / tiles.x * (TILE_ROWS / OCCLUSION_TILE);
-    let upper = band_pixels() + y * tiles.x + tile % tiles.x;
-    var farthest = atomicLoad(&nearest[upper]);
-    if (TILE_ROWS > OCCLUSION_TILE && y + 1u < tiles.y) {
-        farthest |= atomicLoad(&nearest[upper + tiles.x]);
+    let size = vec2<u32>(TILE_WIDTH, TILE_ROWS) / OCCLUSION_TILE;
+    let first = vec2<u32>(tile % tiles_across(), tile / tiles_across()) * size;
+    let end = min(first + size, tiles);
+    var farthest = 0u;
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            farthest |= atomicLoad(&nearest[band_pixels() + y * tiles.x + x]);
+        }
     }
     return farthest != 0u;
 }

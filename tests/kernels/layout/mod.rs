@@ -17,7 +17,7 @@ use epsplat::low_level::gpu::interface::reflect;
 use epsplat::low_level::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, JUDGED, KIND_SHIFT,
     LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
-    QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
+    QUEUE_START, RUN, SPREAD_GRID, TILE, WORKGROUP,
 };
 use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::passes;
@@ -138,7 +138,6 @@ fn constants_agree() {
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
             ("QUEUE_LISTING", QUEUE_LISTING),
-            ("TILE_WIDTH", TILE_WIDTH),
             ("COVERED_LIST", COVERED_LIST),
             ("COVERED_GRID", COVERED_GRID),
             ("COVERED_GRID_OF_EIGHTS", COVERED_GRID_OF_EIGHTS),

@@ -1,4 +1,4 @@
-// Clipped disks in tiles: the clip lines of a splat that another invocation fetched (tile.wgsl).
+// Clipped disks in columns: the clip lines of a splat that another invocation fetched (tile.wgsl).
 // #import clip::{Clip}
 // #import tile::{handed_vector}
 

@@ -1,0 +1,5 @@
+// #import texture::{Place}
+
+fn handed_place(own: Place, from_: u32) -> Place {
+    return own;
+}

@@ -154,8 +154,8 @@ impl Module {
         Ok(Entry { name, told: Told::Words(words) })
     }
 
-    /// Returns the SPIR-V of the entry point `name` that binds `bindings`, for a device with these features
-    /// and limits. Sets those of `constants` that the module declares.
+    /// Returns the SPIR-V of the entry point `name` that binds `bindings`, for a device with these
+    /// features and limits. Sets those of `constants` that the module declares.
     ///
     /// # Errors
     /// A message if the translator refuses the module, or its workgroup is too large.

@@ -24,6 +24,9 @@ use table::{Row, Table};
 /// file for the outcome.
 const COMPILES: &str = "EPSPLAT_REGISTERS_OUTCOME";
 
+/// The file of the table.
+const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/registers.txt");
+
 /// Stack size of a compiling thread: that of a process's first thread.
 const COMPILER_STACK: usize = 8 << 20;
 
@@ -88,7 +91,11 @@ fn compiled() -> Outcome {
         different.insert(&kernel.words, kernel);
     });
     let different: Vec<&Translated> = different.into_values().collect();
-    let compile = |kernel: &Translated| card.compile(kernel).unwrap_or_else(|e| panic!("{}: {e}", kernel.name));
+    let compile = |kernel: &Translated| {
+        // The last lines name the kernels whose compilation crashed the driver.
+        eprintln!("compiling {}", kernel.name);
+        card.compile(kernel).unwrap_or_else(|e| panic!("{}: {e}", kernel.name))
+    };
     let pool = rayon::ThreadPoolBuilder::new().stack_size(COMPILER_STACK).build().unwrap();
     let figures: HashMap<&[u32], Figures> =
         pool.install(|| different.par_iter().map(|kernel| (kernel.words.as_slice(), compile(kernel))).collect());
@@ -115,7 +122,7 @@ fn by_another_process(manifest: &Path) -> Outcome {
     });
     let output = command.output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{told}");
+    assert!(output.status.success(), "{told}\nthe compiling process ended with {}", output.status);
     serde_json::from_slice(&std::fs::read(file.path()).unwrap()).unwrap_or_else(|e| panic!("{e}: {told}"))
 }
 
@@ -144,13 +151,12 @@ fn no_kernel_needs_more_registers_than_before() {
     // Control: the driver reports the memory of arrays that do not fit registers.
     assert!(control.scratch >= 64 * 4096, "{control:?}");
     assert!(made.rows.len() > 100, "{}", made.rows.len());
-    let kept = Table::read(include_str!("../../golden/registers.txt"));
+    let kept = Table::read(&std::fs::read_to_string(TABLE).unwrap());
     if let Ok(reason) = std::env::var("EPSPLAT_REGISTERS") {
         let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(reason.contains(' '), "EPSPLAT_REGISTERS says in words why the figures change");
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/registers.txt");
-        std::fs::write(path, kept.renewed(&made, &reason).written()).unwrap();
-        // The file leaves out the counts of instructions, as they change with every version of Mesa.
+        std::fs::write(TABLE, kept.renewed(&made, &reason).written()).unwrap();
+        // The file leaves out the counts of instructions, which change with Mesa's version.
         for Row { configuration, kernel, figures, .. } in &made.rows {
             println!("{configuration}: {kernel}: {figures:?}");
         }

@@ -126,8 +126,8 @@ impl Draw {
         let bound = module
             .bind(gpu, &[(wgpu::ShaderStages::VERTEX, self.vertex), (wgpu::ShaderStages::FRAGMENT, self.fragment)])?;
         module.check_stages(gpu, [self.vertex, self.fragment], &self.targets)?;
-        let vertex = module.entry(gpu, (naga::ShaderStage::Vertex, self.vertex), &bound, &constants)?;
-        let fragment = module.entry(gpu, (naga::ShaderStage::Fragment, self.fragment), &bound, &constants)?;
+        let vertex = module.entry(gpu, (naga::ShaderStage::Vertex, self.vertex), &bound.bindings, &constants)?;
+        let fragment = module.entry(gpu, (naga::ShaderStage::Fragment, self.fragment), &bound.bindings, &constants)?;
         let targets: Vec<_> = self.targets.iter().cloned().map(Some).collect();
         let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.name),
@@ -150,7 +150,7 @@ impl Draw {
             multiview_mask: None,
             cache: None,
         });
-        Ok((pipeline, bound.variables))
+        Ok((pipeline, bound.bindings.variables))
     }
 }
 
@@ -176,7 +176,7 @@ fn compute(
     constants: &[(&str, f64)],
 ) -> Result<(wgpu::ComputePipeline, Vec<(String, u32)>)> {
     let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
-    let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
+    let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound.bindings, constants)?;
     let make = || {
         Ok(gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(stage),
@@ -187,8 +187,8 @@ fn compute(
             cache: None,
         }))
     };
-    let pipeline = gpu.compiled.pipeline(entry.key(&bound), || watched(gpu, make))?;
-    Ok((pipeline, bound.variables))
+    let pipeline = gpu.compiled.pipeline(entry.key(&bound.bindings), || watched(gpu, make))?;
+    Ok((pipeline, bound.bindings.variables))
 }
 
 impl Program {

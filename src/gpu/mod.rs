@@ -2,6 +2,7 @@
 //! with WGSL.
 
 pub mod adapter;
+pub mod ahead;
 pub mod buffers;
 pub mod device;
 pub(crate) mod evaluate;

@@ -2,6 +2,7 @@
 
 use naga::valid::Capabilities;
 
+use super::adapter::AdapterDescription;
 use super::device::Gpu;
 use super::exact::Needs;
 use super::interface::Interface;
@@ -17,12 +18,17 @@ pub(super) struct Module {
     counts_loops: bool,
 }
 
-/// The bindings of a pipeline.
+/// The bindings of a pipeline, on its device.
 pub(super) struct Bound {
+    pub bindings: Numbered,
+    pub layout: wgpu::PipelineLayout,
+}
+
+/// The bindings of a pipeline.
+pub(super) struct Numbered {
     /// Names and binding numbers of its variables.
     pub variables: Vec<(String, u32)>,
-    pub layout: wgpu::PipelineLayout,
-    entries: Vec<wgpu::BindGroupLayoutEntry>,
+    pub entries: Vec<wgpu::BindGroupLayoutEntry>,
     /// The binding number of each variable in the WGSL source.
     of_text: Vec<u32>,
 }
@@ -41,9 +47,9 @@ enum Told {
 
 impl Entry<'_> {
     /// Returns the key of the pipeline in the cache; `None` for WGSL, which is not cached.
-    pub fn key(&self, bound: &Bound) -> Option<PipelineKey> {
+    pub fn key(&self, bindings: &Numbered) -> Option<PipelineKey> {
         match &self.told {
-            Told::Words(words) => Some((words.clone(), bound.entries.clone(), bound.variables.clone())),
+            Told::Words(words) => Some((words.clone(), bindings.entries.clone(), bindings.variables.clone())),
             Told::Text(_) => None,
         }
     }
@@ -58,24 +64,37 @@ impl Entry<'_> {
 }
 
 impl Module {
-    /// Parses and validates a module.
+    /// Parses and validates a module for a device.
     pub fn of(gpu: &Gpu, text: Text) -> Result<Self> {
-        let counts_loops = text.counts_loops;
         let spirv = gpu.takes_spirv();
         let capabilities = if spirv { spirv::capabilities(gpu.device.features()) } else { Capabilities::all() };
+        Self::settled(text, capabilities, &gpu.adapter, spirv).map_err(|what| gpu.error(what))
+    }
+
+    /// Parses and validates a module that may use `capabilities`, and replaces the operations whose
+    /// bits depend on `adapter`. `spirv` says whether the device takes SPIR-V.
+    ///
+    /// # Errors
+    /// A message if the text is not valid, or cannot be rewritten.
+    pub fn settled(
+        text: Text,
+        capabilities: Capabilities,
+        adapter: &AdapterDescription,
+        spirv: bool,
+    ) -> Result<Self, String> {
         let interface = Interface::of(&text.joined, capabilities).map_err(|invalid| {
             let told = invalid.told(|line| text.place_of(line));
-            gpu.error(format!("a kernel is not valid WGSL: {told}"))
+            format!("a kernel is not valid WGSL: {told}")
         })?;
         let needs = Needs {
-            division: text.divides || !gpu.adapter.rounds_division(),
-            integers: text.divides || !gpu.adapter.rounds_integers(),
-            barriers: !spirv && gpu.adapter.api != twin::API,
+            division: text.divides || !adapter.rounds_division(),
+            integers: text.divides || !adapter.rounds_integers(),
+            barriers: !spirv && adapter.api != twin::API,
         };
         let interface = interface
             .settled(capabilities, needs)
-            .map_err(|e| gpu.error(format!("the arithmetic of a kernel cannot be settled: {e}")))?;
-        Ok(Self { interface, counts_loops })
+            .map_err(|e| format!("the arithmetic of a kernel cannot be settled: {e}"))?;
+        Ok(Self { interface, counts_loops: text.counts_loops })
     }
 
     /// Checks that a draw's two stages and its targets match.
@@ -86,50 +105,78 @@ impl Module {
 
     /// Returns the bindings of a pipeline of `entries`, each with its stage.
     pub fn bind(&self, gpu: &Gpu, entries: &[(wgpu::ShaderStages, &str)]) -> Result<Bound> {
-        let layout = self.interface.layout(entries).map_err(|e| gpu.error(format!("a kernel cannot be bound: {e}")))?;
-        let of_text = layout.iter().map(|(_, entry)| entry.binding).collect();
-        let (mut variables, mut entries) = (Vec::new(), Vec::new());
-        for (place, (name, mut entry)) in layout.into_iter().enumerate() {
-            if gpu.takes_spirv() {
-                // Numbers bindings without gaps: then they are the same whether or not wgpu
-                // renumbers them.
-                entry.binding = place as u32;
-            }
-            variables.push((name, entry.binding));
-            entries.push(entry);
-        }
-        let group =
-            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+        let bindings = self.numbered(entries, gpu.takes_spirv()).map_err(|what| gpu.error(what))?;
+        let descriptor = wgpu::BindGroupLayoutDescriptor { label: None, entries: &bindings.entries };
+        let group = gpu.device.create_bind_group_layout(&descriptor);
         let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
             bind_group_layouts: &[Some(&group)],
             ..Default::default()
         });
-        Ok(Bound { variables, layout, entries, of_text })
+        Ok(Bound { bindings, layout })
     }
 
-    /// Prepares the entry point `name` of a pipeline that binds `bound`. Sets those of `constants`
-    /// that the module declares.
+    /// Returns the bindings of a pipeline of `entries`, each with its stage. With `spirv`, they are
+    /// numbered without gaps: then they are the same whether or not wgpu renumbers them.
+    ///
+    /// # Errors
+    /// A message if a variable cannot be bound.
+    pub fn numbered(&self, entries: &[(wgpu::ShaderStages, &str)], spirv: bool) -> Result<Numbered, String> {
+        let layout = self.interface.layout(entries).map_err(|e| format!("a kernel cannot be bound: {e}"))?;
+        let of_text = layout.iter().map(|(_, entry)| entry.binding).collect();
+        let (mut variables, mut entries) = (Vec::new(), Vec::new());
+        for (place, (name, mut entry)) in layout.into_iter().enumerate() {
+            if spirv {
+                entry.binding = place as u32;
+            }
+            variables.push((name, entry.binding));
+            entries.push(entry);
+        }
+        Ok(Numbered { variables, entries, of_text })
+    }
+
+    /// Prepares the entry point `name` of a pipeline that binds `bindings`. Sets those of
+    /// `constants` that the module declares.
     pub fn entry<'a>(
         &self,
         gpu: &Gpu,
         (stage, name): (naga::ShaderStage, &'a str),
-        bound: &Bound,
+        bindings: &Numbered,
         constants: &[(&'a str, f64)],
     ) -> Result<Entry<'a>> {
-        let declared = self.interface.overrides();
-        let constants: Vec<_> =
-            constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
         let failed = |e: String| gpu.error(format!("the kernel {name} cannot be translated: {e}"));
         if !gpu.takes_spirv() {
-            let text = self.interface.text_of((stage, name), &constants).map_err(failed)?;
+            let text = self.interface.text_of((stage, name), &self.declared(constants)).map_err(failed)?;
             return Ok(Entry { name, told: Told::Text(translated_by_wgpu(gpu, text, self.counts_loops)) });
         }
-        let numbers = bound.of_text.iter().zip(&bound.entries).map(|(&of_text, entry)| (of_text, entry.binding));
-        let options = spirv::options(gpu.device.features(), numbers, self.counts_loops);
-        let words = spirv::translate(&self.interface, (stage, name), &constants, (&options, &gpu.device.limits()))
-            .map_err(failed)?;
+        let (features, limits) = (gpu.device.features(), gpu.device.limits());
+        let words = self.words(stage, name, bindings, constants, features, &limits).map_err(failed)?;
         Ok(Entry { name, told: Told::Words(words) })
+    }
+
+    /// Returns the SPIR-V of the entry point `name` that binds `bindings`, for a device with these
+    /// features and limits. Sets those of `constants` that the module declares.
+    ///
+    /// # Errors
+    /// A message if the translator refuses the module, or its workgroup is too large.
+    pub fn words(
+        &self,
+        stage: naga::ShaderStage,
+        name: &str,
+        bindings: &Numbered,
+        constants: &[(&str, f64)],
+        features: wgpu::Features,
+        limits: &wgpu::Limits,
+    ) -> Result<Vec<u32>, String> {
+        let numbers = bindings.of_text.iter().zip(&bindings.entries).map(|(&of_text, entry)| (of_text, entry.binding));
+        let options = spirv::options(features, numbers, self.counts_loops);
+        spirv::translate(&self.interface, (stage, name), &self.declared(constants), (&options, limits))
+    }
+
+    /// Returns those of `constants` that the module declares.
+    fn declared<'a>(&self, constants: &[(&'a str, f64)]) -> Vec<(&'a str, f64)> {
+        let declared = self.interface.overrides();
+        constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect()
     }
 }
 

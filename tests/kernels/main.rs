@@ -15,6 +15,7 @@ mod long_lists;
 mod lowpass;
 mod optimisations;
 mod plans;
+mod registers;
 mod rounding;
 mod shaders;
 mod slots;

@@ -9,8 +9,8 @@ use super::card::Figures;
 /// Registers are allocated in multiples of this number.
 const GRANULE: u64 = 8;
 
-/// Registers of a SIMD, for subgroups of 64 lanes. The driver's number of waves is twice this number
-/// divided by a kernel's registers and rounded down, or less if workgroup memory limits it.
+/// Registers of a SIMD, for subgroups of 64 lanes. The driver's number of waves is twice this
+/// number divided by a kernel's registers and rounded down, or less if workgroup memory limits it.
 const OF_SIMD: u64 = 512;
 
 /// The first lines of the file.

@@ -366,7 +366,7 @@ fn absent_parts_have_their_partners_signatures() {
     for (_, partners) in pairs.iter_mut().filter(|(name, _)| *name == "oit_absent.wgsl") {
         partners.push("oit_weighted.wgsl".into());
     }
-    for name in ["flat.wgsl", "normal_flat.wgsl", "tile_flat.wgsl"] {
+    for name in ["flat.wgsl", "normal_flat.wgsl", "tile_flat.wgsl", "hand_flat.wgsl"] {
         pairs.push((name, vec![name.replace("flat", "curved")]));
     }
     pairs.push(("color_constant.wgsl", vec!["color_srgb8.wgsl".into(), "color_sums.wgsl".into()]));
@@ -409,7 +409,8 @@ fn absent_parts_have_their_partners_signatures() {
     alike("image_", &["write_color"]);
     alike("tile_deposit", &["deposit_sums"]);
     alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);
-    alike("tile_filter", &["handed_filter", "filter_misses"]);
+    alike("tile_filter", &["filter_misses"]);
+    alike("hand_filter", &["handed_filter"]);
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
     alike("nearest_", &["keep_nearest", "mark_of", "nearest_at"]);

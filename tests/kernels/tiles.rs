@@ -104,6 +104,30 @@ fn adapters_without_64_bit_atomics_and_subgroups_draw_the_same_by_tiles() {
     });
 }
 
+/// A device that draws tiles as a graphics card does, with an invocation for each pixel. The f32
+/// twin interprets their kernels, which llvmpipe takes minutes to compile.
+fn card() -> Gpu {
+    let mut gpu = Gpu::open(Some("twin")).unwrap();
+    gpu.adapter.kind = "discrete";
+    gpu
+}
+
+#[test]
+fn cards_draw_the_same_by_tiles() {
+    for (name, scene, camera, options) in drawn() {
+        let own = |backend: &Backend, organisation| {
+            let options = Settings { organisation, ..options.clone() };
+            render(&scene, &camera, &options, backend, &()).unwrap()
+        };
+        let (expected, _) = own(&on(card(), large_from(u32::MAX)), Organisation::Scatter);
+        for organisation in [Organisation::Auto, Organisation::Tile] {
+            let (frame, report) = own(&on(card(), large_from(40)), organisation);
+            assert!(report.needs.contains(&"tiles"));
+            assert!(bits(&frame) == bits(&expected), "{name}: {organisation:?} changes bits");
+        }
+    }
+}
+
 #[test]
 fn bands_and_pages_of_tiles_do_not_show() {
     let Some(whole) = common::gpu() else { return };
@@ -143,11 +167,11 @@ fn a_wrong_tile_is_noticed() {
         ("tile.wgsl", "deepest_accepted(farthest_of(a, b))", "farthest_of(a, b)"),
         ("tile.wgsl", "gather_eight(8u, next", "gather_eight(0u, next"),
         ("tile_reach.wgsl", "length + half_width(s)", "0.9 * length + 0.5 * half_width(s)"),
-        ("tile.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),
+        ("column.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),
         ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
         ("tile_sums.wgsl", "if (slot == 5u)", "if (slot == 55u)"),
-        ("occlusion.wgsl", "farthest |= atomicLoad", "farthest &= atomicLoad"),
+        ("occlusion.wgsl", "farthest |= atomicLoad", "farthest = atomicLoad"),
         ("covered.wgsl", "place < visible[covered_start()]", "place + 1u < visible[covered_start()]"),
         ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
     ];
@@ -156,8 +180,21 @@ fn a_wrong_tile_is_noticed() {
         ("tile.wgsl", "deposit(column.pixel + k * held.width)", "deposit(column.pixel)"),
         ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
     ];
-    for (wrong, gathers) in [(&gathered[..], true), (&stored[..], false)] {
+    let of_cards = [
+        ("staged.wgsl", "(place + local < listed)", "(place + local + 1u < listed)"),
+        ("staged.wgsl", "min(count - first, STAGED)", "min(count - first, STAGED - 1u)"),
+        ("staged.wgsl", "front = min(front, fragment.depth)", "front = max(front, fragment.depth)"),
+        ("staged.wgsl", "deepest_accepted(farthest_of_all(front, local))", "farthest_of_all(0.5 * front, local)"),
+        ("staged.wgsl", "SIDE, deepest)) {", "SIDE / 2u, deepest)) {"),
+        ("staged_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
+        ("occlusion.wgsl", "vec2<u32>(TILE_WIDTH, TILE_ROWS) /", "vec2<u32>(8u, TILE_ROWS) /"),
+    ];
+    let all = [(&gathered[..], true, false), (&stored[..], false, false), (&of_cards[..], true, true)];
+    for (wrong, gathers, on_card) in all {
         let image = |sources: Sources| {
+            if on_card {
+                return Some(bits(&frame(&scene, &camera, &options, &on(card(), sources)).0));
+            }
             let gpu = common::gpu()?;
             if !(gpu.adapter.atomics_u64 && gpu.adapter.subgroups) {
                 eprintln!("skipped: no 64-bit atomics or no subgroups");

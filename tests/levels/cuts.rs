@@ -11,7 +11,7 @@ use common::scenes::{shuffled, sphere, sphere_camera};
 use common::{Random, bits};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
-use epsplat::low_level::plan::{Raster, RasterDepth, Settings};
+use epsplat::low_level::plan::{Optimisation, Raster, RasterDepth, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Epsilon, Lens, Map, Maps, Projection, Samples, Scene,
@@ -325,6 +325,31 @@ fn odd_views_have_the_cut_of_the_twin() {
                 assert!(detail != Detail::Pixels(1e-6) || differ(&shown, &all) == 0, "{camera:?} {cull:?}");
             }
         }
+    }
+}
+
+/// Batches of a cut that are hidden are left out, and no bit changes.
+#[test]
+fn hidden_batches_of_a_cut_do_not_show() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let scene = levels(sphere(6000, 1.7));
+    let camera = sphere_camera(50, Projection::Pinhole);
+    let balls = ("balls_cut.wgsl", "vec4<f32>(0.5 * (low + high)");
+    let misplaced = Sources::default().replace(balls.0, balls.1, "vec4<f32>(vec3<f32>(0.0)").unwrap();
+    let gpus: [fn() -> Gpu; 2] = [|| common::gpu().unwrap(), small];
+    for (gpu, options) in gpus.iter().flat_map(|gpu| [at(1e-6), at(1.5), fading(&at(1.5))].map(|own| (gpu, own))) {
+        let every = Settings { without: vec![Optimisation::Culling], ..options.clone() };
+        let [(culled, few), (whole, all)] =
+            [&options, &every].map(|own| render(&scene, &camera, own, &Backend::gpu(gpu()), &()).unwrap());
+        assert!(few.needs.contains(&"cull") && !all.needs.contains(&"cull"), "{:?}", few.needs);
+        assert!(few.cut == all.cut && few.splats_drawn < 3 * all.splats_drawn / 4, "{few:?} {all:?}");
+        assert!(bits(&culled) == bits(&whole), "{options:?}");
+        // The control: balls that lie in the middle of the sphere are taken for hidden.
+        let backend = Backend::Gpu { gpu: Box::new(gpu()), sources: misplaced.clone() };
+        let (wrong, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
+        assert!(bits(&wrong) != bits(&whole), "{options:?}");
     }
 }
 

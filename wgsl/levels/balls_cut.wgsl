@@ -1,7 +1,7 @@
 // The bounding balls of the batches of a cut, by which cull.wgsl leaves out hidden ones. A cut
 // changes from view to view, so select.wgsl encloses the balls of the nodes that it draws.
 // Same interface as balls_own.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0x531fb7975f5218d4
+// All loops end, by 1 of src/gpu/loops.rs: 0x178d32536afe3089
 // #import judge::{CHILDREN_DRAWN}
 // #import layout::{BATCH, TreeNode, page}
 // #import select::{drawn_at}
@@ -16,7 +16,7 @@
 const BOX_WORDS: u32 = 6u;
 const SIGN: u32 = 0x80000000u;
 
-fn ordered(number: f32) -> u32 {
+fn sortable(number: f32) -> u32 {
     let bits = bitcast<u32>(number);
     return select(bits | SIGN, ~bits, (bits & SIGN) != 0u);
 }
@@ -30,8 +30,8 @@ fn number_of(word: u32) -> f32 {
 fn enclose(high: vec3<f32>, low: vec3<f32>, first: u32, end: u32) {
     for (var box = first / BATCH; first < end && box * BATCH < end; box++) {
         for (var k = 0u; k < 3u; k++) {
-            atomicMax(&boxes[box * BOX_WORDS + k], ordered(high[k]));
-            atomicMax(&boxes[box * BOX_WORDS + 3u + k], ordered(low[k]));
+            atomicMax(&boxes[box * BOX_WORDS + k], sortable(high[k]));
+            atomicMax(&boxes[box * BOX_WORDS + 3u + k], sortable(low[k]));
         }
     }
 }

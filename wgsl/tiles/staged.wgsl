@@ -4,7 +4,7 @@
 // them draw these splats. Every bit of the result is that of visibility.wgsl and accumulate.wgsl.
 // Same interface as tile.wgsl. Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xf5a32725221354f2
-// #import *::{show}
+// #import *::{resolve_column, show}
 // #import accumulator_raster|visibility::{nearest}
 // #import blend|winner::{Attributes, attributes_of}
 // #import column::{Column, all_listed, column_at, front_of, gather, large_listed, listed_slot}
@@ -17,8 +17,7 @@
 // #import layout::{Splat, hold, kept_depth}
 // #import raster|visibility::{projected}
 // #import records::{splat_of}
-// #import staged_*|tile_*::{resolve_column}
-// #import staged_sums::{deposit}
+// #import staged_sums|tile_sums::{deposit}
 // #import tile_reach::{reaches}
 
 const SIDE: u32 = 16u;

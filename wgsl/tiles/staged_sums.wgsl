@@ -4,7 +4,7 @@
 // #import *::{Term, add}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
-// #import tile_deposit|tile_deposit_pairs::{deposit_sums}
+// #import tile_*::{deposit_sums}
 
 override CHANNELS: u32;
 

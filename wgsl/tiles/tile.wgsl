@@ -5,7 +5,7 @@
 // Every bit of the result is that of visibility.wgsl and accumulate.wgsl.
 // Same interface as staged.wgsl. Host side: src/passes/tiles.rs.
 // All loops end, by 1, 3 of src/gpu/loops.rs: 0xa5d29f85787a0471
-// #import *::{show}
+// #import *::{resolve_column, show}
 // #import accumulator_raster|visibility::{nearest}
 // #import blend|winner::{Attributes, attributes_of}
 // #import column::{Column, all_listed, column_at, front_of, gather, large_listed, listed_slot}
@@ -15,15 +15,16 @@
 // #import fade::{takes_sample}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{footprint}
-// #import hand_*::{handed_bend, handed_cap, handed_clip, handed_fade, handed_filter, handed_place}
-// #import hand_*::{handed_side}
+// #import hand_*::{handed_bend, handed_cap, handed_place, handed_side}
+// #import hand_clip::{handed_clip}
+// #import hand_fade::{handed_fade}
+// #import hand_filter::{handed_filter}
 // #import layout::{Splat, WORKGROUP, held, hold, kept_depth, linear_index}
 // #import raster|visibility::{projected}
 // #import records::{splat_of}
 // #import splat_*::{FETCHED, farthest_in_tile, fetcher, handed, hold_lane, offered}
-// #import tile_*::{resolve_column}
+// #import staged_sums|tile_sums::{deposit}
 // #import tile_reach::{reaches}
-// #import tile_sums::{deposit}
 
 // The column of `tile` that invocation `local` draws: a workgroup has eight tiles, of eight
 // invocations each.

@@ -2,8 +2,8 @@
 // of a tile (tile.wgsl). They are added to the sums in storage at the end, if those exist. `pixel`
 // is the pixel's slot in the column.
 // #import *::{Term}
-// #import terms|terms_wide::{term_words}
 // #import staged_sums|tile_sums::{add_words}
+// #import terms|terms_wide::{term_words}
 
 @group(0) @binding(8) var<storage, read_write> sums: array<u32>;
 

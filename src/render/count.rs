@@ -37,7 +37,7 @@ pub(super) struct Capacities {
     fragments: Option<[u64; 2]>,
 }
 
-/// What a band counted.
+/// The counts of a band.
 pub(super) struct Counted {
     /// Splats that may touch a pixel and are not known to be hidden.
     pub drawn: u64,

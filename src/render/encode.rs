@@ -60,7 +60,7 @@ impl<'a> Target<'a> {
     }
 }
 
-/// What the recorded frames of a renderer share.
+/// State that the recorded frames of a renderer share.
 #[derive(Default)]
 pub(super) struct Shared {
     /// Made by the first frame.
@@ -68,7 +68,7 @@ pub(super) struct Shared {
     lessons: Lessons,
 }
 
-/// What a part of a renderer keeps for its recorded frames.
+/// State that a part of a renderer keeps for its recorded frames.
 #[derive(Default)]
 pub(super) struct Recorded {
     /// Number of measurements so far.
@@ -163,7 +163,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         Ok(Ticket::new(gpu, &verdict.raw, parts, &recorded.lessons))
     }
 
-    /// Takes what tickets told since the last frame.
+    /// Learns from the tickets that were read since the last frame.
     fn learn(&mut self) {
         let lessons =
             std::mem::take(&mut *self.recorded.lessons.lock().unwrap_or_else(std::sync::PoisonError::into_inner));

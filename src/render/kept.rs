@@ -28,7 +28,7 @@ pub(super) struct Kept {
     pub(super) facts: Facts,
     pub(super) options: Settings,
     pub(super) known: Known,
-    /// What frames that are recorded ([`encode`](super::encode)) keep.
+    /// State that only recorded frames ([`encode`](super::encode)) use.
     pub(super) recorded: Recorded,
     /// Width and height of the last frame, in samples.
     pub(super) size: Option<(u32, u32)>,

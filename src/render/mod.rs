@@ -97,7 +97,7 @@ pub struct Renderer<S, B> {
     /// The level of detail in the options. A number of splats is converted to a node size anew for
     /// each view.
     detail: Detail,
-    /// What frames that are recorded share.
+    /// State that recorded frames share.
     recorded: encode::Shared,
 }
 

@@ -94,7 +94,7 @@ impl Judged {
     }
 }
 
-/// What all parts of a recorded frame share.
+/// The target and the verdict that all parts of a recorded frame share.
 pub(super) struct Recorder<'a> {
     /// The caller's encoder.
     pub encoder: &'a mut wgpu::CommandEncoder,

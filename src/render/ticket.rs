@@ -14,7 +14,7 @@ const PENDING: u8 = 0;
 const READY: u8 = 1;
 const FAILED: u8 = 2;
 
-/// What a part of a recorded frame leaves for the host.
+/// The counts and times of a part of a recorded frame, which the host may read.
 pub(super) struct Part {
     tray: wgpu::Buffer,
     bytes: u64,
@@ -45,8 +45,8 @@ impl Part {
     }
 }
 
-/// What the tickets of a renderer have told it: for each part of its frames, the number of
-/// measurements before the frame that was incomplete.
+/// Tickets of incomplete frames that were read: the number of the part that lacked something, and
+/// the number of measurements before the frame.
 pub(super) type Lessons = Arc<Mutex<Vec<(usize, u64)>>>;
 
 /// The receipt of a frame that [`Renderer::encode`](crate::Renderer::encode) recorded.
@@ -62,7 +62,7 @@ pub struct Ticket {
     lessons: Lessons,
 }
 
-/// What a recorded frame counted.
+/// The counts and times of a recorded frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Receipt {
     /// Whether the picture has all its splats.

@@ -58,11 +58,13 @@ mod sets;
 mod stage;
 
 pub use glam;
+pub use wgpu;
 
 pub use error::{Error, Result};
 pub use io::{Mesh, Points, Texture};
 pub use low_level::frame::Frame;
-pub use low_level::render::Report;
+pub use low_level::gpu::Gpu;
+pub use low_level::render::{FrameLayout, Plane, Receipt, Report, Target, Ticket};
 pub use low_level::scene::{Bounds, Camera, Lens, Map, Maps, Side, Up};
 pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;

@@ -55,7 +55,12 @@ pub struct AdapterDescription {
 
 impl AdapterDescription {
     pub(super) fn of(adapter: &wgpu::Adapter) -> Self {
-        let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
+        Self::with(adapter, adapter.features(), &adapter.limits())
+    }
+
+    /// Describes a device of `adapter` that has `features` and `limits`.
+    pub(super) fn with(adapter: &wgpu::Adapter, features: wgpu::Features, limits: &wgpu::Limits) -> Self {
+        let info = adapter.get_info();
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete",
             wgpu::DeviceType::IntegratedGpu => "integrated",
@@ -83,11 +88,7 @@ impl AdapterDescription {
             blends_f32: features.contains(wgpu::Features::FLOAT32_BLENDABLE),
             subgroups: features.contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= TILE_WIDTH,
             vertex_storage: able.contains(wgpu::DownlevelFlags::VERTEX_STORAGE),
-            usable: able.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
-                && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
-                && limits.max_compute_invocations_per_workgroup >= LARGEST_WORKGROUP.max(WORKGROUP.max(TILE * TILE))
-                && limits.max_compute_workgroup_size_x >= LARGEST_WORKGROUP.max(TILE)
-                && limits.max_compute_workgroup_size_y >= TILE,
+            usable: lacking(able, limits).is_none(),
         }
     }
 
@@ -175,6 +176,22 @@ impl AdapterDescription {
             _ => self.name.to_lowercase().contains(&name),
         }
     }
+}
+
+/// Returns the first capability that rendering needs and that is missing, as a sentence's end.
+pub(super) fn lacking(able: wgpu::DownlevelFlags, limits: &wgpu::Limits) -> Option<String> {
+    if !able.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) {
+        return Some("no compute kernels".into());
+    }
+    let invocations = LARGEST_WORKGROUP.max(WORKGROUP.max(TILE * TILE));
+    let all = [
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, STORAGE_BUFFERS),
+        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, invocations),
+        ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, LARGEST_WORKGROUP.max(TILE)),
+        ("max_compute_workgroup_size_y", limits.max_compute_workgroup_size_y, TILE),
+    ];
+    let short = all.into_iter().find(|(_, has, needed)| has < needed);
+    short.map(|(limit, has, needed)| format!("a {limit} of {has}, and {needed} are needed"))
 }
 
 /// The most storage buffers that a kernel binds; core WebGPU grants no more. The kernel that lists

@@ -9,14 +9,17 @@ use super::traffic::Traffic;
 use super::twin;
 use crate::error::{Error, Result};
 
-/// Features that are enabled where an adapter has them: timestamps; 64-bit integers, f32 atomics
-/// and subgroups, which some kernels use; and blending into 32-bit floats.
-const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
-    .union(wgpu::Features::SHADER_INT64)
+/// Features that some kernels use where an adapter has them: 64-bit integers, f32 atomics and
+/// subgroups.
+const OF_KERNELS: wgpu::Features = wgpu::Features::SHADER_INT64
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
     .union(wgpu::Features::SHADER_FLOAT32_ATOMIC)
-    .union(wgpu::Features::SUBGROUP)
-    .union(wgpu::Features::FLOAT32_BLENDABLE);
+    .union(wgpu::Features::SUBGROUP);
+
+/// Features that are enabled where an adapter has them: those of kernels, timestamps, and blending
+/// into 32-bit floats.
+const OPTIONAL_FEATURES: wgpu::Features =
+    OF_KERNELS.union(wgpu::Features::TIMESTAMP_QUERY).union(wgpu::Features::FLOAT32_BLENDABLE);
 
 /// The feature that accepts kernels in SPIR-V (`spirv.rs`), which only Vulkan has.
 fn of_spirv(adapter: &AdapterDescription) -> wgpu::Features {
@@ -26,6 +29,12 @@ fn of_spirv(adapter: &AdapterDescription) -> wgpu::Features {
 /// Features that only software adapters use: the host maps their buffers directly. On a graphics
 /// card, mappable buffers would lie in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+
+/// The features with which kernels and uploads are fastest on `adapter`.
+pub(super) fn wanted_by_kernels(adapter: &AdapterDescription) -> wgpu::Features {
+    let software = if adapter.is_software() { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
+    OF_KERNELS | software | of_spirv(adapter)
+}
 
 /// Advice for a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
@@ -122,8 +131,7 @@ impl Gpu {
             return Ok(Self::watching(twin::adapter(), device, queue));
         }
         let (adapter, handle) = best(name)?;
-        let software = if adapter.is_software() { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
-        let wanted = OPTIONAL_FEATURES | software | of_spirv(&adapter);
+        let wanted = OPTIONAL_FEATURES | wanted_by_kernels(&adapter);
         let (features, limits) = (handle.features() & wanted, handle.limits());
         Self::of(adapter, &handle, features, limits)
     }
@@ -163,16 +171,22 @@ impl Gpu {
         Ok(Self::watching(adapter, device, queue))
     }
 
+    /// Wraps a device whose errors others handle.
+    pub(super) fn unwatched(adapter: AdapterDescription, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self { adapter, device, queue, compiled: Arc::default(), spare: Arc::default(), failure: Arc::default() }
+    }
+
     /// Keeps the first error that the device reports, such as its loss.
     fn watching(adapter: AdapterDescription, device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let failure = Arc::new(Mutex::new(None));
-        let slot = Arc::clone(&failure);
+        let gpu = Self::unwatched(adapter, device, queue);
+        let Self { device, failure, .. } = &gpu;
+        let slot = Arc::clone(failure);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             if let Ok(mut slot) = slot.lock() {
                 slot.get_or_insert_with(|| error.to_string());
             }
         }));
-        let slot = Arc::clone(&failure);
+        let slot = Arc::clone(failure);
         device.set_device_lost_callback(move |reason, message| {
             if reason != wgpu::DeviceLostReason::Destroyed
                 && let Ok(mut slot) = slot.lock()
@@ -180,7 +194,7 @@ impl Gpu {
                 slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
             }
         });
-        Self { adapter, device, queue, compiled: Arc::default(), spare: Arc::default(), failure }
+        gpu
     }
 
     /// Limits the buffers of this device to `bytes` each, so that scenes and images are cut into
@@ -230,6 +244,16 @@ impl Gpu {
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| self.error(format!("waiting for the device failed: {e}")))?;
         self.check()
+    }
+
+    /// Returns a buffer that the host maps to read `bytes`.
+    pub(crate) fn tray(&self, bytes: u64) -> wgpu::Buffer {
+        self.spare.tray(self, bytes)
+    }
+
+    /// Takes back a buffer that [`tray`](Self::tray) returned.
+    pub(crate) fn keep_tray(&self, tray: wgpu::Buffer) {
+        self.spare.keep(tray);
     }
 
     /// Whether the device takes kernels in SPIR-V, and so rounds every operation separately

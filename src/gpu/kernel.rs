@@ -26,8 +26,29 @@ impl Compiled {
         draws: &[Draw],
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
+        self.compiled(gpu, sources.text(files), stages, draws, constants)
+    }
+
+    /// Returns the program of the entry point `stage` of one file, which rounds no number: the
+    /// arithmetic is not part of its module.
+    pub(crate) fn without_arithmetic(
+        &self,
+        gpu: &Gpu,
+        (sources, file): (&Sources, &str),
+        stage: &str,
+    ) -> Result<Arc<Program>> {
+        self.compiled(gpu, sources.text_of(&[file]), &[stage], &[], &[])
+    }
+
+    fn compiled(
+        &self,
+        gpu: &Gpu,
+        text: Text,
+        stages: &[&str],
+        draws: &[Draw],
+        constants: &[(&'static str, f64)],
+    ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let text = sources.text(files);
         let key = (text.joined.clone(), bits, format!("{stages:?} {draws:?} {} {}", text.counts_loops, text.divides));
         // A poisoned lock means that another thread panicked while it held the lock. The cache is
         // intact.

@@ -7,6 +7,7 @@ pub mod buffers;
 pub mod device;
 pub(crate) mod evaluate;
 pub mod exact;
+mod given;
 pub mod interface;
 pub mod kernel;
 pub mod layout;

@@ -115,16 +115,20 @@ impl Sources {
 
     /// Returns the source of the module of `files`, and of the arithmetic.
     pub(super) fn text(&self, files: &[&str]) -> Text {
+        self.text_of(&[files, &[ARITHMETIC]].concat())
+    }
+
+    /// Returns the source of the module of `files` alone.
+    pub(super) fn text_of(&self, files: &[&str]) -> Text {
         let shown = |file: &&str| {
             let text = self.texts.get(file).map_or("", |text| text);
             // Joining ends each text with a line break.
             let lines = text.matches('\n').count() as u32 + 1;
             (self.shown.get(file).map_or_else(|| (*file).to_owned(), String::clone), lines)
         };
-        let files = [files, &[ARITHMETIC]].concat();
         Text {
-            joined: self.join(&files),
-            counts_loops: !self.all_end(&files),
+            joined: self.join(files),
+            counts_loops: !self.all_end(files),
             divides: self.divides,
             files: files.iter().map(shown).collect(),
         }

@@ -32,7 +32,7 @@ impl Traffic {
     const ZERO: Self = Self { submits: 0, waits: 0, dispatches: 0, bind_groups: 0, bytes_written: 0, bytes_read: 0 };
 
     /// Returns the traffic of this thread so far.
-    pub(crate) fn so_far() -> Self {
+    pub fn so_far() -> Self {
         SO_FAR.get()
     }
 

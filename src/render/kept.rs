@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use super::encode::Recorded;
 use super::kernels::Kernels;
 use super::report::{DeviceBytes, Report};
 use super::run::{Run, Tally};
@@ -26,17 +27,20 @@ use crate::scene::Camera;
 pub(super) struct Kept {
     pub(super) facts: Facts,
     pub(super) options: Settings,
-    known: Known,
+    pub(super) known: Known,
+    /// State that only recorded frames ([`encode`](super::encode)) use.
+    pub(super) recorded: Recorded,
     /// Width and height of the last frame, in samples.
-    size: Option<(u32, u32)>,
-    kernels: Option<Kernels>,
+    pub(super) size: Option<(u32, u32)>,
+    pub(super) kernels: Option<Kernels>,
     pub(super) store: Option<Store>,
 }
 
 impl Kept {
     /// Creates the state of a scene with nothing on the device yet.
     pub(super) fn new(facts: Facts, options: Settings) -> Self {
-        Self { facts, options, known: Known::default(), size: None, kernels: None, store: None }
+        let (known, recorded) = (Known::default(), Recorded::default());
+        Self { facts, options, known, recorded, size: None, kernels: None, store: None }
     }
 
     /// Device memory of the last frame.
@@ -95,7 +99,7 @@ impl Kept {
 
     /// Forgets what earlier views and other image sizes required, and samples how many tiles a
     /// splat touches.
-    fn look_at(&mut self, gpu: &Gpu, camera: &Camera) {
+    pub(super) fn look_at(&mut self, gpu: &Gpu, camera: &Camera) {
         self.known.forget_view();
         let size = Some((camera.width, camera.height));
         if self.size != size {
@@ -112,7 +116,7 @@ impl Kept {
     /// Compiles the kernels and creates the buffers of `plan` that do not exist yet; the kernels
     /// are compiled while the scene is uploaded. If both fail, the error of the kernels is
     /// returned.
-    fn prepare(
+    pub(super) fn prepare(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
         source: &dyn Source,

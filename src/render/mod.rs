@@ -1,7 +1,10 @@
 //! Renders frames on a device or with the f64 reference: project, visibility, accumulate, resolve.
 
+mod count;
 mod cut;
+mod encode;
 mod encoded;
+mod frame_layout;
 pub mod inspect;
 mod kept;
 mod kernels;
@@ -9,6 +12,7 @@ mod look;
 mod own;
 mod page;
 mod parts;
+mod record;
 mod reference;
 mod report;
 mod run;
@@ -17,6 +21,8 @@ mod store;
 pub mod sums;
 mod taken;
 mod targets;
+mod texture;
+mod ticket;
 
 use std::borrow::{Borrow, Cow};
 use std::time::Instant;
@@ -29,9 +35,12 @@ use crate::passes::source::Source;
 use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Camera, Detail, KernelFaults};
+pub use encode::Target;
+pub use frame_layout::{FrameLayout, Plane};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 pub use taken::taken;
+pub use ticket::{Receipt, Ticket};
 
 /// The renderer: a graphics device or the processor.
 pub enum Backend {
@@ -88,6 +97,8 @@ pub struct Renderer<S, B> {
     /// The level of detail in the options. A number of splats is converted to a node size anew for
     /// each view.
     detail: Detail,
+    /// State that recorded frames share.
+    recorded: encode::Shared,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
@@ -107,7 +118,8 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
-        Ok(Self { source, backend, sources, faults, kept: Kept::new(facts, colors), of_maps, detail })
+        let (kept, recorded) = (Kept::new(facts, colors), encode::Shared::default());
+        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, recorded })
     }
 
     /// Renders one frame.
@@ -161,6 +173,18 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     }
 }
 
+/// Returns the WGSL files for `options`, which may leave optimisations of all kernels out.
+fn without_optimisations<'a>(sources: &'a Sources, options: &Settings) -> Cow<'a, Sources> {
+    let mut sources = Cow::Borrowed(sources);
+    if !options.has(Optimisation::UncountedLoops) {
+        sources = Cow::Owned(sources.into_owned().with_counted_loops());
+    }
+    if !options.has(Optimisation::Division) {
+        sources = Cow::Owned(sources.into_owned().with_own_division());
+    }
+    sources
+}
+
 /// Renders one part of a frame on `backend`.
 fn one(
     source: &dyn Source,
@@ -171,13 +195,7 @@ fn one(
 ) -> Result<(Frame, Report)> {
     match backend {
         Backend::Gpu { gpu, .. } => {
-            let mut sources = Cow::Borrowed(sources);
-            if !kept.options.has(Optimisation::UncountedLoops) {
-                sources = Cow::Owned(sources.into_owned().with_counted_loops());
-            }
-            if !kept.options.has(Optimisation::Division) {
-                sources = Cow::Owned(sources.into_owned().with_own_division());
-            }
+            let sources = without_optimisations(sources, &kept.options);
             kept.frame((gpu, &sources), source, camera, progress)
         }
         Backend::Reference => {

@@ -1,7 +1,9 @@
 //! Executes the steps of a frame: binds buffers by name, dispatches kernels, and reads what the
 //! device counted.
 
+use super::count::Capacities;
 use super::kernels::Kernels;
+use super::record::Recording;
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -9,11 +11,11 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Image};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID,
-    TILE_WIDTH, WORKGROUP,
+    COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID, TILE_WIDTH,
+    WORKGROUP,
 };
 use crate::gpu::timing::Timing;
-use crate::passes::tiles::{self, LONGEST, list_name};
+use crate::passes::tiles::{self, list_name};
 use crate::passes::{covered, long_lists, raster, resolve, triangles};
 use crate::plan::known::{Known, Listed};
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
@@ -45,7 +47,9 @@ pub struct Run<'a> {
     /// Sizes measured so far; this try adds to them.
     pub known: &'a mut Known,
     /// Times by pass.
-    pub timing: Timing,
+    pub timing: Timing<'a>,
+    /// Where the frame goes if it stays on the device.
+    pub(super) recording: Option<Recording<'a>>,
     /// Whether large splats are drawn by tiles.
     pub(super) by_tiles: bool,
     /// Counts read from the device so far.
@@ -68,6 +72,7 @@ impl<'a> Run<'a> {
             store,
             known,
             timing: Timing::new(gpu),
+            recording: None,
             by_tiles: plan.large_by_tiles,
             tally: Tally { drawn: 0, cut: None, complete: true },
             needed: [None; 2],
@@ -88,6 +93,8 @@ impl<'a> Run<'a> {
                 Step::Large { by_workgroups, .. } => by_workgroups.iter().try_for_each(|stage| self.stage(stage))?,
                 Step::Draw => self.draw()?,
                 Step::DrawTriangles => self.draw_triangles()?,
+                Step::ReadBack(band) if self.recording.is_some() => self.record_band(*band)?,
+                Step::Look(_) if self.recording.is_some() => {}
                 Step::ReadBack(band) => {
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
@@ -129,7 +136,7 @@ impl<'a> Run<'a> {
         if !self.counts_in(band) {
             return Ok(());
         }
-        let counters = counters(self.plan, self.store, self.by_tiles);
+        let counters = Capacities::of(self.plan, self.store, self.by_tiles).counters(self.store);
         let counted = self.timing.counts(self.gpu, &counters)?;
         self.count(band, &counted);
         Ok(())
@@ -149,42 +156,25 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Adds what the [`counters`] held at the end of `band` to the tally.
+    /// Adds what the counters held at the end of `band` to the tally.
     fn count(&mut self, band: usize, counted: &[[u32; 2]]) {
-        let mut counted = counted.iter().copied();
-        let mut next = || counted.next().unwrap_or_default();
-        let (mut most_large, mut slots, mut unseen_in_all) = (0, true, 0);
-        for page in &self.store.pages {
-            let ([large, unseen], [_, batches]) = (next(), next());
-            self.tally.drawn += page.stand_for.saturating_sub(unseen.into());
-            unseen_in_all += u64::from(unseen);
-            most_large = most_large.max(large);
-            slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
-        }
-        let mut lists = true;
-        for of in listed(self.plan, self.store, self.by_tiles).into_iter().flatten() {
-            let [entries, longest] = next().map(u64::from);
-            lists &= entries <= self.store.entries(of) && longest <= LONGEST;
-        }
-        let overflows = if counts_wraps(self.plan) { next()[0] } else { 0 };
+        let counted = Capacities::of(self.plan, self.store, self.by_tiles).compared(counted);
+        self.tally.drawn += counted.drawn;
         let mut fits = true;
-        if let Some(rooms) = &self.plan.cut {
-            let cuts: Vec<u64> = rooms.iter().map(|_| next()[0].into()).collect();
-            let cut: u64 = cuts.iter().sum();
-            self.tally.drawn += cut.saturating_sub(unseen_in_all);
-            self.tally.cut = Some(cut);
-            fits = self.fits_cut(rooms, &cuts);
+        if let (Some(rooms), Some(cuts)) = (&self.plan.cut, &counted.cuts) {
+            self.tally.cut = Some(cuts.iter().sum());
+            fits = self.fits_cut(rooms, cuts);
         }
         // A view has large splats if any of its bands has.
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
-        self.known.large = Some(before || most_large > 0);
-        self.known.slots &= slots;
-        self.wanting |= !lists;
+        self.known.large = Some(before || counted.large);
+        self.known.slots &= counted.slots;
+        self.wanting |= !counted.lists;
         // If splats are missing, this overflow count is not valid.
-        if slots && lists && fits {
-            self.known.overflows = self.known.overflows.max(overflows.into());
+        if counted.slots && counted.lists && fits {
+            self.known.overflows = self.known.overflows.max(counted.overflows);
         }
-        self.tally.complete &= slots && lists && fits && overflows == 0;
+        self.tally.complete &= counted.slots && counted.lists && fits && counted.overflows == 0;
     }
 
     pub(super) fn stage(&mut self, stage: &Stage) -> Result<()> {
@@ -270,7 +260,8 @@ impl<'a> Run<'a> {
         let (layout, pixels) = (&self.plan.pixel, self.plan.image_pixels(band));
         let bytes = pixels * u64::from(layout.image_words) * 4;
         let counts = self.counts_in(band);
-        let counters = if counts { counters(self.plan, self.store, self.by_tiles) } else { Vec::new() };
+        let capacities = counts.then(|| Capacities::of(self.plan, self.store, self.by_tiles));
+        let counters = capacities.map_or_else(Vec::new, |capacities| capacities.counters(self.store));
         let piece = &mut |bytes: &[u8]| resolve::unpack(layout, bytes, frame);
         let counted =
             self.timing.read(self.gpu, &counters, Some(Image { readback, buffer: &image.raw, bytes, piece }))?;
@@ -285,27 +276,6 @@ impl<'a> Run<'a> {
     pub fn never_fits(gpu: &Gpu) -> Error {
         gpu.error("the buffers were too small after every retry of the frame: choose a smaller image")
     }
-}
-
-/// The kinds of lists that a band had.
-fn listed(plan: &Plan, store: &Store, by_tiles: bool) -> [Option<Listed>; 2] {
-    let had = |of| store.buffer(list_name(of)).map(|_| of);
-    [had(Listed::Large).filter(|_| by_tiles), had(Listed::Small).filter(|_| plan.needs.surface.gathers())]
-}
-
-/// Whether the device counts one-word sums that wrap.
-fn counts_wraps(plan: &Plan) -> bool {
-    plan.sum_words > 0 && plan.needs.accumulator.row().head_words() > 0
-}
-
-/// The buffers that count what a band needed, in two words each, from the given word on. The order
-/// is that in which [`Run::count`] takes them.
-fn counters<'a>(plan: &Plan, store: &'a Store, by_tiles: bool) -> Vec<(&'a Buffer<u32>, u64)> {
-    let of_pages = store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
-    let [large, small] = listed(plan, store, by_tiles).map(|of| store.buffer(list_name(of?)));
-    let sums = store.buffer("sums").filter(|_| counts_wraps(plan));
-    let chosen = store.chosen().filter(|_| plan.cut.is_some());
-    of_pages.chain([large, small, sums]).flatten().map(|buffer| (buffer, 0)).chain(chosen).collect()
 }
 
 fn clear(store: &Store, encoder: &mut wgpu::CommandEncoder, clear: &Clear) {

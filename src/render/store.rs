@@ -311,13 +311,18 @@ impl Store {
             }
         }
         if plan.needs.surface.long_lists() {
-            let words = long_lists::words(count, plan.needs.samples);
+            let words = long_lists::words(self.fragments().max(count), plan.needs.samples);
             if self.frame.get("long_lists").is_none_or(|kept| kept.len < words) {
                 self.groups.forget();
                 self.frame.insert("long_lists", Buffer::storage(gpu, "long lists", words)?);
             }
         }
         Ok(())
+    }
+
+    /// The number of fragments that the buffers hold.
+    pub fn fragments(&self) -> u64 {
+        self.frame.get("keys").map_or(0, |keys| keys.len / KEY_WORDS)
     }
 
     /// Grows the buffers of a page to at least `slots` splats and keeps their contents.

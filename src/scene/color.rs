@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::harmonics::Harmonics;
+pub(crate) use super::srgb::CODE_THRESHOLDS;
 pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear, srgb8_of};
 use super::texture::Textured;
 

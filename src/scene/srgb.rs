@@ -63,6 +63,21 @@ static CODES: LazyLock<Codes> = LazyLock::new(|| {
     Codes { least, of_bits: of_bits.collect() }
 });
 
+/// For each code from 1 to 255 the least f32 that is stored as it: linear light that becomes an
+/// sRGB code, and alpha that becomes a plain one. The last entries are infinite.
+pub(crate) static CODE_THRESHOLDS: LazyLock<[[f32; 256]; 2]> = LazyLock::new(|| {
+    let of_light = std::array::from_fn(|index| CODES.least.get(index).copied().unwrap_or(f32::INFINITY));
+    let of_alpha = std::array::from_fn(|index| {
+        let code = index as f64 + 1.0;
+        let near = ((code - 0.5) / 255.0) as f32;
+        // Rounding to f32 moves the threshold by at most one step.
+        let reaches = |alpha: &f32| f64::from(*alpha) * 255.0 + 0.5 >= code;
+        let least = [near.next_down(), near, near.next_up()].into_iter().find(reaches);
+        least.filter(|_| index < 255).unwrap_or(f32::INFINITY)
+    });
+    [of_light, of_alpha]
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,6 +93,18 @@ mod tests {
         {
             assert_eq!(srgb8_of(linear), plain(linear), "{linear}");
         }
+    }
+
+    #[test]
+    fn thresholds_give_the_codes_of_pictures() {
+        let [light, alpha] = &*CODE_THRESHOLDS;
+        for code in 1..=255u8 {
+            let (light, alpha) = (light[code as usize - 1], alpha[code as usize - 1]);
+            assert_eq!([light.next_down(), light].map(srgb8_of), [code - 1, code]);
+            let plain = |alpha: f32| (f64::from(alpha) * 255.0 + 0.5) as u8;
+            assert_eq!([alpha.next_down(), alpha].map(plain), [code - 1, code]);
+        }
+        assert!(light[255].is_infinite() && alpha[255].is_infinite());
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //! frame(view)    reads what else the view needs, and renders
 //! ```
 
+mod encode;
 mod files;
 mod in_part;
 mod levels;

@@ -7,7 +7,7 @@ use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, levels,
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
-use crate::options::{DeviceOptions, RenderOptions, SceneOptions};
+use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
 use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
@@ -23,13 +23,13 @@ pub struct Renderer {
     views: bool,
     settings: Settings,
     backend: Arc<Backend>,
-    drawn: Drawn,
+    pub(super) drawn: Drawn,
     /// Number of frames in memory at once, which counts against the limit of memory.
     frames: u64,
 }
 
 /// The data that views are drawn from.
-enum Drawn {
+pub(super) enum Drawn {
     /// Surfels and triangles that all views share.
     Whole {
         scene: Arc<scene::Scene>,
@@ -75,7 +75,18 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, device, false, progress)
+        Self::with(scene, options, (device, None), false, progress)
+    }
+
+    /// Makes a renderer on a device that is open already, such as that of the caller's own program
+    /// ([`Gpu::from_wgpu`]).
+    ///
+    /// # Errors
+    ///
+    /// The same as those of [`Renderer::new`].
+    pub fn on_device(scene: &Scene, options: &RenderOptions, gpu: &Gpu, progress: &dyn Progress) -> Result<Self> {
+        let device = DeviceOptions { backend: Chosen(Some(BackendName::Gpu)), ..DeviceOptions::default() };
+        Self::with(scene, options, (&device, Some(gpu)), false, progress)
     }
 
     /// Makes a renderer for a camera that moves: cuts of levels of detail fade from view to view
@@ -90,13 +101,13 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, device, true, progress)
+        Self::with(scene, options, (device, None), true, progress)
     }
 
     fn with(
         scene: &Scene,
         options: &RenderOptions,
-        device: &DeviceOptions,
+        (device, open): (&DeviceOptions, Option<&Gpu>),
         views: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -110,7 +121,11 @@ impl Renderer {
                 "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
             );
         }
-        let backend = Arc::new(backend(&device, progress)?);
+        let backend = match open {
+            Some(gpu) => Backend::gpu(gpu.clone()),
+            None => backend(&device, progress)?,
+        };
+        let backend = Arc::new(backend);
         let (settings, drawn) = match Parts::of(&request, &settings, progress)? {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
             None => whole(&request, settings, &backend, progress)?,

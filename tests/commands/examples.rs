@@ -55,3 +55,23 @@ fn a_kernel_of_ones_own_errs_by_rounding_and_differs_from_the_built_in_one() {
     let [to_own, to_built_in] = errors[..] else { panic!("{text}") };
     assert!(to_own < 1e-5 && to_built_in > 1e-4, "{text}");
 }
+
+#[test]
+fn a_turn_stays_on_the_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = printed(&run("turn_on_device", &[], folder.path()));
+    let numbers: Vec<f64> = text.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+    let [frames, complete, rate] = numbers[..3] else { panic!("{text}") };
+    assert_eq!((frames, complete), (300.0, 300.0), "{text}");
+    assert!(rate > 1.0, "{text}");
+}
+
+#[test]
+fn a_kernel_of_ones_own_gets_the_depth_of_a_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = printed(&run("depth_to_kernel", &[BUNNY], folder.path()));
+    let numbers: Vec<u32> = text.split(' ').filter_map(|word| word.parse().ok()).collect();
+    let [covered, edges] = numbers[..] else { panic!("{text}") };
+    assert!((20_000..160_000).contains(&covered) && (100..covered / 5).contains(&edges), "{text}");
+    assert!(text.contains("complete: true"), "{text}");
+}

@@ -21,6 +21,7 @@ mod materials;
 mod matrix;
 mod nearest;
 mod oit;
+mod on_device;
 mod pictures;
 mod points;
 mod properties;

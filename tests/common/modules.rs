@@ -36,7 +36,7 @@ pub struct Made {
 impl Made {
     /// Whether this is a module of tiles.
     pub fn of_tiles(&self) -> bool {
-        self.files.contains(&"tile.wgsl")
+        self.files.contains(&"bin.wgsl")
     }
 
     pub fn text(&self) -> &'static str {

@@ -121,7 +121,7 @@ fn wrong_slots_are_noticed() {
     let broken = |file, from, to| Sources::default().replace(file, from, to).unwrap();
     let wrong = [
         ("cull.wgsl", "spare.y << SPARE.x", "spare.y"),
-        ("cull.wgsl", "drawn[1] - workgroups.y + workgroup.y", "workgroup.y"),
+        ("cull.wgsl", "drawn[1] - workgroups.y + turn", "turn"),
         // The large disk's anchor needs more than 16 bits.
         ("cull.wgsl", "const SPARE: vec2<u32> = vec2<u32>(9u)", "const SPARE: vec2<u32> = vec2<u32>(16u)"),
         ("project.wgsl", "&rare[QUEUE_START + place], slot)", "&rare[QUEUE_START + place], place_for(slot))"),

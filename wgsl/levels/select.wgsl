@@ -8,7 +8,7 @@
 // the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
 // other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xc4d6f253eded2d2d
+// All loops end, by 1 of src/gpu/loops.rs: 0xb6ec28bea98b05e8
 // #import attributes::{attribute_word, attributes}
 // #import balls_cut::{drawn_radius, enclose}
 // #import judge::{CHILDREN_DRAWN, COUNT_MASK, INNER, OTHER_BRANCH, UNSEEN, cuts_of, fate_of}
@@ -337,6 +337,7 @@ fn select_spread(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold_view();
     let run = linear_index(workgroup, workgroups, local);
     let first = selected[LEVEL] + run * JUDGED;
     let end = min(first + JUDGED, selected[LEVEL_END]);

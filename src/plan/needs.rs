@@ -39,9 +39,9 @@ pub struct SceneNeeds {
     pub node_caps: bool,
     /// Cuts fade into each other, so a surfel may belong to only some of them.
     pub fades: bool,
-    /// Batches of surfels that are out of view or hidden are culled. This requires that no cut is
-    /// drawn. It also requires many surfels for the number of pixels, because the search for hidden
-    /// batches visits every pixel ([`tuning::PIXELS_A_CULLED_SURFEL`]).
+    /// Batches of surfels that are out of view or hidden are culled. This requires many surfels for
+    /// the number of pixels, because the search for hidden batches visits every pixel
+    /// ([`tuning::PIXELS_A_CULLED_SURFEL`], [`tuning::PIXELS_A_CULLED_CHOICE`]).
     pub cull: bool,
     /// The needs of the triangles drawn with the splats.
     pub mesh: Option<MeshNeeds>,

@@ -8,8 +8,7 @@ use crate::error::Error;
 /// An optimisation on which no image depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Optimisation {
-    /// Batches of surfels that are out of view or hidden are not projected; cuts are not culled
-    /// (`passes/cull.rs`).
+    /// Batches of surfels that are out of view or hidden are not projected (`passes/cull.rs`).
     Culling,
     /// Surfels are stored along a Morton curve, in runs that are dealt out over the scene
     /// (`passes/order.rs`).

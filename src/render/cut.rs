@@ -67,6 +67,8 @@ impl Run<'_> {
             *first = 1;
         }
         self.known.cut = Some(rooms);
+        // New pages have no slots yet.
+        self.known.slots = false;
     }
 }
 

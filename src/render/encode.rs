@@ -6,6 +6,7 @@ use std::borrow::{Borrow, Cow};
 use super::frame_layout::{FrameLayout, on_device};
 use super::kept::Kept;
 use super::record::{OfRecording, Recorder, VERDICT_WORDS, reads_in_its_middle, record};
+use super::store::Store;
 use super::texture::Textured;
 use super::ticket::{Lessons, Part, Ticket};
 use super::{Backend, Renderer, texture, without_optimisations};
@@ -77,6 +78,8 @@ pub(super) struct Recorded {
     lacks: bool,
     /// Whether no list can hold the large splats, so that frames draw them without.
     unlisted: bool,
+    /// Room for fragments, as the last measurement made it; 0 if the part has no lists.
+    fragments: u64,
     own: OfRecording,
 }
 
@@ -156,10 +159,12 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             // All parts share the uploaded surfels as far as their needs agree.
             part.store = store;
             let sources = without_optimisations(sources, &part.options);
-            parts.push((number, part.encode((gpu, &sources), &*source, camera, &mut recorder)?));
+            let encoded = part.encode((gpu, &sources), &*source, camera, &mut recorder);
             store = part.store.take();
+            parts.push(encoded.map(|part| (number, part)));
         }
         self.kept.store = store;
+        let parts = parts.into_iter().collect::<Result<_>>()?;
         Ok(Ticket::new(gpu, &verdict.raw, parts, &recorded.lessons))
     }
 
@@ -199,6 +204,7 @@ impl Kept {
         if self.recorded.lacks || self.is_unmeasured(&plan) {
             self.frame((gpu, sources), source, image, &())?;
             (self.recorded.lacks, self.recorded.measured) = (false, self.recorded.measured + 1);
+            self.recorded.fragments = self.store.as_ref().map_or(0, Store::fragments);
             let again = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
             self.recorded.unlisted = again.looks_for_lists[Listed::Large as usize];
             plan = self.plan(gpu, camera)?;
@@ -208,7 +214,7 @@ impl Kept {
         if plan.looks_for_cut() || plan.looks_for_lists.contains(&true) {
             return Err(reads_in_its_middle());
         }
-        let fragments = self.store.as_ref().map_or(0, |store| store.fragments());
+        let fragments = self.recorded.fragments;
         self.prepare((gpu, sources), source, (&plan, camera), &())?;
         let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else {
             return Err(gpu.error("a frame has no buffers"));
@@ -242,7 +248,8 @@ impl Kept {
         plan.looks_for_cut()
             || plan.looks_for_lists.contains(&true)
             || plan.needs.cull && !self.known.slots
-            || lists && self.store.as_ref().is_none_or(|store| store.fragments() == 0)
+            || lists && self.recorded.fragments == 0
+            || self.store.as_ref().is_none_or(|store| !store.serves(&plan.needs))
     }
 }
 

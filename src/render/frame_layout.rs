@@ -1,7 +1,6 @@
 //! How a frame lies in a buffer on the device.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use super::encode::no_device;
 use super::{Backend, encoded};
@@ -88,14 +87,6 @@ impl FrameLayout {
             return Ok(());
         };
         Err(Error::Usage(format!("the buffer for the frame {fault}: make it by the renderer's layout")))
-    }
-
-    /// The bytes of a plane, for a binding of its own; from its first word to the end of its
-    /// records.
-    pub fn range(&self, plane: &Plane) -> Range<u64> {
-        let pixels = u64::from(self.width) * u64::from(self.height);
-        let first = 4 * u64::from(plane.first);
-        first..first + 4 * (u64::from(plane.stride) * pixels.saturating_sub(1) + u64::from(plane.values))
     }
 
     /// Returns the frame whose bytes a program has read back.

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::kernel::Groups;
-use crate::gpu::layout::{Band as BandUniform, View};
+use crate::gpu::layout::{BATCH, Band as BandUniform, View};
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
 use crate::passes::upload::Uploaded;
@@ -213,8 +213,13 @@ impl Store {
             }
             self.rooms.clone_from(rooms);
         }
-        if !plan.needs.cull {
-            (0..self.pages.len()).try_for_each(|page| self.grow(gpu, page, self.pages[page].surfels))?;
+        for page in 0..self.pages.len() {
+            let Page { surfels, slots, .. } = self.pages[page];
+            // Pages that were made anew have no slots. A frame that does not look for the slots that
+            // it needs gets all of them.
+            if !plan.needs.cull || (slots == 0 && !plan.looks_for_slots) {
+                self.grow(gpu, page, surfels.next_multiple_of(if plan.needs.cull { BATCH.into() } else { 1 }))?;
+            }
         }
         if fresh {
             self.make_pixels(gpu, plan)?;

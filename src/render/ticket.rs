@@ -69,7 +69,8 @@ pub struct Receipt {
     pub complete: bool,
     /// The buffers that were too small, in words; empty if the frame is complete.
     pub lacking: Vec<&'static str>,
-    /// Number of splats that may touch a pixel, as in [`Report`](crate::Report).
+    /// Number of splats that may touch a pixel. In an image that is drawn in several bands, a splat
+    /// may count in each of them.
     pub splats_drawn: u64,
     /// Number of surfels and nodes in the cut, if a cut is drawn instead of all surfels.
     pub cut: Option<u64>,

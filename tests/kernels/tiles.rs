@@ -12,7 +12,7 @@ use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::plan::{Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer, Report, render};
 use epsplat::low_level::scene::{
-    Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Scene, Shading, Surfel, Up,
+    Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Up,
 };
 use glam::{DVec3, Vec3};
 
@@ -126,6 +126,22 @@ fn cards_draw_the_same_by_tiles() {
         assert!(report.needs.contains(&"tiles"));
         assert!(bits(&frame) == bits(&expected), "{name}: {organisation:?} changes bits");
     }
+    // Samples, an image whose sides are no multiples of a tile's, and stored sums of several pages.
+    let (scene, camera) = (sphere(300, 2.5), common::scenes::sphere_camera(21, Projection::Pinhole));
+    let in_form = |organisation, sources: Sources, most| {
+        let samples = Samples { across: 2, down: 4 };
+        let options = Settings { organisation, samples, maps: Maps::NONE, ..Default::default() };
+        let gpu = if most == 0 { card() } else { card().with_buffer_limit(most) };
+        let (frame, report) = render(&scene, &camera, &options, &on(gpu, sources), &()).unwrap();
+        (bits(&frame), report.needs.contains(&"gather"))
+    };
+    let (expected, _) = in_form(Organisation::Scatter, large_from(u32::MAX), 0);
+    assert!(in_form(Organisation::Tile, large_from(40), 0) == (expected.clone(), true));
+    assert!(in_form(Organisation::Tile, large_from(40), 30_000) == (expected.clone(), false));
+    let wrong = large_from(40).replace("staged_samples.wgsl", "j * SIDE + i", "i * SIDE + j").unwrap();
+    assert!(in_form(Organisation::Tile, wrong, 0) != (expected.clone(), true), "swapped samples are not noticed");
+    let wrong = large_from(40).replace("staged_sums.wgsl", "channel += 2u", "channel += 4u").unwrap();
+    assert!(in_form(Organisation::Tile, wrong, 30_000) != (expected, false), "lost sums are not noticed");
 }
 
 #[test]

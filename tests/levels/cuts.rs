@@ -337,7 +337,7 @@ fn hidden_batches_of_a_cut_do_not_show() {
     let scene = levels(sphere(20_000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
     let balls = ("balls_cut.wgsl", "vec4<f32>(0.5 * (low + high)");
-    let misplaced = Sources::default().replace(balls.0, balls.1, "vec4<f32>(vec3<f32>(0.0)").unwrap();
+    let misplaced = Sources::default().replace(balls.0, balls.1, "vec4<f32>(-3.0 * (low + high)").unwrap();
     let gpus: [fn() -> Gpu; 2] = [|| common::gpu().unwrap(), small];
     for (gpu, options) in gpus.iter().flat_map(|gpu| [at(1e-6), at(1.5), fading(&at(1.5))].map(|own| (gpu, own))) {
         let every = Settings { without: vec![Optimisation::Culling], ..options.clone() };
@@ -346,7 +346,7 @@ fn hidden_batches_of_a_cut_do_not_show() {
         assert!(few.needs.contains(&"cull") && !all.needs.contains(&"cull"), "{:?}", few.needs);
         assert!(few.cut == all.cut && few.splats_drawn < all.splats_drawn, "{few:?} {all:?}");
         assert!(bits(&culled) == bits(&whole), "{options:?}");
-        // The control: balls that lie in the middle of the sphere are taken for hidden.
+        // The control: balls that lie behind the sphere are taken for hidden.
         let backend = Backend::Gpu { gpu: Box::new(gpu()), sources: misplaced.clone() };
         let (wrong, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
         assert!(bits(&wrong) != bits(&whole), "{options:?}");

@@ -8,7 +8,7 @@
 // the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
 // other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xb6ec28bea98b05e8
+// All loops end, by 1 of src/gpu/loops.rs: 0x30e9f9710db2c928
 // #import attributes::{attribute_word, attributes}
 // #import balls_cut::{drawn_radius, enclose}
 // #import judge::{CHILDREN_DRAWN, COUNT_MASK, INNER, OTHER_BRANCH, UNSEEN, cuts_of, fate_of}
@@ -291,7 +291,8 @@ fn select_judge(
     if (first < end) {
         counts_of[runs_start() + run] = before;
     }
-    if (local == WORKGROUP - 1u) {
+    // A grid may have more workgroups than the level needs.
+    if (local == WORKGROUP - 1u && first - (WORKGROUP - 1u) * JUDGED < selected[NEXT_END]) {
         counts_of[workgroup.y * workgroups.x + workgroup.x] = before + counts;
     }
 }

@@ -1,5 +1,5 @@
-// Caps in columns: the cap of a splat that another invocation fetched (tile.wgsl). Same interface as
-// hand_flat.wgsl.
+// Caps in columns: the cap of a splat that another invocation fetched (tile.wgsl). Same interface
+// as hand_flat.wgsl.
 // #import curved|facing|flat::{Bend, Cap}
 // #import filter|lowpass_none::{FILTERED}
 // #import splat_*::{handed}

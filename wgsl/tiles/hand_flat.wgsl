@@ -1,5 +1,5 @@
-// Disks in columns: the parts of a splat that another invocation fetched (tile.wgsl). Same interface
-// as hand_curved.wgsl.
+// Disks in columns: the parts of a splat that another invocation fetched (tile.wgsl). Same
+// interface as hand_curved.wgsl.
 // #import curved|facing|flat::{Bend, Cap}
 // #import side::{SIDES}
 // #import splat_*::{handed}

@@ -1,4 +1,5 @@
-// Decides whether a splat may have fragments in a square of pixels. The tests are conservative, so no image depends on them.
+// Decides whether a splat may have fragments in a square of pixels. The tests are conservative, so
+// no image depends on them.
 // #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle, reach}
 // #import layout::{Splat}

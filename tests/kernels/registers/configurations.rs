@@ -47,7 +47,8 @@ fn card() -> Target {
         | wgpu::Features::FLOAT32_BLENDABLE
         | wgpu::Features::TIMESTAMP_QUERY;
     let limits = wgpu::Limits {
-        max_compute_workgroup_storage_size: 65536,
+        // What core WebGPU grants.
+        max_compute_workgroup_storage_size: 16384,
         max_compute_invocations_per_workgroup: 1024,
         max_compute_workgroup_size_x: 1024,
         max_compute_workgroup_size_y: 1024,

@@ -359,7 +359,7 @@ fn a_fault_is_found() {
         of.options.join == epsplat::low_level::scene::Join::Blended && of.sampled.about.contains(&"triangles")
     };
     let faults: [(&str, &str, &str, Fits<'_>); 4] = [
-        ("tile_curved.wgsl", "if (FILTERED)", "if (false)", &curved),
+        ("hand_curved.wgsl", "if (FILTERED)", "if (false)", &curved),
         ("covered.wgsl", "LIST_EMPTY != 0u ||", "false ||", &|of| of.options.maps.has(Map::TexZ)),
         ("curved.wgsl", "let a = 0.5 * bent", "let a = 0.51 * bent", &|of| of.sampled.about.contains(&"caps")),
         ("join_blended.wgsl", "clamp(0.5 +", "clamp(0.51 +", &blended),

@@ -127,7 +127,7 @@ fn cards_draw_the_same_by_tiles() {
         assert!(bits(&frame) == bits(&expected), "{name}: {organisation:?} changes bits");
     }
     // Samples, an image whose sides are no multiples of a tile's, and stored sums of several pages.
-    let (scene, camera) = (sphere(300, 2.5), common::scenes::sphere_camera(21, Projection::Pinhole));
+    let (scene, camera) = (sphere(900, 2.5), common::scenes::sphere_camera(21, Projection::Pinhole));
     let in_form = |organisation, sources: Sources, most| {
         let samples = Samples { across: 2, down: 4 };
         let options = Settings { organisation, samples, maps: Maps::NONE, ..Default::default() };

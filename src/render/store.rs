@@ -215,8 +215,8 @@ impl Store {
         }
         for page in 0..self.pages.len() {
             let Page { surfels, slots, .. } = self.pages[page];
-            // Pages that were made anew have no slots. A frame that does not look for the slots that
-            // it needs gets all of them.
+            // Pages that were made anew have no slots. A frame that does not look for the slots
+            // that it needs gets all of them.
             if !plan.needs.cull || (slots == 0 && !plan.looks_for_slots) {
                 self.grow(gpu, page, surfels.next_multiple_of(if plan.needs.cull { BATCH.into() } else { 1 }))?;
             }

@@ -47,7 +47,7 @@ fn card() -> Target {
         | wgpu::Features::FLOAT32_BLENDABLE
         | wgpu::Features::TIMESTAMP_QUERY;
     let limits = wgpu::Limits {
-        // What core WebGPU grants.
+        // Core WebGPU grants no more.
         max_compute_workgroup_storage_size: 16384,
         max_compute_invocations_per_workgroup: 1024,
         max_compute_workgroup_size_x: 1024,

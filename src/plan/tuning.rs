@@ -13,7 +13,7 @@ pub const PIXELS_A_CULLED_SURFEL: u64 = 6;
 
 /// The same for batches of a cut, whose surfels are read by way of a list. With culling, frames of
 /// cuts of 9,000,000 and of 1,000,000 splats of a sphere take 0.7 and 0.85 times as long, and
-/// frames of 440,000 splats of the Dragon 1.03 times.
+/// frames of 440,000 splats of the Dragon 1.04 times.
 pub const PIXELS_A_CULLED_CHOICE: u64 = 2;
 
 /// The rasteriser draws a triangle per splat instead of a quad if there is more than one surfel per
@@ -40,10 +40,10 @@ pub const MOST_FRAGMENT_BYTES: u64 = 1 << 29;
 /// Rows per strip, which one thread of the f64 reference renders at a time.
 pub const REFERENCE_ROWS: u32 = 8;
 
-/// How the invocations of a tile get splats. A processor draws eight pixels of a splat with the
-/// registers of one core, and should fetch it once for all of them. On the bunny a graphics card
-/// (RDNA 2) keeps 4 of 32 waves with the registers of such a tile, and 16 or more with those of one
-/// pixel; a processor takes 30 times as long with one pixel an invocation.
+/// How the invocations of a tile get splats. A processor should fetch a splat once for all the
+/// pixels of a column: on the bunny llvmpipe takes 100 times as long with a pixel an invocation. A
+/// graphics card (RDNA 2, by Mesa's compiler) keeps 4 of 32 waves with the registers of a column,
+/// 16 with those of a pixel, and 12 if surfels are curved (`tests/golden/registers.txt`).
 pub fn fetch(adapter: &AdapterDescription, shares: bool) -> Fetch {
     match (adapter.is_software(), adapter.subgroups && shares) {
         (false, _) => Fetch::Staged,

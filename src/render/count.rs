@@ -45,10 +45,8 @@ pub(super) struct Counted {
     pub cuts: Option<Vec<u64>>,
     /// Whether there are large splats.
     pub large: bool,
-    /// Whether all splats had slots.
-    pub slots: bool,
-    /// Whether the lists of splats held all entries.
-    pub lists: bool,
+    /// The bits of [`lacks`] that the counts set.
+    pub lacking: u32,
     /// Fragments that made a sum wrap.
     pub overflows: u64,
 }
@@ -109,26 +107,27 @@ impl Capacities {
 
     /// Compares the words of the [`counters`](Self::counters) with the sizes.
     pub fn compared(&self, counted: &[[u32; 2]]) -> Counted {
+        let over = |([first, second], [most_first, most_second, bit, _]): (&[u32; 2], [u32; 4])| {
+            if *first > most_first || *second > most_second { bit } else { 0 }
+        };
+        let lacking = counted.iter().zip(self.limits()).map(over).fold(0, |all, bit| all | bit);
         let mut counted = counted.iter().copied();
         let mut next = || counted.next().unwrap_or_default();
-        let (mut drawn, mut large, mut slots, mut unseen_in_all) = (0, false, true, 0);
-        for [stand_for, room] in &self.pages {
-            let ([of_large, unseen], [_, batches]) = (next(), next());
+        let (mut drawn, mut large, mut unseen_in_all) = (0, false, 0);
+        for [stand_for, _] in &self.pages {
+            let ([of_large, unseen], _) = (next(), next());
             drawn += stand_for.saturating_sub(unseen.into());
             unseen_in_all += u64::from(unseen);
             large |= of_large > 0;
-            slots &= !self.culls || u64::from(batches) * u64::from(BATCH) <= *room;
         }
-        let mut lists = true;
-        for (_, room) in &self.lists {
-            let [entries, longest] = next().map(u64::from);
-            lists &= entries <= *room && longest <= LONGEST;
+        for _ in &self.lists {
+            next();
         }
         let overflows = if self.wraps { next()[0].into() } else { 0 };
         let cuts = self.cut.as_ref().map(|rooms| rooms.iter().map(|_| next()[0].into()).collect::<Vec<u64>>());
         if let Some(cuts) = &cuts {
             drawn += cuts.iter().sum::<u64>().saturating_sub(unseen_in_all);
         }
-        Counted { drawn, cuts, large, slots, lists, overflows }
+        Counted { drawn, cuts, large, lacking, overflows }
     }
 }

@@ -1,7 +1,7 @@
 //! Executes the steps of a frame: binds buffers by name, dispatches kernels, and reads what the
 //! device counted.
 
-use super::count::Capacities;
+use super::count::{Capacities, lacks};
 use super::kernels::Kernels;
 use super::record::Recording;
 use super::store::Store;
@@ -168,13 +168,14 @@ impl<'a> Run<'a> {
         // A view has large splats if any of its bands has.
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
         self.known.large = Some(before || counted.large);
-        self.known.slots &= counted.slots;
-        self.wanting |= !counted.lists;
+        let [slots, lists] = [lacks::SLOTS, lacks::LISTS].map(|bit| counted.lacking & bit == 0);
+        self.known.slots &= slots;
+        self.wanting |= !lists;
         // If splats are missing, this overflow count is not valid.
-        if counted.slots && counted.lists && fits {
+        if slots && lists && fits {
             self.known.overflows = self.known.overflows.max(counted.overflows);
         }
-        self.tally.complete &= counted.slots && counted.lists && fits && counted.overflows == 0;
+        self.tally.complete &= slots && lists && fits && counted.overflows == 0;
     }
 
     pub(super) fn stage(&mut self, stage: &Stage) -> Result<()> {

@@ -155,14 +155,11 @@ impl Ticket {
         for (stage, ms) in times(&self.gpu, &part.stages, &ticks) {
             *receipt.passes.entry(format!("{stage}_ms")).or_default() += ms;
         }
-        let limits = part.capacities.limits();
         let mut lacking = 0;
-        for of_band in counts.chunks_exact(limits.len().max(1)) {
-            for (count, [first, second, bit, _]) in of_band.iter().zip(&limits) {
-                lacking |= if count[0] > *first || count[1] > *second { *bit } else { 0 };
-            }
+        for of_band in counts.chunks_exact(part.capacities.limits().len().max(1)) {
+            let counted = part.capacities.compared(of_band);
+            lacking |= counted.lacking;
             if is_colour {
-                let counted = part.capacities.compared(of_band);
                 receipt.splats_drawn = counted.drawn + if part.adds { receipt.splats_drawn } else { 0 };
                 receipt.cut = counted.cuts.map(|cuts| cuts.iter().sum());
             }

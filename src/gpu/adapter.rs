@@ -26,6 +26,8 @@ pub struct AdapterDescription {
     pub max_buffer_size: u64,
     /// Most workgroups in each dimension of a dispatch.
     pub max_compute_workgroups_per_dimension: u32,
+    /// Most bytes of memory that the invocations of a workgroup can share.
+    pub max_compute_workgroup_storage_size: u32,
     /// Most storage buffers that one kernel can bind.
     pub max_storage_buffers_per_shader_stage: u32,
     /// Largest uniform, bytes.
@@ -77,6 +79,7 @@ impl AdapterDescription {
             max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
             max_buffer_size: limits.max_buffer_size,
             max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
+            max_compute_workgroup_storage_size: limits.max_compute_workgroup_storage_size,
             max_storage_buffers_per_shader_stage: limits.max_storage_buffers_per_shader_stage,
             max_uniform_buffer_binding_size: limits.max_uniform_buffer_binding_size,
             max_texture_dimension_2d: limits.max_texture_dimension_2d,
@@ -103,6 +106,7 @@ impl AdapterDescription {
             max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
             max_buffer_size: limits.max_buffer_size,
             max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
+            max_compute_workgroup_storage_size: limits.max_compute_workgroup_storage_size,
             max_storage_buffers_per_shader_stage: limits.max_storage_buffers_per_shader_stage,
             max_uniform_buffer_binding_size: limits.max_uniform_buffer_binding_size,
             max_texture_dimension_2d: limits.max_texture_dimension_2d,

@@ -2,6 +2,7 @@
 
 use super::adapter::{AdapterDescription, lacking};
 use super::device::{Gpu, wanted_by_kernels};
+use super::twin::{self, Tally};
 use crate::error::{Error, Result};
 
 impl Gpu {
@@ -17,14 +18,15 @@ impl Gpu {
     }
 
     /// The limits that a program requests for a device that renders, as far as `adapter` grants
-    /// them: those of core WebGPU, and the adapter's own sizes of buffers and dispatches. Smaller
-    /// buffers cut large scenes and images into more pieces.
+    /// them: those of core WebGPU, and the adapter's own sizes of buffers, dispatches and workgroup
+    /// memory. Smaller buffers cut large scenes and images into more pieces.
     pub fn limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
         let granted = adapter.limits();
         wgpu::Limits {
             max_storage_buffer_binding_size: granted.max_storage_buffer_binding_size,
             max_buffer_size: granted.max_buffer_size,
             max_compute_workgroups_per_dimension: granted.max_compute_workgroups_per_dimension,
+            max_compute_workgroup_storage_size: granted.max_compute_workgroup_storage_size,
             max_uniform_buffer_binding_size: granted.max_uniform_buffer_binding_size,
             max_texture_dimension_2d: granted.max_texture_dimension_2d,
             max_color_attachment_bytes_per_sample: granted.max_color_attachment_bytes_per_sample,
@@ -71,6 +73,12 @@ impl Gpu {
             gpu.spare.will_draw();
         }
         Ok(gpu)
+    }
+
+    /// What the kernels have done since the last call, if this is the f32 twin; other devices do
+    /// not count.
+    pub fn tally(&self) -> Option<Tally> {
+        twin::tally(&self.device)
     }
 
     /// The device, which clones share.

@@ -23,8 +23,9 @@
 //! 4. The outer loops of `accumulate_splat` and `list_splat` continue only if the inner loop
 //!    advanced in its rectangle (2).
 //! 5. A counter **shrinks** by 1 in every round, and the loop ends at a limit of 0 or more that no
-//!    round changes. Or the counter grows to more than twice its value (`sink`), and the loop ends
-//!    past the length of a list, which is shorter than 2^30.
+//!    round changes. Or it doubles up to a constant, or halves down to 0, in at most 32 rounds. Or
+//!    it grows to more than twice its value (`sink`), and the loop ends past the length of a list,
+//!    which is shorter than 2^30.
 //! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, is the last round, or consumes
 //!    the fragment at `first`, as the round's surface reaches at least to that depth. The inner
 //!    loop moves `first`, which is a counter (1), past all consumed fragments.

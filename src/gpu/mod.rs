@@ -28,3 +28,4 @@ pub use device::{Gpu, adapters};
 pub use replacement::Replacement;
 pub use sources::Sources;
 pub use traffic::Traffic;
+pub use twin::{Calls, KernelTally, Tally};

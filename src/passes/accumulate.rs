@@ -58,7 +58,7 @@ use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Accumulator, Plan, SceneNeeds, Settings, wide_bits};
+use crate::plan::{Accumulator, PixelLayout, Plan, SceneNeeds, Settings, wide_bits};
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Camera, Colors, Fade, Map, Scene};
 
@@ -69,12 +69,32 @@ use crate::scene::{Camera, Colors, Fade, Map, Scene};
 /// ([`Splats::Copies`](crate::plan::Splats::Copies)), and on whether the adapter adds 64 bits at
 /// once ([`SceneNeeds::atomics_u64`]), which makes the same sums in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
-    match (needs.wide_sums || needs.surface.copies(), needs.atomics_u64) {
+    match (!needs.terms_fit(), needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => PAIRS,
         // The product of a term and a number of copies is computed in single words.
         (true, true) if !needs.surface.copies() => "accumulator_fixed64.wgsl",
         (true, _) => "accumulator_fixed_wide.wgsl",
+    }
+}
+
+/// Words of workgroup memory for sums (`wgsl/accumulate/sums_window.wgsl`). Together with the
+/// attributes of 64 splats they fit into the 32 KiB that graphics cards grant.
+const WINDOW_WORDS: u32 = 5760;
+
+/// The blocks of 4 pixels whose sums fit into workgroup memory. A pixel has a word for each of its
+/// `channels`, and one for the carries of four.
+fn window(channels: u32) -> u32 {
+    (WINDOW_WORDS / (4 * (channels + channels.div_ceil(4)).max(1))).min(288)
+}
+
+/// The splats of a workgroup. On a sphere of 1,000,000 at 1024x1024, 256 splats touch about 900
+/// pixels, and 128 splats 500.
+fn spread_splats(channels: u32) -> u32 {
+    match window(channels) {
+        192.. => 256,
+        96.. => 128,
+        _ => 64,
     }
 }
 
@@ -89,6 +109,10 @@ pub(super) fn terms_file(needs: &SceneNeeds) -> &'static str {
 /// The files that store the sums of a render with `needs` in storage buffers.
 pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     match needs.accumulator {
+        Accumulator::Fixed if needs.spreads => {
+            vec![terms_file(needs), fixed_file(needs), "sums_window.wgsl", "accumulate_spread.wgsl"]
+        }
+        Accumulator::Fixed if needs.terms_fit() => vec![terms_file(needs), fixed_file(needs), "sums_direct.wgsl"],
         Accumulator::Fixed => vec![terms_file(needs), fixed_file(needs)],
         Accumulator::Fixed64 => vec!["terms_wide.wgsl", "accumulator_fixed64.wgsl"],
         other => vec![other.row().file],
@@ -285,17 +309,24 @@ fn decision_beside(at: Intersection, behind: f64, near: f64, beside: f64) -> f64
 pub const PASS: Pass = Pass {
     name: "accumulate",
     files: |needs| {
-        if needs.surface.accumulates() { vec!["accumulate.wgsl"] } else { Vec::new() }
+        let mut files = Vec::new();
+        files.extend(needs.surface.accumulates().then_some("accumulate.wgsl"));
+        files.extend((needs.surface.accumulates() && !needs.spreads).then_some("accumulate_alone.wgsl"));
+        files
     },
     kernels: |needs| match needs.surface.accumulates() && !needs.surface.gathers() {
-        true => vec![ACCUMULATE, ACCUMULATE_LARGE],
+        true => vec![accumulating(needs), ACCUMULATE_LARGE],
         false => Vec::new(),
     },
     constants: |making| {
         let wide = wide_bits(making.options, making.surfels);
+        let channels = PixelLayout::of(making.needs).channels;
         vec![
             ("FRACTION_BITS", making.needs.accumulator.row().fraction_bits(making.surfels).into()),
             ("ONE", f64::from(wide).exp2()),
+            ("WINDOW", window(channels).into()),
+            ("WINDOW_SIDE", window(channels).isqrt().into()),
+            ("SPREAD_SPLATS", spread_splats(channels).into()),
         ]
     },
 };
@@ -309,7 +340,13 @@ pub const SUMS: Pass = Pass {
 };
 
 const ACCUMULATE: Kernel = Kernel::new("accumulate");
+const SPREAD: Kernel = Kernel::of("accumulate", [256, 1, 1]);
 const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1]);
+
+/// The kernel that accumulates the small splats.
+fn accumulating(needs: &SceneNeeds) -> Kernel {
+    if needs.spreads { SPREAD } else { ACCUMULATE }
+}
 
 /// The stage that accumulates the small splats; with separate inputs, `first` says whether this is
 /// the first one.
@@ -320,7 +357,7 @@ pub fn steps(plan: &Plan, band: usize, first: bool) -> Stage {
     if band == 0 && first && head > 0 {
         clears.push(Clear::of("sums", 0, head));
     }
-    let runs = vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }];
+    let runs = vec![Run { kernel: accumulating(&plan.needs), over: Over::Slots(Part::All) }];
     Stage::new("accumulate", band, runs).after(clears).as_twin(Twin::Accumulate)
 }
 

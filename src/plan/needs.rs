@@ -28,6 +28,9 @@ pub struct SceneNeeds {
     /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in
     /// half the additions.
     pub atomics_u64: bool,
+    /// The fragments of a workgroup's splats are spread over its invocations and summed in its
+    /// memory first, on graphics cards (`wgsl/accumulate/accumulate_spread.wgsl`).
+    pub spreads: bool,
     /// Records are read and written 64 bits at a time, on adapters with 64-bit integers: the same
     /// bits in half the accesses.
     pub long_words: bool,
@@ -197,6 +200,7 @@ impl SceneNeeds {
             accumulator: options.accumulator,
             wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || order_free),
             atomics_u64: false,
+            spreads: false,
             long_words: false,
             doubled: facts.doubled,
             levels: facts.nodes_of(options).is_some(),
@@ -258,13 +262,27 @@ impl SceneNeeds {
         // Fragment lists are summed in registers.
         let fixed = picture.accumulator == Accumulator::Fixed && surface.sums_by_compute();
         let once = long_atomics && surface.raster().is_none();
-        Self {
+        let spreads = tuning::spreads(adapter) && options.has(Optimisation::Spreading);
+        let needs = Self {
             surface,
             mesh: picture.mesh.map(|mesh| MeshNeeds { once, ..mesh }),
             atomics_u64: long_atomics && fixed && !surface.copies(),
             long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
             ..picture
-        }
+        };
+        Self { spreads: spreads && needs.may_spread(), ..needs }
+    }
+
+    /// Whether a term of the accumulator `fixed` fits in one word.
+    pub fn terms_fit(&self) -> bool {
+        !self.wide_sums && !self.surface.copies()
+    }
+
+    /// Whether a kernel can sum fragments in workgroup memory first. With textures a pixel has too
+    /// many sums.
+    fn may_spread(&self) -> bool {
+        let blends = matches!(self.surface, Surface::Blended { .. }) && self.color != ColorNeed::Textured;
+        blends && self.accumulator == Accumulator::Fixed && self.terms_fit()
     }
 
     /// Whether identical surfels may be drawn once.
@@ -342,6 +360,7 @@ impl SceneNeeds {
             (self.low_pass == LowPass::Gaussians, "lowpass-gaussians"),
             (self.wide_sums, "wide-sums"),
             (self.atomics_u64, "atomics-u64"),
+            (self.spreads, "spreads"),
             (self.long_words, "long-words"),
             (self.doubled, "doubled"),
             (self.surface.copies(), "copies"),

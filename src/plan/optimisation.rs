@@ -22,6 +22,9 @@ pub enum Optimisation {
     /// (`wgsl/accumulate/accumulator_fixed_pairs.wgsl`), or the nearest depth and its colour
     /// (`wgsl/visibility/nearest_color.wgsl`).
     Pairs,
+    /// Graphics cards spread the fragments of a workgroup's splats over its invocations and sum them
+    /// in its memory first (`wgsl/accumulate/accumulate_spread.wgsl`).
+    Spreading,
     /// Records are read and written 64 bits at a time (`wgsl/common/words_long.wgsl`).
     LongWords,
     /// Tiles sum small splats too (`passes/tiles.rs`).
@@ -37,12 +40,13 @@ pub enum Optimisation {
 
 impl Optimisation {
     /// Every optimisation and its name.
-    pub const ALL: [(Self, &'static str); 10] = [
+    pub const ALL: [(Self, &'static str); 11] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
         (Self::Copies, "copies"),
         (Self::Pairs, "pairs"),
+        (Self::Spreading, "spreading"),
         (Self::LongWords, "long-words"),
         (Self::Gathering, "gathering"),
         (Self::Sharing, "sharing"),

@@ -40,6 +40,14 @@ pub const MOST_FRAGMENT_BYTES: u64 = 1 << 29;
 /// Rows per strip, which one thread of the f64 reference renders at a time.
 pub const REFERENCE_ROWS: u32 = 8;
 
+/// Whether workgroups sum fragments in their memory before they add them to the image
+/// (`wgsl/accumulate/accumulate_spread.wgsl`): on graphics cards, whose workgroups have memory of
+/// their own of at least 32 KiB. Processors have none; llvmpipe takes minutes to compile the
+/// kernel.
+pub fn spreads(adapter: &AdapterDescription) -> bool {
+    !adapter.is_software() && adapter.max_compute_workgroup_storage_size >= 1 << 15
+}
+
 /// How the invocations of a tile get splats. A processor should fetch a splat once for all the
 /// pixels of a column: on the bunny llvmpipe takes 100 times as long with a pixel an invocation. A
 /// graphics card (RDNA 2, by Mesa's compiler) keeps 4 of 32 waves with the registers of a column,

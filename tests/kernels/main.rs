@@ -20,6 +20,7 @@ mod rounding;
 mod shaders;
 mod slots;
 mod sources;
+mod spread;
 mod sums;
 mod tiles;
 mod twins;

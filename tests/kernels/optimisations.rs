@@ -59,6 +59,7 @@ fn no_optimisation_shows() {
                     Optimisation::Culling => assert!(left_out("cull")),
                     Optimisation::Copies => assert!(left_out("copies")),
                     Optimisation::Pairs => assert!(left_out("atomics-u64")),
+                    Optimisation::Spreading => assert!(left_out("spreads")),
                     Optimisation::LongWords => assert!(left_out("long-words")),
                     Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),
                     Optimisation::Order

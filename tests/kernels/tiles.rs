@@ -32,7 +32,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &Settings, backend: &Backend) 
 }
 
 /// Scenes with splats of all sizes, and options that cover each variant of the kernels.
-fn drawn() -> Vec<(&'static str, Scene, Camera, Settings)> {
+pub(super) fn drawn() -> Vec<(&'static str, Scene, Camera, Settings)> {
     let plain = Settings { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() };
     let mut all = Vec::new();
     let (scene, camera) = crowded().swap_remove(1);

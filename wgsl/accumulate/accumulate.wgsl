@@ -3,17 +3,15 @@
 // accumulators quantise each fragment's terms before they add them, so their sums do not depend on
 // the order.
 // Twin: src/passes/accumulate.rs.
-// All loops end, by 2, 4 of src/gpu/loops.rs: 0x1c18d5be7c903b06
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0xadeec7902b0211fd
 // #import *::{front_at}
 // #import blend|winner::{attributes_of}
 // #import blend|winner_second::{blend}
 // #import camera_*::{Fragment}
-// #import cull::{slot_of, surfel_in}
-// #import epsilon_*::{radius_of}
+// #import cull::{surfel_in}
 // #import filter|lowpass_none::{Filter, filter_in}
-// #import footprint::{Rectangle, TILE, footprint, is_large, large_splat, pixel_index, reach}
-// #import layout::{Splat, WORKGROUP, hold}
-// #import occlusion::{hidden}
+// #import footprint::{Rectangle, TILE, footprint, large_splat, pixel_index, reach}
+// #import layout::{Splat, hold}
 // #import raster|visibility::{projected}
 // #import records::{splat_of}
 // #import side::{is_shown}
@@ -45,26 +43,6 @@ fn accumulate_splat(surfel: u32, splat: Splat, filter_: Filter, pixels: Rectangl
         let front = front_at(pixel);
         if (is_shown(fragment, front, attributes.radius, place)) {
             blend(pixel, fragment, front, attributes);
-        }
-    }
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn accumulate(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    hold();
-    let slot = slot_of(workgroup, workgroups, local);
-    if (slot < arrayLength(&projected)) {
-        let record = projected[slot];
-        let splat = splat_of(record);
-        let surfel = surfel_in(record, slot);
-        let filter_ = filter_in(record);
-        let pixels = reach(splat);
-        if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(surfel))) {
-            accumulate_splat(surfel, splat, filter_, pixels, vec2<u32>(0u), 1u);
         }
     }
 }

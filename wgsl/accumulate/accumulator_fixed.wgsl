@@ -1,6 +1,6 @@
 // Sums of the terms of terms.wgsl in fixed point. A term fills one word; a sum has two, (low,
 // high), with an exact carry. Error bound: src/passes/accumulate.rs.
-// All loops end, by 3 of src/gpu/loops.rs: 0xeda3c87029d68b8f
+// All loops end, by 3 of src/gpu/loops.rs: 0x383207936f3c0571
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
@@ -12,7 +12,7 @@ override CHANNELS: u32;
 // The channels whose low words wrapped while the current fragment was added, one bit each.
 var<private> carries: u32;
 
-fn add(pixel: u32, channel: u32, value: Term) {
+fn add_stored(pixel: u32, channel: u32, value: Term) {
     let before = atomicAdd(&sums[2u * (pixel * CHANNELS + channel)], value);
     carries |= select(0u, 1u << channel, before + value < before);
 }
@@ -28,9 +28,25 @@ fn settle(pixel: u32) {
 }
 
 // Adds to two neighbouring sums, of which the first has an even channel.
-fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
-    add(pixel, channel, first);
-    add(pixel, channel + 1u, second);
+fn add_pair_stored(pixel: u32, channel: u32, first: Term, second: Term) {
+    add_stored(pixel, channel, first);
+    add_stored(pixel, channel + 1u, second);
+}
+
+fn deposit_one_stored(word: u32, value: vec2<u32>) {
+    let before = atomicAdd(&sums[word], value.x);
+    let high = value.y + select(0u, 1u, before + value.x < before);
+    if (high > 0u) {
+        atomicAdd(&sums[word + 1u], high);
+    }
+}
+
+// Adds to two neighbouring sums, of which the first has an even channel, numbers of two words each,
+// low and high.
+fn deposit_stored(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>) {
+    let word = 2u * (pixel * CHANNELS + channel);
+    deposit_one_stored(word, first);
+    deposit_one_stored(word + 2u, second);
 }
 
 fn show(pixel: u32) {}

@@ -3,7 +3,7 @@
 // low half that wraps carries into the high half. The next u64 counts the carries of both halves.
 // Readers subtract the carries of the low half from the high half again.
 // Error bound: src/passes/accumulate.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x8d89caff991eca3f
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x7cfc7c460f245b6e
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
@@ -14,7 +14,7 @@ override CHANNELS: u32;
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
 // The carries of the current fragment, three bits per pair: one bit for the carry of the low half,
-// and two that count the carries of the high half. The high half may wrap twice if add() adds the
+// and two that count the carries of the high half. The high half may wrap twice if add_stored() adds the
 // halves one after the other, the first time by a carry from the low half.
 var<private> carries: u32;
 
@@ -28,13 +28,31 @@ fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
     carries += (from_low + from_high) << (3u * pair);
 }
 
-fn add(pixel: u32, channel: u32, value: Term) {
+fn add_stored(pixel: u32, channel: u32, value: Term) {
     let odd = (channel & 1u) == 1u;
     add_halves(pixel, channel >> 1u, select(value, 0u, odd), select(0u, value, odd));
 }
 
-fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+fn add_pair_stored(pixel: u32, channel: u32, first: Term, second: Term) {
     add_halves(pixel, channel >> 1u, first, second);
+}
+
+// Adds to two neighbouring sums, of which the first has an even channel, numbers of two words each,
+// low and high. Readers subtract all carries of the low half from the high half, so the high word
+// of the first number is also added there.
+fn deposit_stored(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>) {
+    let place = pixel * CHANNELS + 2u * (channel >> 1u);
+    let middle = second.x + first.y;
+    let before = atomicAdd(&sums[place], (u64(middle) << 32u) | u64(first.x));
+    let before_low = u32(before & 0xfffffffflu);
+    let before_high = u32(before >> 32u);
+    let from_low = select(0u, 1u, before_low + first.x < before_low);
+    let after = before_high + middle;
+    let wraps = select(0u, 1u, middle < first.y) + select(0u, 1u, after < middle) + select(0u, 1u, after + from_low < after);
+    let carried = vec2<u32>(first.y + from_low, second.y + wraps);
+    if (any(carried != vec2<u32>(0u))) {
+        atomicAdd(&sums[place + 1u], (u64(carried.y) << 32u) | u64(carried.x));
+    }
 }
 
 // Adds the carries of a fragment. They are rare, so one loop over all pairs costs less than a

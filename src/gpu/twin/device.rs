@@ -12,6 +12,7 @@ use wgpu::custom as api;
 use super::commands::{Command, Encoder, Finished, Grid};
 use super::objects::{Bound, Buffer, Group, Kernels, Nothing, Pipeline};
 use super::raster::NoRaster;
+use super::tally::Tally;
 use crate::gpu::interface::Interface;
 
 /// Errors until somebody asks for them.
@@ -32,6 +33,7 @@ struct Scope {
 #[derive(Clone, Default)]
 pub(super) struct Device {
     errors: Arc<Mutex<Errors>>,
+    done: Arc<Mutex<Tally>>,
 }
 
 impl std::fmt::Debug for Device {
@@ -61,6 +63,11 @@ impl Device {
         self.fail(format!("the f32 twin has no {what}"));
     }
 
+    /// Returns what the kernels have done since the last call.
+    pub(super) fn tally(&self) -> Tally {
+        std::mem::take(&mut *self.done.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
     /// Runs a command.
     fn run(&self, command: Command) -> Result<(), String> {
         match command {
@@ -78,7 +85,11 @@ impl Device {
                     Grid::Of(grid) => grid,
                     Grid::In(buffer, at) => [0, 1, 2].map(|k| buffer.0[at + k].load(Relaxed)),
                 };
-                super::dispatch(&pipeline, &bound, grid)
+                let done = super::dispatch(&pipeline, &bound, grid)?;
+                let mut tally = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+                let so_far = tally.remove(&pipeline.entry).unwrap_or_default();
+                tally.insert(pipeline.entry.clone(), so_far.and(done));
+                Ok(())
             }
             Command::Fail(what) => Err(format!("the f32 twin has no {what}")),
         }

@@ -11,6 +11,7 @@ use naga::{
 };
 
 use super::shape::words;
+use super::tally::KernelTally;
 
 /// The words that each variable of a dispatch binds. All workgroups share them.
 pub(super) type Buffers<'a> = HashMap<Handle<GlobalVariable>, &'a [AtomicU32]>;
@@ -78,6 +79,7 @@ pub(super) struct Group<'a> {
     /// Private variables of all invocations, laid out as values, and workgroup memory.
     pub memory: HashMap<Handle<GlobalVariable>, Vec<u32>>,
     pub frames: Vec<Frame<'a>>,
+    pub tally: KernelTally,
 }
 
 /// A result, or why the twin cannot go on.
@@ -91,8 +93,8 @@ impl<'a> Group<'a> {
         buffers: &'a Buffers<'a>,
     ) -> Done<Self> {
         let lanes = size.iter().product::<u32>() as usize;
-        let mut group =
-            Self { module, info, lanes, size, id, grid, buffers, memory: HashMap::new(), frames: Vec::new() };
+        let (memory, frames, tally) = Default::default();
+        let mut group = Self { module, info, lanes, size, id, grid, buffers, memory, frames, tally };
         for (handle, variable) in module.global_variables.iter() {
             let copies = match variable.space {
                 AddressSpace::Private => lanes,
@@ -108,8 +110,8 @@ impl<'a> Group<'a> {
         Ok(group)
     }
 
-    /// Runs an entry point.
-    pub fn run(&mut self, entry: usize) -> Done {
+    /// Runs an entry point. Returns what it did.
+    pub fn run(mut self, entry: usize) -> Done<KernelTally> {
         let function = &self.module.entry_points[entry].function;
         let arguments = function.arguments.iter().map(|argument| {
             let Some(naga::Binding::BuiltIn(built_in)) = argument.binding else {
@@ -119,7 +121,7 @@ impl<'a> Group<'a> {
         });
         let arguments = arguments.collect::<Done<Vec<_>>>()?;
         self.call(function, self.info.get_entry_point(entry), arguments, vec![true; self.lanes])?;
-        Ok(())
+        Ok(self.tally)
     }
 
     fn built_in(&self, built_in: BuiltIn) -> Done<Slot> {
@@ -244,6 +246,7 @@ impl<'a> Group<'a> {
             Statement::Call { function, arguments, result } => {
                 let arguments = arguments.iter().map(|argument| self.slot(*argument)).collect::<Done<Vec<_>>>()?;
                 let called = &self.module.functions[*function];
+                self.tally.called(called.name.as_deref().unwrap_or_default(), &mask);
                 let value = self.call(called, &self.info[*function], arguments, mask.clone())?;
                 if let (Some(result), Some(value)) = (result, value) {
                     self.top().values[result.index()] = Some(Slot::Value(value.into()));

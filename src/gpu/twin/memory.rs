@@ -138,6 +138,12 @@ impl Group<'_> {
             _ => None,
         };
         let combine = combination(fun, kind_of(&pointer.inner))?;
+        if let Root::Global(variable) = pointer.root
+            && self.buffers.contains_key(&variable)
+        {
+            let name = self.module.global_variables[variable].name.clone().unwrap_or_default();
+            *self.tally.atomics.entry(name).or_default() += mask.iter().filter(|on| **on).count() as u64;
+        }
         let mut memory = self.memory(pointer.root)?;
         let mut before = vec![0; lanes];
         let mut exchanged = vec![0; lanes];

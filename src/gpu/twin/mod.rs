@@ -17,12 +17,14 @@ mod objects;
 mod operations;
 mod raster;
 mod shape;
+mod tally;
 
 use rayon::prelude::*;
 
 use self::device::Device;
 use self::group::{Buffers, Group};
 use self::objects::{Bound, Pipeline};
+pub use self::tally::{Calls, KernelTally, Tally};
 use super::adapter::AdapterDescription;
 
 /// The name of the twin's interface, by which `--adapter` chooses it.
@@ -46,8 +48,13 @@ pub(super) fn open() -> (wgpu::Device, wgpu::Queue) {
     (wgpu::Device::from_custom(device.clone()), wgpu::Queue::from_custom(device))
 }
 
-/// Runs a kernel over a grid of workgroups.
-fn dispatch(pipeline: &Pipeline, bound: &[Bound], grid: [u32; 3]) -> Result<(), String> {
+/// Returns what the kernels have done since the last call, if `device` is the twin.
+pub(super) fn tally(device: &wgpu::Device) -> Option<Tally> {
+    device.as_custom::<Device>().map(Device::tally)
+}
+
+/// Runs a kernel over a grid of workgroups. Returns what it did.
+fn dispatch(pipeline: &Pipeline, bound: &[Bound], grid: [u32; 3]) -> Result<KernelTally, String> {
     let (module, info) = (*pipeline.kernels.0).as_ref().map_err(Clone::clone)?;
     let found = module.entry_points.iter().position(|point| point.name == pipeline.entry);
     let index = found.ok_or_else(|| format!("there is no kernel {}", pipeline.entry))?;
@@ -60,9 +67,11 @@ fn dispatch(pipeline: &Pipeline, bound: &[Bound], grid: [u32; 3]) -> Result<(), 
     let buffers: Buffers = variables.filter_map(|(handle, variable)| Some((handle, bound_by(variable)?))).collect();
     let size = module.entry_points[index].workgroup_size;
     let [across, down, deep] = grid.map(|count| count as usize);
-    let done = (0..across * down * deep).into_par_iter().try_for_each(|k| {
+    let run = |k: usize| {
         let id = [k % across, k / across % down, k / (across * down)].map(|place| place as u32);
         Group::new((module, info), size, (id, grid), &buffers)?.run(index)
-    });
+    };
+    let all = (0..across * down * deep).into_par_iter().map(run);
+    let done = all.try_reduce(KernelTally::default, |a, b| Ok(a.and(b)));
     done.map_err(|error| format!("the kernel {}: {error}", pipeline.entry))
 }

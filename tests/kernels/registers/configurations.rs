@@ -30,6 +30,7 @@ fn card() -> Target {
         name: "Radeon RX 6800".into(),
         api: "vulkan".into(),
         kind: "discrete",
+        max_compute_workgroup_storage_size: 1 << 15,
         max_storage_buffer_binding_size: most,
         max_buffer_size: most,
         max_storage_buffers_per_shader_stage: 64,
@@ -47,8 +48,7 @@ fn card() -> Target {
         | wgpu::Features::FLOAT32_BLENDABLE
         | wgpu::Features::TIMESTAMP_QUERY;
     let limits = wgpu::Limits {
-        // Core WebGPU grants no more.
-        max_compute_workgroup_storage_size: 16384,
+        max_compute_workgroup_storage_size: 1 << 15,
         max_compute_invocations_per_workgroup: 1024,
         max_compute_workgroup_size_x: 1024,
         max_compute_workgroup_size_y: 1024,

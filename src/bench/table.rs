@@ -129,8 +129,8 @@ pub(super) fn whole_frame(measurement: &Measurement) -> f64 {
     measurement.total_ms.median
 }
 
-/// Returns the time `ms` of a measurement divided by the baseline's in the same case; `None` without
-/// a baseline.
+/// Returns the time `ms` of a measurement divided by the baseline's in the same case; `None`
+/// without a baseline.
 pub(super) fn relative(
     definition: &Definition,
     study: &Study,

@@ -33,9 +33,9 @@ use super::{note, outputs, print};
 pub struct Arguments {
     /// Definitions of studies: .toml [default: those in the folder benches]
     studies: Vec<PathBuf>,
-    /// Run a built-in study instead of a record: hot-path (each optimisation, organisation, fetch of
-    /// tiles, threshold and number of frames in flight alone against the default, with equal bits;
-    /// the configurations of STUDIES are tried in the same way)
+    /// Run a built-in study instead of a record: hot-path (each optimisation, organisation, fetch
+    /// of tiles, threshold and number of frames in flight alone against the default, with equal
+    /// bits; the configurations of STUDIES are tried in the same way)
     #[arg(long, value_name = "NAME")]
     study: Option<BuiltIn>,
     /// Folder for the records

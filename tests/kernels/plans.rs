@@ -348,8 +348,7 @@ fn what_does_not_go_together_is_refused_by_one_rule() {
     }
     let raster = Raster { format: "rgba32float".parse().unwrap(), ..Raster::default() };
     assert!(refused(Settings { raster: Some(raster), ..Settings::default() }).contains("32-bit floats"));
-    let check =
-        |options: Settings| check::options(&options, false).map_err(|e| e.to_string());
+    let check = |options: Settings| check::options(&options, false).map_err(|e| e.to_string());
     assert_eq!(check(Settings::default()), Ok(()));
     let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
     assert_eq!(check(tile.clone()), Ok(()));

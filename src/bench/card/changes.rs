@@ -22,13 +22,13 @@ const IN_FLIGHT: [usize; 3] = [1, 2, 3];
 pub(super) struct Change {
     /// The name, in the words of the command line.
     pub name: String,
-    /// What differs.
+    /// The difference from the default.
     pub by: By,
     /// Whether quick runs try it too: they try each kind of change once.
     pub quick: bool,
 }
 
-/// What differs from frames of the default settings that the caller waits for.
+/// The difference from frames of the default settings that the caller waits for.
 #[derive(Clone, Debug)]
 pub(super) enum By {
     /// The settings.

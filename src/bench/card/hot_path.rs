@@ -78,7 +78,8 @@ pub struct Trial {
 }
 
 impl Trial {
-    /// The passes whose times differ by more than [`NAMED`], the largest difference first.
+    /// The passes whose times differ by more than a hundredth of the default's frame, the largest
+    /// difference first.
     pub fn changed(&self) -> Vec<(&str, [f64; 2])> {
         let frame = self.default_ms.median;
         let difference = |times: &[f64; 2]| (times[1] - times[0]).abs();
@@ -164,7 +165,7 @@ fn at_size(card: &mut Card<'_>, surfels: u64, changes: &[Change], deadline: Inst
     }
     told.progress.end();
     if !late.is_empty() {
-        card.leave_out(format!("changes at {surfels} surfels, as the time was over: {}", late.join(", ")));
+        card.leave_out(format!("changes at {surfels} surfels, as the time was over: {}", late.join("; ")));
     }
     unfit.into_iter().for_each(|what| card.leave_out(format!("changes at {surfels} surfels: {what}")));
     Ok(())

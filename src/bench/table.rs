@@ -31,7 +31,10 @@ pub fn text(definition: &Definition, study: &Study) -> String {
         ("ms".into(), Box::new(|m| format!("{:.2} ± {:.2}", m.total_ms.median, m.total_ms.mad))),
     ];
     if let Some(baseline) = &definition.baseline {
-        columns.push((format!("time / {baseline}"), Box::new(|m| optional(relative(definition, study, m), 2))));
+        columns.push((
+            format!("time / {baseline}"),
+            Box::new(|m| optional(relative(definition, study, (m, whole_frame)), 2)),
+        ));
     }
     columns.push(("max vs f64".into(), Box::new(|m| error(m.numeric.map(|n| n.max_abs)))));
     columns.push(("RMSE vs f64".into(), Box::new(|m| error(m.numeric_error()))));
@@ -91,7 +94,8 @@ pub fn markdown(definition: &Definition, study: &Study) -> String {
         text += &format!("| | time / {baseline} | largest error | RMSE vs f64 | same bits in any order | runs on |\n");
         text += "|---|---|---|---|---|---|\n";
         for m in case {
-            let time = relative(definition, study, m).map_or(NONE.to_owned(), |ratio| format!("{ratio:.2}"));
+            let time =
+                relative(definition, study, (m, whole_frame)).map_or(NONE.to_owned(), |ratio| format!("{ratio:.2}"));
             let (largest, rmse) = (error(m.numeric.map(|n| n.max_abs)), error(m.numeric_error()));
             let config = definition.configs.iter().find(|config| config.name == m.config);
             let bits = config.map_or(NONE, |config| if config.deterministic() { "yes" } else { "no" });
@@ -120,11 +124,21 @@ fn same_case(a: &Measurement, b: &Measurement) -> bool {
     a.scene == b.scene && a.surfels == b.surfels && a.footprint_px == b.footprint_px
 }
 
-/// Returns the median time divided by the baseline's in the same case; `None` without a baseline.
-pub(super) fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
+/// The median time of a frame, milliseconds.
+pub(super) fn whole_frame(measurement: &Measurement) -> f64 {
+    measurement.total_ms.median
+}
+
+/// Returns the time `ms` of a measurement divided by the baseline's in the same case; `None`
+/// without a baseline.
+pub(super) fn relative(
+    definition: &Definition,
+    study: &Study,
+    (of, ms): (&Measurement, fn(&Measurement) -> f64),
+) -> Option<f64> {
     let baseline = definition.baseline.as_ref()?;
     let base = study.measurements.iter().find(|m| m.config == *baseline && same_case(m, of))?;
-    Some(of.total_ms.median / base.total_ms.median).filter(|ratio| ratio.is_finite())
+    Some(ms(of) / ms(base)).filter(|ratio| ratio.is_finite())
 }
 
 fn error(value: Option<f64>) -> String {

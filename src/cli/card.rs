@@ -5,7 +5,7 @@ use std::time::SystemTime;
 
 use clap::Args;
 use epsplat::io::atomic;
-use epsplat::low_level::bench::card::{self, Asked, Told};
+use epsplat::low_level::bench::card::{self, Asked, BuiltIn, Told};
 use epsplat::low_level::bench::{Definition, machine};
 use epsplat::low_level::report;
 use epsplat::{Error, Result};
@@ -16,19 +16,28 @@ use super::{note, outputs, print};
 
 /// Make a record of an adapter in limited time: accuracy, equal bits, speed.
 ///
-/// The record has, in this order: the adapter; its copy bandwidth; the hard cases; images that must
-/// have the same bits; frames of spheres, with a lower bound of the bytes per second that each pass
-/// moves; and studies. Each step is written as soon as it is done, and steps that were left out for
-/// lack of time are named. STUDIES are TOML files, as for `epsplat bench`; by default card runs
-/// accumulators, organisation, optimisations, scaling and compute-vs-raster in the folder benches.
+/// The record has, in this order: the adapter; its bandwidth of copies by a kernel and by the copy
+/// command; the hard cases; images that must have the same bits; frames of spheres that the caller
+/// waits for and frames in flight, with a lower bound of the bytes per second that each pass moves;
+/// order, culling and organisation beside the default; and studies. The card's clocks are read
+/// before and after each step. Each step is written as soon as it is done, and steps that were left
+/// out for lack of time are named. STUDIES are TOML files, as for `epsplat bench`; by default card
+/// runs accumulators, organisation, optimisations, scaling and compute-vs-raster in the folder
+/// benches.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  epsplat card --out card\n  epsplat card --quick --out card-tried\n\n\
+#[command(after_help = "Examples:\n  epsplat card --out card\n  epsplat card --quick --out card-tried\n  \
+    epsplat card --study hot-path --out hot-path\n\n\
     Writes card.md (a summary), card.json (all of it), hardcases.json, and a report of each study.\n\
     Exits with 1, after everything is written, if an image misses its bound or differs in a bit,\n\
     a study fails, or a step could not be done.")]
 pub struct Arguments {
     /// Definitions of studies: .toml [default: those in the folder benches]
     studies: Vec<PathBuf>,
+    /// Run a built-in study instead of a record: hot-path (each optimisation, organisation, fetch
+    /// of tiles, threshold and number of frames in flight alone against the default, with equal
+    /// bits; the configurations of STUDIES are tried in the same way)
+    #[arg(long, value_name = "NAME")]
+    study: Option<BuiltIn>,
     /// Folder for the records
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
@@ -50,17 +59,22 @@ const FOLDER: &str = "benches";
 const STUDIES: [&str; 5] = ["accumulators", "organisation", "optimisations", "scaling", "compute-vs-raster"];
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let files = definitions(&arguments.studies)?;
+    let files = match arguments.study {
+        Some(_) => arguments.studies.clone(),
+        None => definitions(&arguments.studies)?,
+    };
     let mut studies = files.iter().map(|file| Definition::read(file)).collect::<Result<Vec<_>>>()?;
     card::check_names(&studies)?;
-    check_outputs(&arguments.out, &files, &studies)?;
-    if arguments.quick {
+    let reported = if arguments.study.is_some() { &[][..] } else { &studies[..] };
+    check_outputs(&arguments.out, (&files, &studies), reported)?;
+    if arguments.quick && arguments.study.is_none() {
         studies = studies.into_iter().map(Definition::quick_form).collect::<Result<_>>()?;
     }
     let asked = Asked {
         adapter: arguments.adapter.clone(),
         quick: arguments.quick,
         minutes: arguments.minutes.into(),
+        study: arguments.study,
         studies,
         command: machine::command(std::env::args_os().map(|argument| argument.to_string_lossy().into_owned())),
         date: machine::date(SystemTime::now()),
@@ -91,9 +105,10 @@ fn definitions(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(STUDIES.iter().map(|name| Path::new(FOLDER).join(name).with_extension("toml")).collect())
 }
 
-/// Fails if the records cannot be written to the folder, or would overwrite a file that is read.
-fn check_outputs(out: &Path, files: &[PathBuf], studies: &[Definition]) -> Result<()> {
-    let folders: Vec<PathBuf> = studies.iter().map(|study| out.join(&study.name)).collect();
+/// Fails if the records, and a report of each study in `reported`, cannot be written to the folder,
+/// or would overwrite a file that is read.
+fn check_outputs(out: &Path, (files, studies): (&[PathBuf], &[Definition]), reported: &[Definition]) -> Result<()> {
+    let folders: Vec<PathBuf> = reported.iter().map(|study| out.join(&study.name)).collect();
     let reports = folders.iter().flat_map(|folder| report::FILES.map(|name| folder.join(name)));
     let written: Vec<PathBuf> = card::FILES.iter().map(|name| out.join(name)).chain(reports).collect();
     let named: Vec<PathBuf> = studies.iter().flat_map(Definition::files).collect();

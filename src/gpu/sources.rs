@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 
 /// The source of a module.
+#[derive(PartialEq)]
 pub(crate) struct Text {
     pub joined: String,
     /// Whether every loop gets a counter that ends it.
@@ -114,7 +115,7 @@ impl Sources {
     }
 
     /// Returns the source of the module of `files`, and of the arithmetic.
-    pub(super) fn text(&self, files: &[&str]) -> Text {
+    pub(crate) fn text(&self, files: &[&str]) -> Text {
         self.text_of(&[files, &[ARITHMETIC]].concat())
     }
 

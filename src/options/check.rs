@@ -16,7 +16,7 @@ struct Clash {
 }
 
 /// All refused combinations that do not depend on the scene.
-const CLASHES: [Clash; 9] = [
+const CLASHES: [Clash; 10] = [
     Clash {
         applies: |options, _, settings| settings.blend == Blend::Nearest && options.surface.epsilon.is_some(),
         sentence: "--blend nearest has no tolerance: leave --epsilon out",
@@ -54,6 +54,10 @@ const CLASHES: [Clash; 9] = [
             (settings.organisation != Organisation::default() || !settings.without.is_empty()) && !is_gpu(backend)
         },
         sentence: "the organisation, and what is left out of it, are of the backend gpu alone: leave them out",
+    },
+    Clash {
+        applies: |_, backend, settings| (settings.fetch.is_some() || settings.large.is_some()) && !is_gpu(backend),
+        sentence: "--fetch and --large are of the backend gpu alone: leave them out",
     },
     Clash {
         applies: |options, backend, _| {
@@ -102,7 +106,7 @@ mod tests {
 
     #[test]
     fn every_clash_is_refused_and_says_what_to_do() {
-        let clashes: [(&str, &[(&str, &str)]); 11] = [
+        let clashes: [(&str, &[(&str, &str)]); 15] = [
             ("auto", &[("blend", "nearest"), ("epsilon", "abs:1")]),
             ("auto", &[("blend", "nearest"), ("kernel", "hat")]),
             ("auto", &[("composite", "weighted"), ("epsilon", "abs:1")]),
@@ -112,6 +116,10 @@ mod tests {
             ("reference", &[("accumulator", "float")]),
             ("raster", &[("organisation", "tile")]),
             ("reference", &[("without", "order")]),
+            ("raster", &[("large", "64")]),
+            ("reference", &[("fetch", "staged")]),
+            ("gpu", &[("fetch", "staged"), ("organisation", "scatter")]),
+            ("gpu", &[("large", "4097")]),
             ("gpu", &[("blend_format", "rgba8unorm")]),
             ("auto", &[("opacity", "2")]),
         ];
@@ -120,9 +128,10 @@ mod tests {
         }
         // Accepted: defaults that are given explicitly, and options with the backend or shading
         // that they need.
-        let fine: [(&str, &[(&str, &str)]); 4] = [
+        let fine: [(&str, &[(&str, &str)]); 5] = [
             ("reference", &[("accumulator", "fixed"), ("organisation", "auto")]),
             ("auto", &[("tail", "sum")]),
+            ("gpu", &[("fetch", "alone"), ("organisation", "tile"), ("large", "4096")]),
             ("raster", &[("raster_depth", "offset")]),
             ("auto", &[("shading", "phong"), ("shininess", "8")]),
         ];

@@ -2,7 +2,7 @@
 
 use super::group::group;
 use crate::gpu::Replacement;
-use crate::plan::{Accumulator, BlendFormat, Optimisation, Organisation, RasterDepth};
+use crate::plan::{Accumulator, BlendFormat, Fetch, Optimisation, Organisation, RasterDepth};
 use crate::scene::{DetailMeasure, NodeShape, Outline, ShadingAt};
 
 group! {
@@ -18,6 +18,16 @@ group! {
         /// (by tiles of the image) or auto (chosen by splat size and adapter) [default: auto]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", hide_short_help = true))]
         pub organisation: Option<Organisation>,
+        /// How tiles get splats, with the same bits in the image: shared (eight invocations a tile
+        /// exchange them), alone (each of them fetches its own) or staged (an invocation a pixel,
+        /// from workgroup memory) [default: by the adapter]
+        #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", hide_short_help = true))]
+        pub fetch: Option<Fetch>,
+        /// Number of pixels, 0 to 4096, above which the bounds of a splat make it large: drawn by
+        /// tiles, or with scatter by a workgroup; the bits of the image are the same [default: 256
+        /// for tiles (0 with --organisation tile), 1024 for workgroups]
+        #[cfg_attr(feature = "cli", arg(long, value_name = "PIXELS", hide_short_help = true))]
+        pub large: Option<u32>,
         /// Optimisations to turn off, none of which changes a bit of the picture: culling, order,
         /// hiding, copies, pairs, long-words, gathering, sharing, uncounted-loops or division
         #[cfg_attr(feature = "cli", arg(long, value_name = "NAMES", value_delimiter = ',', hide_short_help = true))]

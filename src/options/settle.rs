@@ -62,6 +62,8 @@ impl RenderOptions {
             outline: research.outline,
             accumulator: research.accumulator.unwrap_or_default(),
             organisation: research.organisation.unwrap_or_default(),
+            fetch: research.fetch,
+            large: research.large,
             raster,
             shading: look.shading.or(unlit.then_some(Shading::Unlit)).or(suggested.shading).unwrap_or(default.shading),
             shading_at: research.shading_at.unwrap_or_default(),

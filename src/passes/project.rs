@@ -12,10 +12,10 @@ use super::homography::{self, slope};
 use super::lowpass::{self, Design};
 use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
-use crate::plan::pass::{Making, Pass};
+use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, Settings, Sides, composited, culls_back};
-use crate::plan::{Organisation, Plan, tuning};
+use crate::plan::{Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
 /// A surfel with its index, and with its cap if some surfel of the scene curves.
@@ -146,20 +146,16 @@ pub const PASS: Pass = Pass {
     name: "project",
     files: |_| vec!["project.wgsl"],
     kernels: |_| vec![PROJECT, PROJECT_RARE],
-    constants: |making| vec![("LARGE", large(making).into()), ("CULL_BACK", u32::from(making.needs.cull_back).into())],
+    constants: |making| {
+        vec![
+            ("LARGE", tuning::large(making.needs.surface.tiles(), making.options).into()),
+            ("CULL_BACK", u32::from(making.needs.cull_back).into()),
+        ]
+    },
 };
 
 const PROJECT: Kernel = Kernel::new("project");
 const PROJECT_RARE: Kernel = Kernel::new("project_rare");
-
-/// The number of pixels above which the bounds of a splat make it large.
-fn large(making: &Making<'_>) -> u32 {
-    match (making.needs.surface.tiles(), making.options.organisation) {
-        (true, Organisation::Tile) => 0,
-        (true, _) => tuning::LARGE_BY_TILES,
-        (false, _) => tuning::LARGE_BY_WORKGROUPS,
-    }
-}
 
 /// The stage that projects `part` of the surfels, for `band` or for it and all later bands.
 ///

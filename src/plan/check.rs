@@ -7,6 +7,7 @@ mod table;
 
 pub use self::adapter::{on_adapter, sums};
 use self::table::{FADES, OPTIONS, SCENES, TEXTURES, TILES};
+use super::tuning::MOST_LARGE;
 use super::{Facts, Settings, composited};
 use crate::error::{Error, Result};
 use crate::scene::light::MAX_LIGHTS;
@@ -61,6 +62,9 @@ fn in_range(options: &Settings) -> Result<()> {
     }
     if options.shading == Shading::Phong && !(least..=most).contains(&options.shininess) {
         return usage(format!("the shininess is {least} to {most}, not {}", options.shininess));
+    }
+    if let Some(large) = options.large.filter(|large| *large > MOST_LARGE) {
+        return usage(format!("a splat is large above 0 to {MOST_LARGE} pixels, not {large}"));
     }
     if !(0.0..=1.0).contains(&options.opacity) {
         return usage(format!("the opacity is 0 to 1, not {}", options.opacity));

@@ -250,7 +250,7 @@ impl SceneNeeds {
                 Surface::Blended { splats: Splats::Copies, separate: false }
             }
             Surface::Blended { splats: Splats::Tiles { gather, .. }, separate } => {
-                let fetch = tuning::fetch(adapter, options.has(Optimisation::Sharing));
+                let fetch = tuning::fetch(adapter, options);
                 Surface::Blended { splats: Splats::Tiles { gather, fetch }, separate }
             }
             Surface::Raster { raster, shown, .. } => {

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::{Accumulator, Optimisation, Raster};
+use super::{Accumulator, Fetch, Optimisation, Raster};
 use crate::error::Error;
 use crate::gpu::Replacement;
 use crate::scene::{
@@ -111,6 +111,14 @@ pub struct Settings {
     pub accumulator: Accumulator,
     /// How the device draws splats; with other accumulators than `fixed` they are scattered.
     pub organisation: Organisation,
+    /// How tiles get splats; None chooses by the adapter ([`tuning::fetch`](super::tuning::fetch)).
+    /// No image depends on it.
+    pub fetch: Option<Fetch>,
+    /// The number of pixels above which the bounds of a splat make it large, at most
+    /// [`MOST_LARGE`](super::tuning::MOST_LARGE). Large splats are drawn by tiles, or where there
+    /// are none by a workgroup each. None is the measured threshold
+    /// ([`tuning::large`](super::tuning::large)). No image depends on it.
+    pub large: Option<u32>,
     /// The rasteriser makes the sums, instead of compute kernels.
     pub raster: Option<Raster>,
     /// Shading model.
@@ -205,6 +213,8 @@ impl Default for Settings {
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,
             organisation: Organisation::Auto,
+            fetch: None,
+            large: None,
             raster: None,
             shading: Shading::Lambert,
             shading_at: ShadingAt::Pixel,

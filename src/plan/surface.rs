@@ -1,6 +1,9 @@
 //! The ways in which the fragments of a pixel become its colour. Each picture has one of them.
 
+use std::str::FromStr;
+
 use super::{Accumulator, Facts, Lists, Oit, Organisation, Raster, Settings};
+use crate::error::Error;
 use crate::scene::{Blend, Composite};
 
 /// How the fragments of a pixel become its colour.
@@ -76,6 +79,23 @@ pub enum Fetch {
     /// An invocation for each pixel; all of them read splats that were copied to workgroup memory
     /// (`wgsl/tiles/staged.wgsl`).
     Staged,
+}
+
+impl Fetch {
+    /// Every way and its name.
+    pub const ALL: [(Self, &'static str); 3] =
+        [(Self::Shared, "shared"), (Self::Alone, "alone"), (Self::Staged, "staged")];
+}
+
+impl FromStr for Fetch {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let known = Self::ALL.iter().find(|(_, name)| *name == text);
+        known
+            .map(|(fetch, _)| *fetch)
+            .ok_or_else(|| Error::Usage(format!("tiles do not fetch splats {text:?}: take shared, alone or staged")))
+    }
 }
 
 /// How compute kernels find the only fragment that shows at a pixel

@@ -3,7 +3,7 @@
 //! All were measured on Mesa 22.3's llvmpipe, a software adapter, at 1024x1024. None was measured
 //! on a graphics card yet.
 
-use super::Fetch;
+use super::{Fetch, Optimisation, Organisation, Settings};
 use crate::gpu::adapter::AdapterDescription;
 
 /// Batches are culled if there is more than one surfel per this many pixels. With culling, frames
@@ -48,14 +48,28 @@ pub fn spreads(adapter: &AdapterDescription) -> bool {
     !adapter.is_software() && adapter.max_compute_workgroup_storage_size >= 1 << 15
 }
 
+/// The largest number of pixels that one invocation draws as a small splat: software adapters end
+/// the loops of an invocation after 65,535 rounds.
+pub const MOST_LARGE: u32 = 4096;
+
+/// The number of pixels above which the bounds of a splat make it large, with or without `tiles`.
+pub fn large(tiles: bool, options: &Settings) -> u32 {
+    options.large.unwrap_or(match (tiles, options.organisation) {
+        (true, Organisation::Tile) => 0,
+        (true, _) => LARGE_BY_TILES,
+        (false, _) => LARGE_BY_WORKGROUPS,
+    })
+}
+
 /// How the invocations of a tile get splats. A processor should fetch a splat once for all the
 /// pixels of a column: on the bunny llvmpipe takes 100 times as long with a pixel an invocation. A
 /// graphics card (RDNA 2, by Mesa's compiler) keeps 4 of 32 waves with the registers of a column,
 /// 16 with those of a pixel, and 12 if surfels are curved (`tests/golden/registers.txt`).
-pub fn fetch(adapter: &AdapterDescription, shares: bool) -> Fetch {
-    match (adapter.is_software(), adapter.subgroups && shares) {
+pub fn fetch(adapter: &AdapterDescription, options: &Settings) -> Fetch {
+    let shares = adapter.subgroups && options.has(Optimisation::Sharing);
+    options.fetch.unwrap_or(match (adapter.is_software(), shares) {
         (false, _) => Fetch::Staged,
         (true, true) => Fetch::Shared,
         (true, false) => Fetch::Alone,
-    }
+    })
 }

@@ -107,7 +107,7 @@ impl Kept {
             self.size = size;
         }
         let options = &self.options;
-        let shares = tuning::fetch(&gpu.adapter, options.has(Optimisation::Sharing)) == Fetch::Shared;
+        let shares = tuning::fetch(&gpu.adapter, options) == Fetch::Shared;
         if shares && options.organisation == Organisation::Auto && options.has(Optimisation::Gathering) {
             self.known.touched_tiles = tiles::touched(&self.facts, camera, options);
         }

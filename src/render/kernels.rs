@@ -48,6 +48,17 @@ impl Kernels {
         self.made.0 == plan.needs && self.made.1 == bits(&constants(&making))
     }
 
+    /// Whether the modules of `other` have the same text, entry points and constants.
+    #[cfg(feature = "bench")]
+    pub fn are_those_of(&self, other: &Self) -> bool {
+        let same = |((own, _), (others, _)): (&(Module, _), &(Module, _))| {
+            let texts = [(&self.sources, own), (&other.sources, others)].map(|(sources, of)| sources.text(&of.files));
+            own.kernels == others.kernels && texts[0] == texts[1]
+        };
+        let both = self.modules.iter().zip(&other.modules);
+        self.made.1 == other.made.1 && self.modules.len() == other.modules.len() && both.into_iter().all(same)
+    }
+
     /// Compiles and returns the module of all passes.
     pub fn first(&self, gpu: &Gpu) -> Result<&Program> {
         self.compiled(gpu, 0)

@@ -167,6 +167,13 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         self.faults.as_ref()
     }
 
+    /// Whether the last frames of both renderers were drawn by the same compiled kernels.
+    #[cfg(feature = "bench")]
+    pub(crate) fn has_kernels_of(&self, other: &Self) -> bool {
+        let both = self.kept.kernels.as_ref().zip(other.kept.kernels.as_ref());
+        both.is_some_and(|(own, others)| own.are_those_of(others))
+    }
+
     /// Device memory of the last frame; zero for the reference.
     pub fn device_bytes(&self) -> DeviceBytes {
         self.kept.device_bytes()

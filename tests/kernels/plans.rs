@@ -11,7 +11,8 @@ use epsplat::low_level::passes::fragments;
 use epsplat::low_level::plan::known::Listed;
 use epsplat::low_level::plan::steps::{Look, Over, Stage, Step};
 use epsplat::low_level::plan::{
-    Accumulator, Band, Facts, Known, Optimisation, Organisation, Plan, Raster, Settings, page_surfels,
+    Accumulator, Band, Facts, Fetch, Known, Optimisation, Organisation, Plan, Raster, SceneNeeds, Settings, check,
+    page_surfels, tuning,
 };
 use epsplat::low_level::render::sequence::steps;
 use epsplat::low_level::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
@@ -187,6 +188,32 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
 }
 
 #[test]
+fn a_study_chooses_how_tiles_get_splats_and_which_are_large() {
+    let (scene, camera) = (sphere(1000, 1.5), sphere_camera(256, Projection::Pinhole));
+    let facts = Facts::of(&scene);
+    let card = AdapterDescription { kind: "discrete", ..software() };
+    let of = |adapter: &AdapterDescription, options: &Settings| {
+        SceneNeeds::of(&facts, adapter, &camera, options).surface.fetch().unwrap()
+    };
+    let plain = Settings::default();
+    assert_eq!((of(&card, &plain), of(&software(), &plain)), (Fetch::Staged, Fetch::Shared));
+    for (fetch, _) in Fetch::ALL {
+        let options = Settings { fetch: Some(fetch), ..Settings::default() };
+        assert_eq!([&card, &software()].map(|adapter| of(adapter, &options)), [fetch; 2]);
+    }
+    let shared = Settings { fetch: Some(Fetch::Shared), ..Settings::default() };
+    let refused = |adapter: &AdapterDescription| {
+        check::on_adapter(adapter, &SceneNeeds::of(&facts, adapter, &camera, &shared), &camera).err()
+    };
+    assert!(refused(&card).is_none());
+    assert!(refused(&AdapterDescription::core()).unwrap().to_string().contains("take --fetch staged"));
+    let large = |options: &Settings| [true, false].map(|tiles| tuning::large(tiles, options));
+    assert_eq!(large(&plain), [tuning::LARGE_BY_TILES, tuning::LARGE_BY_WORKGROUPS]);
+    assert_eq!(large(&Settings { organisation: Organisation::Tile, ..Settings::default() })[0], 0);
+    assert_eq!(large(&Settings { large: Some(40), organisation: Organisation::Tile, ..Settings::default() }), [40; 2]);
+}
+
+#[test]
 fn small_buffers_make_bands_and_pages() {
     let scene = sphere(3000, 1.5);
     let small = AdapterDescription { max_storage_buffer_binding_size: 100_000, ..AdapterDescription::core() };
@@ -321,13 +348,12 @@ fn what_does_not_go_together_is_refused_by_one_rule() {
     }
     let raster = Raster { format: "rgba32float".parse().unwrap(), ..Raster::default() };
     assert!(refused(Settings { raster: Some(raster), ..Settings::default() }).contains("32-bit floats"));
-    let check =
-        |options: Settings| epsplat::low_level::plan::check::options(&options, false).map_err(|e| e.to_string());
+    let check = |options: Settings| check::options(&options, false).map_err(|e| e.to_string());
     assert_eq!(check(Settings::default()), Ok(()));
     let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
     assert_eq!(check(tile.clone()), Ok(()));
     let other = Settings { accumulator: Accumulator::Cas, ..tile };
-    let of_study = epsplat::low_level::plan::check::by_tiles(&other).unwrap_err().to_string();
+    let of_study = check::by_tiles(&other).unwrap_err().to_string();
     assert!(check(other) == Ok(()) && of_study.contains("accumulator fixed"), "{of_study}");
     let phong = Settings { shading: Shading::Phong, shininess: 1e6, ..Settings::default() };
     assert!(check(phong).unwrap_err().contains("shininess"));

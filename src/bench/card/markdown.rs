@@ -1,12 +1,10 @@
 //! Formats a record as a Markdown page.
 
-use super::{ConfigRecord, PassRecord, Record, StudyRecord, Throughput};
+use super::{ConfigRecord, Record, StudyRecord, speeds};
+use crate::bench::bandwidth::Copier;
 use crate::report::Summary;
 
-/// The passes with a column in the table, in the order of a frame.
-const PASSES: [&str; 5] = ["project", "bin", "visibility", "accumulate", "resolve"];
-
-/// Formats the overview, the failures, the times of the passes, the studies, and the skipped work.
+/// Formats the overview, the failures, the speeds, the studies, and the skipped work.
 pub fn markdown(record: &Record) -> String {
     let adapter = &record.adapter;
     let mut text = format!("# {}\n\n", adapter.name);
@@ -18,7 +16,7 @@ pub fn markdown(record: &Record) -> String {
         text += &format!("| {head} | {} |\n", cell.replace('|', "\\|"));
     }
     text += &list("What is wrong", &record.failures());
-    text += &throughput(record);
+    text += &speeds::tables(record);
     text += &studies(record);
     text + &list("Left out", &record.left_out)
 }
@@ -31,16 +29,7 @@ fn overview(record: &Record) -> Vec<(&'static str, String)> {
         ("run", format!("`{}`, epsplat {}, {}", record.command, machine.version, record.date)),
         ("time", format!("{:.0} of {:.0} s{}", record.seconds, 60.0 * record.minutes, steps(record))),
     ];
-    if let Some(copy) = &record.copy_bandwidth {
-        let (runs, copies, mib) = (copy.runs, copy.copies, copy.buffer_bytes >> 20);
-        let [speed, mad] = [copy.gb_per_second.median, copy.gb_per_second.mad];
-        let wall = copy.wall_gb_per_second.median;
-        let how = format!("median of {runs} runs of {copies} copies of {mib} MiB, by {}", copy.clock);
-        rows.push((
-            "copy bandwidth",
-            format!("**{speed:.1} ± {mad:.1} GB/s** read and written ({how}; wall: {wall:.1})"),
-        ));
-    }
+    rows.extend([Copier::Kernel, Copier::Command].into_iter().filter_map(|by| speeds::copy(record, by)));
     if let Some(found) = &record.accuracy {
         let (passed, expected, failed) = (found.passed, found.expected_failures, found.failed);
         let verdict = if failed == 0 { "none fails".to_owned() } else { format!("**{failed} FAIL**") };
@@ -70,46 +59,6 @@ fn list(head: &str, sentences: &[String]) -> String {
     if items.is_empty() { items } else { format!("\n## {head}\n\n{items}") }
 }
 
-/// Formats a table of frame times: a row per number of surfels, a column per pass that ran.
-fn throughput(record: &Record) -> String {
-    let Some(first) = record.throughput.first() else { return String::new() };
-    let [width, height] = first.size;
-    let there = |pass: &&&str| record.throughput.iter().any(|row| row.passes.contains_key(**pass));
-    let passes: Vec<&str> = PASSES.iter().filter(there).copied().collect();
-    let mut text = format!(
-        "\n## Frames of a lit sphere, {width}x{height}\n\n\
-         Medians in ms (clock of the passes: {}). In brackets: the least bytes that a pass moves, in GB/s and as a share of\n\
-         the copy bandwidth; caches make shares above 100 % possible.\n\n",
-        first.clock,
-    );
-    let heads = passes.iter().map(|pass| format!(" {pass} |")).collect::<String>();
-    text += &format!(
-        "| surfels | px | drawn | frame | million splats/s |{heads} rest |\n|{}\n",
-        "---|".repeat(passes.len() + 6)
-    );
-    for row in &record.throughput {
-        let cells = passes.iter().map(|pass| format!(" {} |", cell(row.passes.get(*pass)))).collect::<String>();
-        let Throughput { surfels, footprint_px, splats_drawn, total_ms, rest_ms, splats_per_second, .. } = row;
-        text += &format!(
-            "| {surfels} | {footprint_px:.1} | {splats_drawn} | {:.2} ± {:.2} | {:.3} |{cells} {rest_ms:.2} |\n",
-            total_ms.median,
-            total_ms.mad,
-            splats_per_second * 1e-6,
-        );
-    }
-    text
-}
-
-fn cell(pass: Option<&PassRecord>) -> String {
-    let Some(pass) = pass else { return "-".to_owned() };
-    let ms = format!("{:.3}", pass.ms.median);
-    match (pass.gb_per_second, pass.share_of_copy) {
-        (Some(speed), Some(share)) => format!("{ms} ({speed:.1}, {:.1} %)", 100.0 * share),
-        (Some(speed), None) => format!("{ms} ({speed:.1})"),
-        _ => ms,
-    }
-}
-
 /// Formats a table of the studies, and for each a table of its configurations' times and errors.
 fn studies(record: &Record) -> String {
     if record.studies.is_empty() {
@@ -136,15 +85,18 @@ fn configs(study: &StudyRecord) -> String {
     }
     let baseline = study.baseline.as_deref().unwrap_or("-");
     let mut text = format!("\n**{}**: {}\n\n", study.name, study.about);
-    text +=
-        &format!("| | scenes | time / {baseline}: median | least | most | worst RMSE |\n|---|---|---|---|---|---|\n");
-    for ConfigRecord { config, scenes, time_over_baseline, worst_rmse } in &study.configs {
-        let times = time_over_baseline.map_or("- | - | -".to_owned(), |time| {
-            let Summary { median, min, max, .. } = time;
-            format!("{median:.2} | {min:.2} | {max:.2}")
+    text += &format!(
+        "| | scenes | frame / {baseline}: median | least | most | passes alone: median | least | most | worst RMSE |\n{}\n",
+        "|---|---|---|---|---|---|---|---|---|"
+    );
+    for ConfigRecord { config, scenes, time_over_baseline, passes_over_baseline, worst_rmse } in &study.configs {
+        let [frames, passes] = [time_over_baseline, passes_over_baseline].map(|ratio| {
+            ratio.map_or("- | - | -".to_owned(), |Summary { median, min, max, .. }| {
+                format!("{median:.2} | {min:.2} | {max:.2}")
+            })
         });
         let error = worst_rmse.map_or("-".to_owned(), |rmse| format!("{rmse:.1e}"));
-        text += &format!("| {config} | {scenes} | {times} | {error} |\n");
+        text += &format!("| {config} | {scenes} | {frames} | {passes} | {error} |\n");
     }
     text
 }

@@ -2,28 +2,38 @@
 //!
 //! [`run`] performs the steps in an order in which each step helps to interpret the next. It writes
 //! [`FILES`] after each step, so that an interrupted run keeps its results. If a step fails, the
-//! error is added to the [`Record`] and the next step opens the adapter again.
+//! error is added to the [`Record`] and the next step opens the adapter again. The card's clocks
+//! are read before and after each step.
 
 mod accuracy;
 mod bytes;
+mod changes;
+mod clocks;
 mod determinism;
+mod hot_path;
 mod markdown;
+mod pace;
 mod record;
+mod speeds;
 mod studies;
 mod throughput;
 
 use std::path::Path;
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 pub use self::accuracy::{Accuracy, Worst};
 pub use self::bytes::Moved;
+pub use self::clocks::Clocks;
 pub use self::determinism::Comparison;
+pub use self::hot_path::Trial;
 pub use self::markdown::markdown;
+pub use self::pace::{InFlight, WarmUp};
 pub use self::record::{FILES, Record, Step};
 pub use self::studies::{ConfigRecord, StudyRecord, check_names};
 pub use self::throughput::{PassRecord, Throughput};
 
-use super::bandwidth::CopyBandwidth;
+use super::bandwidth::{Copier, CopyBandwidth};
 use super::definition::Definition;
 use super::staging::{Point, Staged, stage};
 use crate::error::{Error, Result};
@@ -40,12 +50,33 @@ pub struct Asked {
     pub quick: bool,
     /// Time limit in minutes. Work that does not fit is skipped and listed in [`Record::left_out`].
     pub minutes: f64,
-    /// The studies. For a quick run, the caller passes their quick forms.
+    /// A built-in study that is run alone, in place of a record.
+    pub study: Option<BuiltIn>,
+    /// The studies. For a quick run, the caller passes their quick forms. With a built-in study,
+    /// their configurations are tried beside its own.
     pub studies: Vec<Definition>,
     /// The command line, as it is recorded.
     pub command: String,
     /// The date, as it is recorded.
     pub date: String,
+}
+
+/// A study that needs no file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BuiltIn {
+    /// Each change of the hot path alone against the default.
+    HotPath,
+}
+
+impl FromStr for BuiltIn {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "hot-path" => Ok(Self::HotPath),
+            _ => Err(Error::Usage(format!("there is no built-in study {text:?}: take hot-path"))),
+        }
+    }
 }
 
 /// The callbacks that report the progress of a run.
@@ -60,17 +91,25 @@ pub struct Told<'a> {
 /// A step: its name, and its function.
 type Work = (&'static str, fn(&mut Card<'_>) -> Result<()>);
 
-/// The steps after the first, which opens the adapter.
-const STEPS: [Work; 5] = [
+/// The steps of a record after the first, which opens the adapter.
+const STEPS: [Work; 6] = [
     ("copy bandwidth", bandwidth),
     ("accuracy", accuracy::check),
     ("determinism", determinism::check),
     ("throughput", throughput::measure),
+    ("choices", hot_path::usual),
     ("studies", studies::run),
 ];
 
-/// Buffer size in bytes and number of timings of the copy bandwidth, in a full and in a quick run.
-const COPIED: [(u64, u32); 2] = [(256 << 20, 9), (32 << 20, 5)];
+/// The steps of the study of the hot path, after the first.
+const HOT_PATH: [Work; 2] = [("copy bandwidth", bandwidth), ("hot path", hot_path::study)];
+
+/// Buffer sizes in bytes of the copy bandwidth, the smallest first: full run, quick run. A buffer
+/// that fits a card's cache is copied faster than memory.
+const COPIED: [&[u64]; 2] = [&[16 << 20, 64 << 20, 256 << 20, 1 << 30], &[4 << 20, 32 << 20]];
+
+/// Number of timings of the copy bandwidth: full run, quick run.
+const COPY_RUNS: [u32; 2] = [9, 3];
 
 /// Runs all steps and writes their records into `folder`, which is created if it is missing.
 ///
@@ -82,7 +121,8 @@ const COPIED: [(u64, u32); 2] = [(256 << 20, 9), (32 << 20, 5)];
 pub fn run(asked: &Asked, folder: &Path, told: Told<'_>) -> Result<Record> {
     let start = Instant::now();
     std::fs::create_dir_all(folder).map_err(|e| Error::write(folder, e))?;
-    let steps = 1 + STEPS.len();
+    let work: &[Work] = if asked.study.is_some() { &HOT_PATH } else { &STEPS };
+    let steps = 1 + work.len();
     (told.say)(&format!("[1/{steps}] adapter"));
     let gpu = Gpu::open(asked.adapter.as_deref())?;
     let adapter = gpu.adapter.clone();
@@ -92,8 +132,8 @@ pub fn run(asked: &Asked, folder: &Path, told: Told<'_>) -> Result<Record> {
     let record = Record::new(asked, &backend, adapter);
     let mut card = Card { asked, folder, told, budget, backend, record };
     card.end_step("adapter", start)?;
-    for (number, step) in (2..).zip(STEPS) {
-        card.step(&format!("[{number}/{steps}]"), step)?;
+    for (number, step) in (2..).zip(work) {
+        card.step(&format!("[{number}/{steps}]"), *step)?;
     }
     Ok(card.record)
 }
@@ -113,9 +153,11 @@ impl Card<'_> {
         let start = Instant::now();
         let [spent, total] = [self.budget.start.elapsed(), self.budget.total].map(|time| time.as_secs());
         (self.told.say)(&format!("{number} {name} (after {spent} of {total} s)"));
+        self.read_clocks(format!("before {name}"));
         if let Err(error) = work(self) {
             self.problem(name, error)?;
         }
+        self.read_clocks(format!("after {name}"));
         self.end_step(name, start)
     }
 
@@ -145,6 +187,16 @@ impl Card<'_> {
         self.record.write(self.folder)
     }
 
+    /// The place of this run's form in constants: 0 for a full run, 1 for a quick run.
+    fn form(&self) -> usize {
+        usize::from(self.asked.quick)
+    }
+
+    /// Records the card's clocks at this time.
+    fn read_clocks(&mut self, when: String) {
+        self.record.clocks.push(Clocks::read(&self.record.adapter, when));
+    }
+
     /// Records work that is skipped, with the reason, and reports it.
     fn leave_out(&mut self, what: String) {
         (self.told.say)(&format!("  left out: {what}"));
@@ -152,13 +204,30 @@ impl Card<'_> {
     }
 }
 
+/// Measures copies by kernels and by commands. Sizes that the adapter does not allow are left out.
 fn bandwidth(card: &mut Card<'_>) -> Result<()> {
-    let (bytes, runs) = COPIED[usize::from(card.asked.quick)];
-    if let Backend::Gpu { gpu, .. } = &card.backend {
-        let found = CopyBandwidth::measure(gpu, bytes, runs)?;
-        (card.told.say)(&format!("  {:.1} GB/s", found.gb_per_second.median));
-        card.record.copy_bandwidth = Some(found);
+    let form = card.form();
+    let Backend::Gpu { gpu, .. } = &card.backend else { return Ok(()) };
+    let mut sizes: Vec<u64> = COPIED[form].iter().map(|bytes| (*bytes).min(gpu.buffer_limit())).collect();
+    sizes.dedup();
+    let mut unable = Vec::new();
+    for by in [Copier::Kernel, Copier::Command] {
+        for bytes in &sizes {
+            match CopyBandwidth::measure(gpu, by, *bytes, COPY_RUNS[form]) {
+                Ok(found) => card.record.copies.push(found),
+                // The last size that fits stands for memory.
+                Err(error) if card.record.copy_of_memory(by).is_some() => {
+                    unable.push(format!("copies of {bytes} bytes: {error}"));
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
     }
+    unable.into_iter().for_each(|what| card.leave_out(what));
+    let speed = |copy: Option<&CopyBandwidth>| copy.map_or(0.0, |copy| copy.gb_per_second.max);
+    let [kernel, command] = [Copier::Kernel, Copier::Command].map(|by| speed(card.record.copy_of_memory(by)));
+    (card.told.say)(&format!("  {kernel:.1} GB/s by a kernel, {command:.1} GB/s by the copy command"));
     Ok(())
 }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{Accuracy, Asked, Comparison, StudyRecord, Throughput, accuracy, markdown};
-use crate::bench::bandwidth::CopyBandwidth;
+use super::{Accuracy, Asked, Clocks, Comparison, StudyRecord, Throughput, Trial, accuracy, markdown};
+use crate::bench::bandwidth::{Copier, CopyBandwidth};
 use crate::bench::machine::machine;
 use crate::error::{Error, Result};
 use crate::gpu::AdapterDescription;
@@ -37,8 +37,10 @@ pub struct Record {
     pub adapter: AdapterDescription,
     /// The finished steps.
     pub steps: Vec<Step>,
-    /// The copy bandwidth of the device; `None` until it is measured.
-    pub copy_bandwidth: Option<CopyBandwidth>,
+    /// The card's clocks, in the order in which they were read.
+    pub clocks: Vec<Clocks>,
+    /// The copy bandwidth of the device by kernels and by commands, for growing buffers.
+    pub copies: Vec<CopyBandwidth>,
     /// The results of the hard cases; `None` until they have run.
     pub accuracy: Option<Accuracy>,
     /// Comparisons of images that must be bit-identical.
@@ -48,6 +50,8 @@ pub struct Record {
     pub bits: BTreeMap<String, BTreeMap<&'static str, String>>,
     /// Frame times, one entry per number of surfels.
     pub throughput: Vec<Throughput>,
+    /// Changes of the hot path beside the default, by number of surfels.
+    pub changes: Vec<Trial>,
     /// The studies that ran.
     pub studies: Vec<StudyRecord>,
     /// Errors that ended a step or a part of it, one sentence each.
@@ -77,15 +81,22 @@ impl Record {
             machine: machine(Some(backend)),
             adapter,
             steps: Vec::new(),
-            copy_bandwidth: None,
+            clocks: Vec::new(),
+            copies: Vec::new(),
             accuracy: None,
             determinism: Vec::new(),
             bits: BTreeMap::new(),
             throughput: Vec::new(),
+            changes: Vec::new(),
             studies: Vec::new(),
             problems: Vec::new(),
             left_out: Vec::new(),
         }
+    }
+
+    /// Returns the copies of the largest buffer, whose speed is that of memory.
+    pub fn copy_of_memory(&self, by: Copier) -> Option<&CopyBandwidth> {
+        self.copies.iter().filter(|copy| copy.by == by).max_by_key(|copy| copy.buffer_bytes)
     }
 
     /// Returns a sentence for each failed hard case, image difference, failed study and error.
@@ -100,7 +111,10 @@ impl Record {
             .studies
             .iter()
             .flat_map(|study| study.failures.iter().map(move |failure| format!("the study {}: {failure}", study.name)));
-        hard.chain(differ).chain(studies).chain(self.problems.iter().cloned()).collect()
+        let changes = self.changes.iter().filter(|trial| !trial.equal);
+        let changes = changes
+            .map(|trial| format!("{} surfels, {}: the bits are not those of the default", trial.surfels, trial.change));
+        hard.chain(differ).chain(changes).chain(studies).chain(self.problems.iter().cloned()).collect()
     }
 
     /// Writes the JSON and Markdown files into `folder`, both or neither.
@@ -133,6 +147,7 @@ mod tests {
             adapter: None,
             quick: false,
             minutes: 1.0,
+            study: None,
             studies: Vec::new(),
             command: "epsplat card".into(),
             date: String::new(),

@@ -9,9 +9,9 @@ use super::Card;
 use crate::bench::definition::{Definition, SceneEntry};
 use crate::bench::runner::{self, Outcome};
 use crate::bench::staging::{Point, points};
-use crate::bench::table::relative;
+use crate::bench::table::{relative, whole_frame};
 use crate::error::{Error, Result};
-use crate::report::{self, Study, Summary};
+use crate::report::{self, Measurement, Study, Summary};
 
 /// Interval at which the report of an unfinished study is written.
 const WRITTEN_EVERY: Duration = Duration::from_secs(20);
@@ -48,6 +48,9 @@ pub struct ConfigRecord {
     pub scenes: usize,
     /// Time divided by the baseline's time on the same scene; `None` without a baseline.
     pub time_over_baseline: Option<Summary>,
+    /// The passes' times alone, without submission and read-back, divided by the baseline's;
+    /// `None` without a baseline.
+    pub passes_over_baseline: Option<Summary>,
     /// The largest RMSE against the f64 reference.
     pub worst_rmse: Option<f64>,
 }
@@ -56,11 +59,14 @@ pub struct ConfigRecord {
 fn digest(definition: &Definition, study: &Study) -> Vec<ConfigRecord> {
     let of = |config: &str| {
         let all: Vec<_> = study.measurements.iter().filter(|m| m.config == config).collect();
-        let times: Vec<f64> = all.iter().filter_map(|m| relative(definition, study, m)).collect();
+        let ratios = |ms: fn(&Measurement) -> f64| {
+            Summary::of(&all.iter().filter_map(|m| relative(definition, study, (m, ms))).collect::<Vec<_>>())
+        };
         (!all.is_empty()).then(|| ConfigRecord {
             config: config.to_owned(),
             scenes: all.len(),
-            time_over_baseline: Summary::of(&times),
+            time_over_baseline: ratios(whole_frame),
+            passes_over_baseline: ratios(|m| m.passes.values().map(|ms| ms.median).sum()),
             worst_rmse: all.iter().filter_map(|m| m.numeric_error()).max_by(f64::total_cmp),
         })
     };
@@ -183,7 +189,7 @@ fn keep(
 mod tests {
     use super::*;
     use crate::render::Backend;
-    use crate::report::{Measurement, Numeric};
+    use crate::report::Numeric;
 
     fn study(name: &str) -> Definition {
         let text = format!(
@@ -216,14 +222,18 @@ mod tests {
                 config: config.into(),
                 surfels,
                 total_ms: Summary { median, ..Summary::default() },
+                passes: [("project".to_owned(), Summary { median: median * median, ..Summary::default() })].into(),
                 numeric: Some(Numeric { rmse, ..Numeric::default() }),
                 ..Measurement::default()
             })
             .to_vec();
         let found = digest(&definition, &outcome.study);
-        let of = |r: &ConfigRecord| (r.config.clone(), r.scenes, r.time_over_baseline.unwrap().median, r.worst_rmse);
+        let of = |r: &ConfigRecord| {
+            let [time, passes] = [r.time_over_baseline, r.passes_over_baseline].map(|ratio| ratio.unwrap().median);
+            (r.config.clone(), r.scenes, time, passes, r.worst_rmse)
+        };
         let found: Vec<_> = found.iter().map(of).collect();
-        assert_eq!(found, [("b".to_owned(), 2, 2.5, Some(1e-3)), ("a".to_owned(), 2, 1.0, Some(1e-5))]);
+        assert_eq!(found, [("b".to_owned(), 2, 2.5, 6.5, Some(1e-3)), ("a".to_owned(), 2, 1.0, 1.0, Some(1e-5))]);
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Times each pass in frames of spheres with growing numbers of surfels, and compares the pass's
-//! bandwidth with that of copies.
+//! Times frames of spheres with growing numbers of surfels: frames that the caller waits for,
+//! frames in flight, and each pass, whose bandwidth is compared with that of copies by a kernel.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -7,12 +7,15 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::bytes::Moved;
+use super::pace::{self, InFlight, Limits, OfScene, Ring, WarmUp, waited};
 use super::{Card, sphere};
+use crate::bench::bandwidth::Copier;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::plan::{Facts, PixelLayout, SceneNeeds, Settings};
 use crate::render::{Backend, Renderer, Report};
 use crate::report::Summary;
+use crate::scene::Camera;
 
 /// The fraction of the remaining time that this step may use.
 const SHARE: f64 = 0.4;
@@ -21,7 +24,7 @@ const SHARE: f64 = 0.4;
 const SIZES: [&[u64]; 2] = [&[10_000, 100_000, 1_000_000, 10_000_000], &[1_000, 10_000]];
 
 /// The largest number of timed frames: full run, quick run.
-const FRAMES: [u32; 2] = [15, 3];
+const FRAMES: [usize; 2] = [50, 3];
 
 /// The smallest number of timed frames, however long they take.
 const FEWEST_FRAMES: usize = 3;
@@ -29,8 +32,20 @@ const FEWEST_FRAMES: usize = 3;
 /// Time after which a sphere gets no further frame, if it has [`FEWEST_FRAMES`].
 const FRAMES_TIME: Duration = Duration::from_secs(10);
 
-/// Untimed frames: the first finds the buffer sizes, the second allocates the buffers.
-const WARM_UP: usize = 2;
+/// Warm-up: full run, quick run.
+const WARM_UP: [Limits; 2] = [
+    Limits { fewest: 3, frames: 200, time: Duration::from_secs(2) },
+    Limits { fewest: 3, frames: 3, time: Duration::ZERO },
+];
+
+/// Number of frames in flight.
+const DEPTH: usize = 3;
+
+/// The most timed frames that fly: full run, quick run.
+const FLYING: [f64; 2] = [100.0, 6.0];
+
+/// The duration of these frames, seconds, if there are [`FLYING`] or fewer.
+const FLIGHT: f64 = 3.0;
 
 /// Side of the image, pixels.
 const SIDE: u32 = 1024;
@@ -38,7 +53,7 @@ const SIDE: u32 = 1024;
 /// Frame times of one sphere, with the default options: lit by a headlight, without maps.
 #[derive(Clone, Debug, Serialize)]
 pub struct Throughput {
-    /// Number of surfels in the scene.
+    /// Number of surfels in the scene, all of which are processed.
     pub surfels: u64,
     /// Number of splats that may touch a pixel and were not culled.
     pub splats_drawn: u64,
@@ -48,14 +63,17 @@ pub struct Throughput {
     pub size: [u32; 2],
     /// Number of pixels that are not background.
     pub covered_pixels: u64,
-    /// Number of timed frames.
+    /// The frames before the timed ones.
+    pub warm_up: WarmUp,
+    /// Number of timed frames that the caller waited for.
     pub frames: usize,
-    /// Time from the uploaded scene to the frame in host memory, milliseconds.
-    pub total_ms: Summary,
-    /// Median time outside all passes, milliseconds: submission and readback.
+    /// Time from the call until the caller has the frame's last byte, milliseconds.
+    pub wait_ms: Summary,
+    /// Median part of `wait_ms` outside all passes, milliseconds: recording, submission, gaps
+    /// between passes, and read-back.
     pub rest_ms: f64,
-    /// Surfels of the scene per second of the median frame time.
-    pub splats_per_second: f64,
+    /// Frames that stay on the device, several at a time; `None` where they could not be recorded.
+    pub in_flight: Option<InFlight>,
     /// The clock of the passes' times: `timestamps` (of the device) or `wall`.
     pub clock: &'static str,
     /// The passes by name.
@@ -64,6 +82,13 @@ pub struct Throughput {
     pub device_bytes: u64,
     /// Names of the [`SceneNeeds`] that chose the kernels.
     pub needs: Vec<&'static str>,
+}
+
+impl Throughput {
+    /// Sum of the passes' median times, milliseconds.
+    pub fn passes_ms(&self) -> f64 {
+        self.passes.values().map(|pass| pass.ms.median).sum()
+    }
 }
 
 /// Time and bandwidth of one pass.
@@ -75,13 +100,13 @@ pub struct PassRecord {
     pub least_bytes: Option<u64>,
     /// `least_bytes` per second of the median time, in GB/s (10^9 bytes).
     pub gb_per_second: Option<f64>,
-    /// `gb_per_second` over the median copy bandwidth, if measured. A value above 1 shows that
-    /// caches helped.
+    /// `gb_per_second` over the bandwidth of copies by a kernel, if measured. A value above 1 shows
+    /// that caches helped.
     pub share_of_copy: Option<f64>,
 }
 
 impl PassRecord {
-    /// Derives the bandwidth of a pass that took `ms`; `copy` is the copy bandwidth in GB/s.
+    /// Derives the bandwidth of a pass that took `ms`; `copy` is that of a kernel's copies in GB/s.
     pub fn of(ms: Summary, least_bytes: Option<u64>, copy: Option<f64>) -> Self {
         let gb_per_second = least_bytes.filter(|_| ms.median > 0.0).map(|bytes| bytes as f64 * 1e-6 / ms.median);
         let share_of_copy = gb_per_second.zip(copy).filter(|(_, copy)| *copy > 0.0).map(|(own, copy)| own / copy);
@@ -103,13 +128,18 @@ pub(super) fn measure(card: &mut Card<'_>) -> Result<()> {
         let start = Instant::now();
         match of_size(card, surfels) {
             Ok(found) => {
-                let (ms, rate) = (found.total_ms.median, found.splats_per_second * 1e-6);
-                (card.told.say)(&format!("  {surfels} surfels: {ms:.2} ms a frame, {rate:.3} million splats a second"));
+                let (ms, passes) = (found.wait_ms.median, found.passes_ms());
+                let flown = found.in_flight.map_or(String::new(), |flown| format!(", {:.2} in flight", flown.ms));
+                let drawn = found.splats_drawn;
+                (card.told.say)(&format!(
+                    "  {surfels} surfels, {drawn} drawn: {ms:.2} ms a frame{flown}, {passes:.2} in passes"
+                ));
                 card.record.throughput.push(found);
             }
             Err(limit @ Error::Limit { .. }) => card.leave_out(format!("frames of {surfels} surfels: {limit}")),
             Err(error) => card.problem(&format!("frames of {surfels} surfels"), error)?,
         }
+        card.read_clocks(format!("after frames of {surfels} surfels"));
         card.write()?;
         last = Some((surfels, start.elapsed()));
     }
@@ -117,38 +147,51 @@ pub(super) fn measure(card: &mut Card<'_>) -> Result<()> {
 }
 
 fn of_size(card: &Card<'_>, surfels: u64) -> Result<Throughput> {
-    let staged = sphere(surfels, None, SIDE, card.told.progress)?;
+    let (form, staged) = (card.form(), sphere(surfels, None, SIDE, card.told.progress)?);
     let options = Settings::default();
     let (scene, camera) = (&staged.scene, &staged.cameras[0]);
     let backend: &Backend = &card.backend;
     let mut renderer = Renderer::new(scene, &options, backend)?;
-    for _ in 0..WARM_UP {
-        renderer.frame(camera, &())?;
-    }
-    let (frame, report) = renderer.frame(camera, &())?;
-    let (mut reports, start) = (vec![report], Instant::now());
-    for _ in 1..FRAMES[usize::from(card.asked.quick)] {
-        if reports.len() >= FEWEST_FRAMES && start.elapsed() > FRAMES_TIME {
-            break;
-        }
-        reports.push(renderer.frame(camera, &())?.1);
+    let warm_up = pace::warm_up(&mut renderer, camera, WARM_UP[form])?;
+    let first = waited(&mut renderer, camera)?;
+    let (mut frames, start) = (vec![(first.report, first.ms)], Instant::now());
+    while frames.len() < FEWEST_FRAMES || frames.len() < FRAMES[form] && start.elapsed() < FRAMES_TIME {
+        let next = waited(&mut renderer, camera)?;
+        frames.push((next.report, next.ms));
     }
     let needs = SceneNeeds::of(&Facts::of(scene), &card.record.adapter, camera, &options);
-    let copy = card.record.copy_bandwidth.as_ref().map(|copy| copy.gb_per_second.median);
-    let mut found = summarised(&reports, &frame, &needs, copy);
+    let copy = card.record.copy_of_memory(Copier::Kernel).map(|copy| copy.gb_per_second.max);
+    let found = summarised(&frames, &first.frame, &needs, copy);
+    let in_flight = in_flight(backend, &mut renderer, camera, (found.wait_ms.median, FLYING[form]))?;
     let bytes = renderer.device_bytes();
-    (found.footprint_px, found.device_bytes) = (staged.footprint_px, bytes.splats + bytes.pixels);
-    Ok(found)
+    let (footprint_px, device_bytes) = (staged.footprint_px, bytes.splats + bytes.pixels);
+    Ok(Throughput { footprint_px, device_bytes, warm_up, in_flight, ..found })
 }
 
-/// Summarises the `reports` of repeated renders of `frame`. There is at least one report.
-fn summarised(reports: &[Report], frame: &Frame, needs: &SceneNeeds, copy: Option<f64>) -> Throughput {
-    let summary = |of: &dyn Fn(&Report) -> Option<f64>| {
-        Summary::of(&reports.iter().filter_map(of).collect::<Vec<_>>()).unwrap_or_default()
+/// Times frames in flight, at most `most` of them; a frame that is waited for takes `wait_ms`.
+fn in_flight(
+    backend: &Backend,
+    renderer: &mut OfScene<'_, '_>,
+    camera: &Camera,
+    (wait_ms, most): (f64, f64),
+) -> Result<Option<InFlight>> {
+    let Backend::Gpu { gpu, .. } = backend else { return Ok(None) };
+    let ring = Ring::new(gpu, renderer, camera, DEPTH)?;
+    // The first block creates what frames in flight need.
+    ring.fly(renderer, camera, DEPTH + 1)?;
+    let frames = (FLIGHT * 1e3 / wait_ms.max(1e-3)).clamp(2.0 * DEPTH as f64, most);
+    ring.fly(renderer, camera, frames as usize).map(Some)
+}
+
+/// Summarises repeated renders of `frame`, at least one: their reports, and the milliseconds that
+/// the caller waited. What frames of other kinds measure is left at its default.
+fn summarised(frames: &[(Report, f64)], frame: &Frame, needs: &SceneNeeds, copy: Option<f64>) -> Throughput {
+    let summary = |of: &dyn Fn(&(Report, f64)) -> Option<f64>| {
+        Summary::of(&frames.iter().filter_map(of).collect::<Vec<_>>()).unwrap_or_default()
     };
-    let (surfels, splats_drawn, clock, names) = reports
+    let (surfels, splats_drawn, clock, names) = frames
         .first()
-        .map(|report| (report.surfels, report.splats_drawn, report.clock, report.needs.clone()))
+        .map(|(report, _)| (report.surfels, report.splats_drawn, report.clock, report.needs.clone()))
         .unwrap_or_default();
     // The background is transparent, so only covered pixels have alpha.
     let covered_pixels = frame.color.iter().filter(|pixel| pixel[3] > 0.0).count() as u64;
@@ -165,25 +208,23 @@ fn summarised(reports: &[Report], frame: &Frame, needs: &SceneNeeds, copy: Optio
         gathers: names.contains(&"gather"),
     }
     .least();
-    let named = reports.iter().flat_map(|report| report.passes.keys().cloned()).map(|key| {
-        let ms = summary(&|report| report.passes.get(&key).copied());
+    let named = frames.iter().flat_map(|(report, _)| report.passes.keys().cloned()).map(|key| {
+        let ms = summary(&|(report, _)| report.passes.get(&key).copied());
         let name = key.trim_end_matches("_ms").to_owned();
         let bytes = least.get(name.as_str()).copied();
         (name, PassRecord::of(ms, bytes, copy))
     });
-    let total_ms = summary(&|report| Some(report.total_ms));
-    let rest_ms = summary(&|report| Some(report.total_ms - report.passes.values().sum::<f64>())).median;
-    let per_second = if total_ms.median > 0.0 { 1e3 / total_ms.median } else { 0.0 };
     Throughput {
         surfels,
         splats_drawn,
         footprint_px: 0.0,
         size: [frame.width, frame.height],
         covered_pixels,
-        frames: reports.len(),
-        total_ms,
-        rest_ms,
-        splats_per_second: surfels as f64 * per_second,
+        warm_up: WarmUp { frames: 0, seconds: 0.0, settled: false },
+        frames: frames.len(),
+        wait_ms: summary(&|(_, ms)| Some(*ms)),
+        rest_ms: summary(&|(report, ms)| Some(ms - report.passes.values().sum::<f64>())).median,
+        in_flight: None,
         clock,
         passes: named.collect(),
         device_bytes: 0,
@@ -216,15 +257,14 @@ mod tests {
         let mut renderer = Renderer::new(scene, &options, &Backend::Reference).unwrap();
         let (frame, report) = renderer.frame(camera, &()).unwrap();
         let needs = SceneNeeds::of(&Facts::of(scene), &AdapterDescription::core(), camera, &options);
-        let reports = [8.0, 4.0, 6.0].map(|total_ms| Report {
-            passes: BTreeMap::from([("project_ms".to_owned(), 1.0), ("resolve_ms".to_owned(), total_ms / 2.0)]),
-            total_ms,
-            ..report.clone()
+        let frames = [8.0, 4.0, 6.0].map(|ms| {
+            let passes = BTreeMap::from([("project_ms".to_owned(), 1.0), ("resolve_ms".to_owned(), ms / 2.0)]);
+            (Report { passes, ..report.clone() }, ms)
         });
-        let found = summarised(&reports, &frame, &needs, None);
-        assert_eq!((found.total_ms.median, found.frames, found.rest_ms), (6.0, 3, 2.0));
-        assert_eq!(found.passes["resolve"].ms.median, 3.0);
-        assert!((found.splats_per_second - 200.0 / 6e-3).abs() < 1e-6);
+        let found = summarised(&frames, &frame, &needs, None);
+        assert_eq!((found.wait_ms.median, found.frames, found.rest_ms), (6.0, 3, 2.0));
+        assert_eq!((found.passes["resolve"].ms.median, found.passes_ms()), (3.0, 4.0));
+        assert_eq!((found.surfels, found.splats_drawn), (200, report.splats_drawn));
         assert!(found.covered_pixels > 100 && found.covered_pixels < 256, "{}", found.covered_pixels);
         // Sums: weight, three colours and three normal components, stored in 8 pairs of words. The
         // image has four words per pixel.

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
-use crate::plan::{Accumulator, BlendFormat, Features, PixelLayout, RasterDepth, SceneNeeds};
+use crate::plan::{Accumulator, BlendFormat, Features, Fetch, PixelLayout, RasterDepth, SceneNeeds};
 use crate::scene::Camera;
 
 /// Fails if `adapter` lacks what `needs` require.
@@ -10,6 +10,9 @@ use crate::scene::Camera;
 /// # Errors
 /// A sentence that says what is missing and what to do.
 pub fn on_adapter(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
+    if needs.surface.fetch() == Some(Fetch::Shared) && !adapter.subgroups {
+        return Err(adapter.error("tiles share splats by subgroups, which this adapter lacks: take --fetch staged"));
+    }
     match needs.surface.raster() {
         None => sums(adapter, needs.accumulator),
         Some(_) => rasteriser(adapter, needs, camera),

@@ -38,7 +38,7 @@ fn has_triangles(facts: &Facts) -> bool {
 }
 
 /// Combinations of options that are rejected for every scene.
-pub(super) const OPTIONS: [Clash; 28] = [
+pub(super) const OPTIONS: [Clash; 29] = [
     Clash {
         applies: |options, _| options.facing.is_some() && (is_lit(options) || options.maps.has(Map::Normal)),
         sentence: "points that face the camera have no normals: take --shading unlit and no normal map",
@@ -171,7 +171,18 @@ pub(super) const OPTIONS: [Clash; 28] = [
         },
         sentence: "an 8-bit target cannot count fragments: leave the count map out, or take --blend-format rgba16float",
     },
+    Clash {
+        applies: |options, device| device && options.fetch.is_some() && !may_draw_tiles(options),
+        sentence: "tiles fetch splats for the accumulator fixed, on the nearest surface only: leave --fetch out with \
+                   --organisation scatter, another --accumulator, --composite, --blend nearest or --backend raster",
+    },
 ];
+
+/// Whether tiles may draw splats.
+fn may_draw_tiles(options: &Settings) -> bool {
+    let sums = options.blend != Blend::Nearest && !is_composited(options) && options.raster.is_none();
+    sums && options.accumulator == Accumulator::Fixed && options.organisation != Organisation::Scatter
+}
 
 /// Options that tiles cannot draw.
 pub(super) const TILES: [Clash; 3] = [

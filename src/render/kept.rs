@@ -90,7 +90,8 @@ impl Kept {
                 finish(&mut frame, &plan.needs, &source.provenance(), order);
                 bar.end();
                 let report = self.report(gpu, &plan, image, (tally, clock, all_passes, total_ms));
-                return Ok((frame, Report { traffic, ..report }));
+                gpu.compiled.save();
+                return Ok((frame, Report { compile_ms: gpu.compiled.take_ms(), traffic, ..report }));
             }
         }
         bar.end();
@@ -194,6 +195,7 @@ impl Kept {
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),
             clock,
             total_ms,
+            compile_ms: 0.0,
             traffic: Traffic::default(),
             needs: plan.needs.names(),
             tail: None,

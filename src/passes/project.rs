@@ -14,7 +14,7 @@ use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Facts, Settings, Sides, composited, culls_back};
+use crate::plan::{Facts, SceneNeeds, Settings, Sides, composited, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
@@ -146,15 +146,18 @@ pub const PASS: Pass = Pass {
     name: "project",
     files: |_| vec!["project.wgsl"],
     kernels: |_| vec![PROJECT, PROJECT_RARE],
-    constants: |making| vec![("LARGE", large(making).into()), ("CULL_BACK", u32::from(making.needs.cull_back).into())],
+    constants: |making| {
+        let Making { needs, options, .. } = making;
+        vec![("LARGE", large(needs, options).into()), ("CULL_BACK", u32::from(needs.cull_back).into())]
+    },
 };
 
 const PROJECT: Kernel = Kernel::new("project");
 const PROJECT_RARE: Kernel = Kernel::new("project_rare");
 
 /// The number of pixels above which the bounds of a splat make it large.
-fn large(making: &Making<'_>) -> u32 {
-    match (making.needs.surface.tiles(), making.options.organisation) {
+pub(super) fn large(needs: &SceneNeeds, options: &Settings) -> u32 {
+    match (needs.surface.tiles(), options.organisation) {
         (true, Organisation::Tile) => 0,
         (true, _) => tuning::LARGE_BY_TILES,
         (false, _) => tuning::LARGE_BY_WORKGROUPS,

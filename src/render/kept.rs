@@ -138,17 +138,18 @@ impl Kept {
         }
         let store = match &mut self.store {
             Some(store) => {
-                kernels.compile(gpu, plan)?;
+                kernels.compile(gpu, plan, false)?;
                 store
             }
             None => {
                 let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
                 let next = self.plan_of_cut(gpu, plan, camera);
+                let large = tiles::likely(&self.facts, camera, (&plan.needs, &self.options));
                 let compile = || {
-                    kernels.compile(gpu, plan)?;
+                    kernels.compile(gpu, plan, large)?;
                     if let Some(next) = &next {
                         // Warm-up only: errors are reported by the compilation that is used.
-                        let _ = Kernels::new(sources, next, &self.options, surfels).first(gpu);
+                        let _ = Kernels::new(sources, next, &self.options, surfels).compile(gpu, next, false);
                     }
                     Ok(())
                 };

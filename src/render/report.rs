@@ -42,8 +42,8 @@ pub struct Report {
     pub clock: &'static str,
     /// Milliseconds from the uploaded scene to the frame in host memory.
     pub total_ms: f64,
-    /// Milliseconds in which kernels were compiled for the adapter since its last report: by several
-    /// threads at once, and mostly while the scene was read and uploaded, before `total_ms` begins.
+    /// Milliseconds in which kernels were compiled for the adapter since its last report: by
+    /// several threads at once, and mostly before `total_ms` begins.
     pub compile_ms: f64,
     /// Submissions, waits and other requests of the host to the device, summed over all tries.
     pub traffic: Traffic,

@@ -114,6 +114,14 @@ impl Kept {
         }
     }
 
+    /// Compiles the kernels of a first frame.
+    pub(super) fn warm(&mut self, (gpu, sources): (&Gpu, &Sources), camera: &Camera) -> Result<()> {
+        self.look_at(gpu, camera);
+        let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
+        let large = tiles::likely(&self.facts, camera, (&plan.needs, &self.options));
+        Kernels::new(sources, &plan, &self.options, self.facts.surfels).compile(gpu, &plan, large)
+    }
+
     /// Compiles the kernels and creates the buffers of `plan` that do not exist yet; the kernels
     /// are compiled while the scene is uploaded. If both fail, the error of the kernels is
     /// returned.

@@ -1,9 +1,9 @@
 //! Compiled kernels on disk, for Vulkan drivers that keep none themselves.
 //!
 //! A driver hands out what it compiled as one block of data, which wgpu wraps
-//! ([`wgpu::PipelineCache`]). A file for each kind of adapter holds it from run to run. The file
-//! only saves time: a missing, broken or foreign one is ignored, and so is a folder that cannot be
-//! written.
+//! ([`wgpu::PipelineCache`]). A file for each adapter and version of its driver holds it from run
+//! to run. The file only saves time: a missing, broken or foreign one is ignored, and so is a
+//! folder that cannot be written.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -88,6 +88,9 @@ pub(super) fn file_of(adapter: &AdapterDescription, handle: &wgpu::Adapter) -> O
     let name = wgpu::util::pipeline_cache_key(&handle.get_info())?;
     let asked = std::env::var_os("EPSPLAT_CACHE");
     let folder = folder(asked.as_deref(), usual_folder(), keeps(adapter, is_root()))?;
+    // Drivers should tell versions apart by Vulkan's pipelineCacheUUID, but that of Mesa 22.3.6's
+    // lavapipe is the same text in every build: "val-%s".
+    let name = format!("{name}_{:016x}", hash(adapter.driver.bytes()));
     handle.features().contains(wgpu::Features::PIPELINE_CACHE).then(|| folder.join(name))
 }
 
@@ -144,11 +147,11 @@ impl Stored {
             wgpu::PipelineCacheDescriptor { label: Some("epsplat"), data: data.as_deref(), fallback: true };
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         // SAFETY: the data are those that `get_data` gave for an adapter of the same key
-        // (`wgpu::util::pipeline_cache_key`), as the file has the hash of its bytes and of the key,
-        // which is its name. wgpu then compares vendor, device, size of pointers, and the identity
-        // of driver and version (Vulkan's `pipelineCacheUUID`), and drops data that differ. The
-        // driver checks its own header once more. The hash keeps out accidents, not forgers: the
-        // folder is the user's alone.
+        // (`wgpu::util::pipeline_cache_key`) and the same driver: the file's name is made of both,
+        // and the file has the hash of its name and its bytes. wgpu then compares vendor, device,
+        // size of pointers, and the identity of driver and version (Vulkan's `pipelineCacheUUID`),
+        // and drops data that differ. The driver checks its own header once more. The hash keeps
+        // out accidents, not forgers: the folder is the user's alone.
         #[allow(unsafe_code)]
         let cache = unsafe { device.create_pipeline_cache(&descriptor) };
         if let Some(error) = pollster::block_on(scope.pop()) {

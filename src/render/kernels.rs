@@ -33,8 +33,8 @@ impl Kernels {
     }
 
     /// Compiles, in parallel, the modules of the kernels that `plan` is certain to dispatch: until
-    /// the cut is known, only the one that chooses it. `large` says that tiles most likely draw some
-    /// splats; their module is compiled too, but an error of it is left to its first use.
+    /// the cut is known, only the one that chooses it. `large` says that tiles most likely draw
+    /// some splats; their module is compiled too, but an error of it is left to its first use.
     pub fn compile(&self, gpu: &Gpu, plan: &Plan, large: bool) -> Result<()> {
         let drawn = !plan.looks_for_cut();
         let listed = plan.large_by_tiles && !plan.looks_for_lists[Listed::Large as usize];

@@ -18,8 +18,8 @@ fn started(cache: &Path, picture: &Path) -> Child {
     command.spawn().unwrap()
 }
 
-/// Waits for a render, and returns the hashes of its bits. Standard error must have the lines of any
-/// render alone.
+/// Waits for a render, and returns the hashes of its bits. Standard error must have the lines of
+/// any render alone.
 fn bits(child: Child) -> serde_json::Value {
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8(output.stderr).unwrap();
@@ -56,8 +56,8 @@ fn kernels_on_disk_change_no_picture_and_their_faults_are_no_errors() {
     assert_eq!([drawn(&cache), drawn(&cache)], [expected.clone(), expected.clone()]);
     let [file] = files(&cache).try_into().expect("one file");
     let whole = fs::read(&file).unwrap();
-    // A broken file is written anew: one that ends early, one of something else, and that of another
-    // adapter.
+    // A broken file is written anew: one that ends early, one of something else, and that of
+    // another adapter.
     let (short, other) = (whole[..whole.len() - 1].to_vec(), b"something else".to_vec());
     let mut foreign = whole.clone();
     foreign[8..16].copy_from_slice(&[7; 8]);

@@ -32,7 +32,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     let scene = Scene::of_files(files, &arguments.scene)?;
 
     let bars = Bars::new();
-    let mut renderer = Renderer::new(&scene, &arguments.options, &arguments.device, &bars)?;
+    let mut renderer = Renderer::ahead(&scene, &arguments.options, &arguments.device, &view, &bars)?;
     let Picture { frame, report, view, read, unseen, .. } = renderer.frame(&view, &bars)?;
     note_overflows(&report);
     note_cut([&report], arguments.options.levels.splats);

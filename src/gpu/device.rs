@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use super::adapter::AdapterDescription;
 use super::program::Compiled;
 use super::spare::Spare;
+use super::stored::{self, Stored};
 use super::traffic::Traffic;
 use super::twin;
 use crate::error::{Error, Result};
@@ -137,8 +138,9 @@ impl Gpu {
     }
 
     /// Opens the adapter that [`open`](Self::open) chooses, but only with the capabilities of core
-    /// WebGPU, as in a browser or on a phone. The limits are those of core WebGPU. SPIR-V is the
-    /// only optional feature, so that kernels are compiled in the same way.
+    /// WebGPU, as in a browser or on a phone. The limits are those of core WebGPU. SPIR-V
+    /// and pipeline caches are the only optional features, so that kernels are compiled in the same
+    /// way.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
@@ -150,12 +152,14 @@ impl Gpu {
     fn of(
         adapter: AdapterDescription,
         handle: &wgpu::Adapter,
-        required_features: wgpu::Features,
+        features: wgpu::Features,
         required_limits: wgpu::Limits,
     ) -> Result<Self> {
+        let file = stored::file_of(&adapter, handle);
+        let of_file = if file.is_some() { wgpu::Features::PIPELINE_CACHE } else { wgpu::Features::empty() };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("epsplat"),
-            required_features,
+            required_features: features | of_file,
             required_limits,
             // There are few, large buffers: without pooling, a scene uses only the memory of its
             // buffers.
@@ -168,7 +172,9 @@ impl Gpu {
         let (device, queue) = pollster::block_on(handle.request_device(&descriptor))
             .map_err(|e| Error::Gpu { adapter: adapter.name.clone(), what: format!("cannot open the device: {e}") })?;
         drop(opening);
-        Ok(Self::watching(adapter, device, queue))
+        let mut compiled = Compiled::default();
+        compiled.stored = file.and_then(|file| Stored::open(&device, file));
+        Ok(Self { compiled: Arc::new(compiled), ..Self::watching(adapter, device, queue) })
     }
 
     /// Wraps a device whose errors others handle.

@@ -57,9 +57,14 @@ impl Compiled {
             return Ok(program);
         }
         // Other threads can compile meanwhile; at worst, two threads compile the same program.
-        let program = Arc::new(Program::compile(gpu, text, stages, draws, constants)?);
+        let program = self.timed(|| Program::compile(gpu, text, stages, draws, constants)).map(Arc::new)?;
         programs().insert(key, Arc::clone(&program));
         Ok(program)
+    }
+
+    /// The driver's cache that is kept on disk, if there is one.
+    fn on_disk(&self) -> Option<&wgpu::PipelineCache> {
+        self.stored.as_ref().map(|stored| &stored.cache)
     }
 
     /// Returns the cached pipeline of `key`, or makes one and caches it. Without a key, nothing is
@@ -81,14 +86,14 @@ impl Compiled {
 
 /// Stack size of a thread that compiles: that of a process's first thread, on which compilers of
 /// drivers are usually tested.
-const COMPILER_STACK: usize = 8 << 20;
+pub(crate) const COMPILER_STACK: usize = 8 << 20;
 
 /// Returns the result of `make` for each of `things`, in order, computed on several new threads.
 ///
 /// Threads of a pool are not suitable. While such a thread waits, it takes up other work, on a
 /// stack of 2 MiB that already holds the driver's frames. That work may wait for these very
 /// kernels.
-fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -> Vec<M> {
+pub(crate) fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -> Vec<M> {
     let (next, made) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
         loop {
@@ -117,12 +122,16 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
+/// Whether nothing else should use the device while a module is compiled. In OpenGL, a thread that
+/// compiles holds the context, and other threads give up waiting for it after a short time.
+pub(crate) fn compiles_alone(gpu: &Gpu) -> bool {
+    gpu.adapter.api == "gl"
+}
+
 /// Runs `compile` on a new thread while the current thread runs `other`, which uses the device. If
 /// no thread can be started, `compile` runs first.
 pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
-    // In OpenGL, a thread that compiles holds the context, and other threads give up waiting for it
-    // after a short time.
-    if gpu.adapter.api == "gl" {
+    if compiles_alone(gpu) {
         return (compile(), other());
     }
     thread::scope(|scope| {
@@ -169,7 +178,7 @@ impl Draw {
                 targets: &targets,
             }),
             multiview_mask: None,
-            cache: None,
+            cache: gpu.compiled.on_disk(),
         });
         Ok((pipeline, bound.bindings.variables))
     }
@@ -205,7 +214,7 @@ fn compute(
             module: &entry.module(gpu),
             entry_point: Some(stage),
             compilation_options: Default::default(),
-            cache: None,
+            cache: gpu.compiled.on_disk(),
         }))
     };
     let pipeline = gpu.compiled.pipeline(entry.key(&bound.bindings), || watched(gpu, make))?;

@@ -42,12 +42,15 @@ fn loops(text: &str) -> usize {
     text.lines().filter(|line| starts(line)).count()
 }
 
-/// 64-bit FNV-1a hash (Fowler, Noll, Vo) of a kernel's code: its lines without comments and
-/// surrounding space.
+/// [`hash`] of a kernel's code: its lines without comments and surrounding space.
 fn code_hash(text: &str) -> u64 {
     let code = text.lines().map(|line| line.split("//").next().unwrap_or(line).trim()).filter(|code| !code.is_empty());
-    code.flat_map(|code| code.bytes().chain([b'\n']))
-        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    hash(code.flat_map(|code| code.bytes().chain([b'\n'])))
+}
+
+/// 64-bit FNV-1a hash (Fowler, Noll, Vo).
+pub(super) fn hash(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
 }
 
 /// Returns the hash in the comment by which a kernel claims that all its loops end.

@@ -19,6 +19,7 @@ mod replacement;
 pub mod sources;
 mod spare;
 mod spirv;
+mod stored;
 pub mod timing;
 mod traffic;
 mod twin;

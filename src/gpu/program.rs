@@ -1,10 +1,13 @@
 //! Compiled kernels, and the cache of them on a device.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::interface::Bindings;
 use super::recent::Recent;
+use super::stored::Stored;
 
 /// The compiled kernels of a module, by entry point.
 #[derive(Default)]
@@ -42,25 +45,97 @@ pub(crate) struct Compiled {
     pub(super) programs: Mutex<Recent<ProgramKey, Arc<Program>>>,
     /// Compute pipelines by SPIR-V and bindings. Different programs share many of them.
     pub(super) pipelines: Mutex<Recent<PipelineKey, wgpu::ComputePipeline>>,
+    /// The cache on disk, if there is one.
+    pub(super) stored: Option<Stored>,
+    /// Whether pipelines were made since the file was written.
+    unsaved: AtomicBool,
+    clock: Mutex<Clock>,
+}
+
+/// The time in which kernels are compiled, by however many threads.
+#[derive(Default)]
+struct Clock {
+    /// Programs that are being compiled.
+    running: u32,
+    /// When the oldest of them began, or when the time was last taken.
+    since: Option<Instant>,
+    /// The time since it was last taken, before `since`.
+    spent: Duration,
+}
+
+impl Clock {
+    /// Adds the time since `since`, which becomes `next`.
+    fn turn(&mut self, next: Option<Instant>) {
+        self.spent += self.since.map(|since| since.elapsed()).unwrap_or_default();
+        self.since = next;
+    }
 }
 
 impl Default for Compiled {
     fn default() -> Self {
-        Self { programs: Mutex::new(Recent::of(MOST_PROGRAMS)), pipelines: Mutex::new(Recent::of(MOST_PIPELINES)) }
+        Self {
+            programs: Mutex::new(Recent::of(MOST_PROGRAMS)),
+            pipelines: Mutex::new(Recent::of(MOST_PIPELINES)),
+            stored: None,
+            unsaved: AtomicBool::default(),
+            clock: Mutex::default(),
+        }
+    }
+}
+
+impl Drop for Compiled {
+    fn drop(&mut self) {
+        self.save();
     }
 }
 
 impl Compiled {
+    /// Compiles by `compile`, and counts the time.
+    pub(super) fn timed<T>(&self, compile: impl FnOnce() -> T) -> T {
+        // A poisoned lock means that another thread panicked; the numbers are intact.
+        let clock = || self.clock.lock().unwrap_or_else(PoisonError::into_inner);
+        let begin = |clock: &mut Clock| {
+            clock.running += 1;
+            clock.since.get_or_insert_with(Instant::now);
+        };
+        begin(&mut clock());
+        let made = compile();
+        let mut clock = clock();
+        clock.running -= 1;
+        if clock.running == 0 {
+            clock.turn(None);
+        }
+        self.unsaved.store(true, Ordering::Relaxed);
+        made
+    }
+
+    /// Returns the milliseconds in which kernels were compiled since the last call.
+    pub(crate) fn take_ms(&self) -> f64 {
+        let mut clock = self.clock.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = clock.since.map(|_| Instant::now());
+        clock.turn(next);
+        std::mem::take(&mut clock.spent).as_secs_f64() * 1e3
+    }
+
+    /// Writes the cache on disk if there is one and pipelines were made since it was written.
+    pub(crate) fn save(&self) {
+        if let Some(stored) = &self.stored
+            && self.unsaved.swap(false, Ordering::Relaxed)
+        {
+            stored.save();
+        }
+    }
+
     /// Number of pipelines in the cache.
     #[cfg(test)]
     pub(crate) fn count_pipelines(&self) -> usize {
-        self.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values().count()
+        self.pipelines.lock().unwrap_or_else(PoisonError::into_inner).values().count()
     }
 
     /// For each program in the cache, whether its loops have counters.
     #[cfg(test)]
     pub(crate) fn count_loops(&self) -> Vec<bool> {
-        let programs = self.programs.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let programs = self.programs.lock().unwrap_or_else(PoisonError::into_inner);
         programs.values().map(|program| program.counts_loops()).collect()
     }
 }

@@ -21,14 +21,16 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::lowpass::Design;
 use super::{accumulate, covered, individuals, project};
 use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, OCCLUSION_TILE, TILE_WIDTH};
 use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
-use crate::plan::{Band, ColorNeed, Facts, Fetch, Plan, SceneNeeds, Settings};
-use crate::scene::{Camera, LowPass, Samples};
+use crate::plan::{Band, ColorNeed, Facts, Fetch, Plan, SceneNeeds, Settings, tuning};
+use crate::scene::{Camera, LowPass, Samples, Surfel};
 
 /// The files and kernels that the tiles' module adds to those of every module.
 pub const PASS: Pass = Pass {
@@ -133,19 +135,29 @@ pub fn tiles_in(needs: &SceneNeeds, width: u32, band: &Band) -> u64 {
 ///
 /// Infinite if the view shows no splat of the sample.
 pub fn touched(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
-    let design = Design::of(options);
-    let eye = camera.eye - facts.origin;
-    let splats = facts
-        .sample
-        .iter()
-        .filter_map(|(surfel, center)| project::reference((0, surfel, None), *center - eye, camera, &design));
-    let across = |first: u32, last: u32, size: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(size);
-    let touched = splats.map(|splat| {
-        let ([left, top], [right, bottom]) = (splat.first, splat.last);
-        across(left, right, SHARED[0]) * across(top, bottom, SHARED[1])
-    });
+    let across = |pixels: u32, size: u32| 1.0 + f64::from(pixels.saturating_sub(1)) / f64::from(size);
+    let sizes = sampled(facts, camera, options);
+    let touched = sizes.map(|[width, height]| across(width, SHARED[0]) * across(height, SHARED[1]));
     let (sum, count) = touched.fold((0.0, 0.0), |(sum, count), tiles| (sum + tiles, count + 1.0));
     if count > 0.0 { sum / count } else { f64::INFINITY }
+}
+
+/// Width and height in pixels of the bounds of each splat of the sample in `facts` that the view of
+/// `camera` shows.
+fn sampled(facts: &Facts, camera: &Camera, options: &Settings) -> impl Iterator<Item = [u32; 2]> {
+    let (design, eye) = (Design::of(options), camera.eye - facts.origin);
+    let project = move |(surfel, center): &(Surfel, DVec3)| {
+        let splat = project::reference((0, surfel, None), *center - eye, camera, &design)?;
+        Some([0, 1].map(|axis| splat.last[axis].saturating_sub(splat.first[axis]) + 1))
+    };
+    facts.sample.iter().filter_map(project)
+}
+
+/// Whether a splat of the sample in `facts` is large, so that tiles most likely draw some.
+pub fn likely(facts: &Facts, camera: &Camera, (needs, options): (&SceneNeeds, &Settings)) -> bool {
+    let most = u64::from(tuning::large(needs.surface.tiles(), options));
+    needs.surface.tiles()
+        && sampled(facts, camera, options).any(|[width, height]| u64::from(width) * u64::from(height) > most)
 }
 
 /// The longest list that tiles draw. Mesa's llvmpipe ends the loops of an invocation after 65,535

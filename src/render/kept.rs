@@ -90,7 +90,8 @@ impl Kept {
                 finish(&mut frame, &plan.needs, &source.provenance(), order);
                 bar.end();
                 let report = self.report(gpu, &plan, image, (tally, clock, all_passes, total_ms));
-                return Ok((frame, Report { traffic, ..report }));
+                gpu.compiled.save();
+                return Ok((frame, Report { compile_ms: gpu.compiled.take_ms(), traffic, ..report }));
             }
         }
         bar.end();
@@ -111,6 +112,14 @@ impl Kept {
         if shares && options.organisation == Organisation::Auto && options.has(Optimisation::Gathering) {
             self.known.touched_tiles = tiles::touched(&self.facts, camera, options);
         }
+    }
+
+    /// Compiles the kernels of a first frame.
+    pub(super) fn warm(&mut self, (gpu, sources): (&Gpu, &Sources), camera: &Camera) -> Result<()> {
+        self.look_at(gpu, camera);
+        let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
+        let large = tiles::likely(&self.facts, camera, (&plan.needs, &self.options));
+        Kernels::new(sources, &plan, &self.options, self.facts.surfels).compile(gpu, &plan, large)
     }
 
     /// Compiles the kernels and creates the buffers of `plan` that do not exist yet; the kernels
@@ -137,17 +146,18 @@ impl Kept {
         }
         let store = match &mut self.store {
             Some(store) => {
-                kernels.compile(gpu, plan)?;
+                kernels.compile(gpu, plan, false)?;
                 store
             }
             None => {
                 let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
                 let next = self.plan_of_cut(gpu, plan, camera);
+                let large = tiles::likely(&self.facts, camera, (&plan.needs, &self.options));
                 let compile = || {
-                    kernels.compile(gpu, plan)?;
+                    kernels.compile(gpu, plan, large)?;
                     if let Some(next) = &next {
                         // Warm-up only: errors are reported by the compilation that is used.
-                        let _ = Kernels::new(sources, next, &self.options, surfels).first(gpu);
+                        let _ = Kernels::new(sources, next, &self.options, surfels).compile(gpu, next, false);
                     }
                     Ok(())
                 };
@@ -194,6 +204,7 @@ impl Kept {
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),
             clock,
             total_ms,
+            compile_ms: 0.0,
             traffic: Traffic::default(),
             needs: plan.needs.names(),
             tail: None,

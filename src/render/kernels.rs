@@ -1,13 +1,15 @@
 //! Compiles the kernels of a frame. There are up to three modules: one for all passes, one for the
-//! tiles, compiled when tiles first draw something, and one that chooses a cut.
+//! tiles, compiled when tiles draw something or most likely will, and one that chooses a cut.
 
 use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
+use crate::gpu::kernel::{compiles_alone, side_by_side};
 use crate::gpu::program::Program;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::select::CHOOSING;
 use crate::passes::{constants, modules, raster};
+use crate::plan::known::Listed;
 use crate::plan::pass::{Making, Module};
 use crate::plan::steps::Kernel;
 use crate::plan::{Plan, SceneNeeds, Settings};
@@ -30,16 +32,24 @@ impl Kernels {
         Self { made, sources: sources.clone(), constants, modules }
     }
 
-    /// Compiles the kernels that `plan` is certain to dispatch: until the cut is known, only those
-    /// that choose it.
-    pub fn compile(&self, gpu: &Gpu, plan: &Plan) -> Result<()> {
-        if plan.needs.levels {
-            self.of(gpu, &CHOOSING[0])?;
-        }
-        if !plan.looks_for_cut() {
-            self.first(gpu)?;
-        }
-        Ok(())
+    /// Compiles, in parallel, the modules of the kernels that `plan` is certain to dispatch: until
+    /// the cut is known, only the one that chooses it. `large` says that tiles most likely draw
+    /// some splats; their module is compiled too, but an error of it is left to its first use.
+    pub fn compile(&self, gpu: &Gpu, plan: &Plan, large: bool) -> Result<()> {
+        let drawn = !plan.looks_for_cut();
+        let listed = plan.large_by_tiles && !plan.looks_for_lists[Listed::Large as usize];
+        let certain = |index: usize| match &self.modules[index].0 {
+            _ if index == 0 => drawn,
+            module if module.kernels.contains(&CHOOSING[0]) => true,
+            _ => drawn && (listed || plan.needs.surface.gathers()),
+        };
+        let wanted: Vec<usize> = (0..self.modules.len()).filter(|&index| certain(index) || (large && drawn)).collect();
+        let compile = |&index: &usize| self.compiled(gpu, index).map(drop);
+        let made: Vec<Result<()>> = match compiles_alone(gpu) {
+            true => wanted.iter().map(compile).collect(),
+            false => side_by_side(&wanted, compile),
+        };
+        wanted.into_iter().zip(made).filter(|(index, _)| certain(*index)).try_for_each(|(_, made)| made)
     }
 
     /// Returns whether these kernels serve `plan` too.

@@ -23,6 +23,7 @@ mod taken;
 mod targets;
 mod texture;
 mod ticket;
+mod warm;
 
 use std::borrow::{Borrow, Cow};
 use std::time::Instant;
@@ -41,6 +42,7 @@ use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 pub use taken::taken;
 pub use ticket::{Receipt, Ticket};
+pub(crate) use warm::warm;
 
 /// The renderer: a graphics device or the processor.
 pub enum Backend {

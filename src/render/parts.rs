@@ -64,6 +64,7 @@ pub(super) fn joined(of_colors: (Frame, Report), others: Vec<(Frame, Report)>) -
             *report.passes.entry(pass).or_default() += ms;
         }
         report.total_ms += of_maps.total_ms;
+        report.compile_ms += of_maps.compile_ms;
         report.traffic = report.traffic + of_maps.traffic;
         report.overflows = report.overflows.max(of_maps.overflows);
         let needs = of_maps.needs.into_iter().filter(|need| !report.needs.contains(need)).collect::<Vec<_>>();

@@ -204,6 +204,7 @@ fn report(
         passes,
         clock: "wall",
         total_ms,
+        compile_ms: 0.0,
         traffic: Traffic::default(),
         needs: needs.names(),
         tail: None,

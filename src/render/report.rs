@@ -42,6 +42,9 @@ pub struct Report {
     pub clock: &'static str,
     /// Milliseconds from the uploaded scene to the frame in host memory.
     pub total_ms: f64,
+    /// Milliseconds in which kernels were compiled for the adapter since its last report: by
+    /// several threads at once, and mostly before `total_ms` begins.
+    pub compile_ms: f64,
     /// Submissions, waits and other requests of the host to the device, summed over all tries.
     pub traffic: Traffic,
     /// Names of the needs of scene and options

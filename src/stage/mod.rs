@@ -6,6 +6,7 @@
 //! frame(view)    reads what else the view needs, and renders
 //! ```
 
+mod ahead;
 mod encode;
 mod files;
 mod in_part;
@@ -124,6 +125,8 @@ struct Request<'a> {
     device: &'a DeviceOptions,
     /// The picture is one of many views, from one to the next of which levels of detail fade.
     views: bool,
+    /// Gets the points of the inputs once they are read.
+    read: Option<&'a ahead::Read<'a>>,
 }
 
 impl Request<'_> {

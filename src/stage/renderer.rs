@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::in_part::{Part, Parts};
-use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, levels, memory};
+use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, levels, memory};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
@@ -75,7 +75,23 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), false, progress)
+        Self::with(scene, options, (device, None), (false, None), progress)
+    }
+
+    /// Makes a renderer as [`Renderer::new`] does, and meanwhile compiles the kernels that `first`,
+    /// the first view, most likely needs.
+    ///
+    /// # Errors
+    ///
+    /// The same as those of [`Renderer::new`]. Errors of the kernels are left to the frame.
+    pub fn ahead(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        first: &View,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::with(scene, options, (device, None), (false, Some(first)), progress)
     }
 
     /// Makes a renderer on a device that is open already, such as that of the caller's own program
@@ -86,7 +102,7 @@ impl Renderer {
     /// The same as those of [`Renderer::new`].
     pub fn on_device(scene: &Scene, options: &RenderOptions, gpu: &Gpu, progress: &dyn Progress) -> Result<Self> {
         let device = DeviceOptions { backend: Chosen(Some(BackendName::Gpu)), ..DeviceOptions::default() };
-        Self::with(scene, options, (&device, Some(gpu)), false, progress)
+        Self::with(scene, options, (&device, Some(gpu)), (false, None), progress)
     }
 
     /// Makes a renderer for a camera that moves: cuts of levels of detail fade from view to view
@@ -101,20 +117,20 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), true, progress)
+        Self::with(scene, options, (device, None), (true, None), progress)
     }
 
     fn with(
         scene: &Scene,
         options: &RenderOptions,
         (device, open): (&DeviceOptions, Option<&Gpu>),
-        views: bool,
+        (views, first): (bool, Option<&View>),
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (inputs, mut options, device) = (scene.0.clone(), options.clone(), device.clone());
         let sources = options.research.sources.iter().map(Replacement::loaded).collect::<Result<_>>()?;
         options.research.sources = sources;
-        let request = Request { scene: &inputs, options: &options, device: &device, views };
+        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None };
         let settings = request.settings()?;
         if options.surface.separate && inputs.files.paths().len().max(inputs.given.len()) < 2 {
             progress.note(
@@ -128,7 +144,7 @@ impl Renderer {
         let backend = Arc::new(backend);
         let (settings, drawn) = match Parts::of(&request, &settings, progress)? {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
-            None => whole(&request, settings, &backend, progress)?,
+            None => whole(&request, settings, (&backend, first), progress)?,
         };
         Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
     }
@@ -140,7 +156,7 @@ impl Renderer {
     /// [`Error::Usage`], as [`Renderer::new`].
     pub fn check(files: &Files, scene: &SceneOptions, options: &RenderOptions, device: &DeviceOptions) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        Request { scene: &inputs, options, device, views: false }.settings().map(drop)
+        Request { scene: &inputs, options, device, views: false, read: None }.settings().map(drop)
     }
 
     /// Sets how many frames the caller has in memory at once (1 by default). They count against the
@@ -194,7 +210,7 @@ impl Renderer {
     pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
-        let request = Request { scene: inputs, options, device, views: *views };
+        let request = Request { scene: inputs, options, device, views: *views, read: None };
         // Many views would give a line each.
         let tell = |view: &ViewReport| {
             if !*views {
@@ -260,10 +276,11 @@ fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result<Backend> {
 fn whole(
     request: &Request<'_>,
     settings: Settings,
-    backend: &Arc<Backend>,
+    (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let mut whole = request.whole(progress)?;
+    let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
+    let mut whole = ahead::compiling(request, &settings, first, backend, read)?;
     whole.preparation.notes().iter().for_each(|line| progress.note(line));
     let settings = request.for_scene(settings, &whole.scene, progress)?;
     if levels::lack(&whole.scene, &settings) {

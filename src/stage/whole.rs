@@ -57,7 +57,11 @@ impl Making {
 
 /// Reads all inputs and meshes into one scene.
 pub(super) fn scene(request: &Request<'_>, progress: &dyn Progress) -> Result<Made> {
-    scene_of(request, request.points(progress)?, progress)
+    let points = request.points(progress)?;
+    if let Some(read) = request.read {
+        read(&points);
+    }
+    scene_of(request, points, progress)
 }
 
 /// Builds one scene from the points of the inputs, reading the triangle meshes to draw with them.
@@ -133,7 +137,7 @@ fn paints(request: &Request<'_>) -> bool {
 }
 
 /// Builds the surfels of all inputs.
-fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+pub(super) fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
     if !textures.is_empty() && inputs.iter().any(bare) {

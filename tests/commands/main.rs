@@ -14,3 +14,4 @@ mod readme;
 mod release;
 mod report;
 mod rooms;
+mod stored;

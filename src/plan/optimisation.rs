@@ -28,6 +28,9 @@ pub enum Optimisation {
     Gathering,
     /// The invocations of a tile share what they fetch (`wgsl/tiles/splat_shared.wgsl`).
     Sharing,
+    /// Processors project and draw splats by two kernels (`passes/project.rs`). Graphics cards use
+    /// one, which saves a dispatch and the reading of all records.
+    Splitting,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,
     /// Processors divide, take roots and convert integers by their own instructions, which round to
@@ -37,7 +40,7 @@ pub enum Optimisation {
 
 impl Optimisation {
     /// Every optimisation and its name.
-    pub const ALL: [(Self, &'static str); 10] = [
+    pub const ALL: [(Self, &'static str); 11] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
@@ -46,6 +49,7 @@ impl Optimisation {
         (Self::LongWords, "long-words"),
         (Self::Gathering, "gathering"),
         (Self::Sharing, "sharing"),
+        (Self::Splitting, "splitting"),
         (Self::UncountedLoops, "uncounted-loops"),
         (Self::Division, "division"),
     ];

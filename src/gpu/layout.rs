@@ -35,6 +35,9 @@ pub const COVERED_GRID: u32 = 1;
 /// First word of the grid with one workgroup per eight tiles, in the list of covered tiles.
 pub const COVERED_GRID_OF_EIGHTS: u32 = 4;
 
+/// Side of the square of occlusion tiles whose farthest depths a workgroup finds, in such tiles.
+pub const OCCLUSION_BLOCK: u32 = 8;
+
 /// Words at the start of the tile lists: the greatest length so far of all lists together, and of
 /// one list (`wgsl/tiles/bin.wgsl`).
 pub const LIST_ENDS: u32 = 2;

@@ -29,7 +29,8 @@ group! {
         #[cfg_attr(feature = "cli", arg(long, value_name = "PIXELS", hide_short_help = true))]
         pub large: Option<u32>,
         /// Optimisations to turn off, none of which changes a bit of the picture: culling, order,
-        /// hiding, copies, pairs, long-words, gathering, sharing, uncounted-loops or division
+        /// hiding, copies, pairs, long-words, gathering, sharing, splitting, uncounted-loops or
+        /// division
         #[cfg_attr(feature = "cli", arg(long, value_name = "NAMES", value_delimiter = ',', hide_short_help = true))]
         pub without: Vec<Optimisation>,
         /// A WGSL file that replaces a built-in one: FILE=PATH, such as

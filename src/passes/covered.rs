@@ -13,7 +13,7 @@ use crate::plan::{Band, Plan};
 pub const PASS: Pass = Pass {
     name: "covered",
     files: |_| vec!["covered.wgsl"],
-    kernels: |_| vec![LIST, ARRANGE],
+    kernels: |needs| needs.surface.raster().map_or_else(Vec::new, |_| vec![LIST]),
     constants: |making| {
         // With depth peeling the last layer may be empty, so its nearest depths do not show which
         // tiles have earlier layers.
@@ -30,7 +30,6 @@ pub const PASS: Pass = Pass {
 };
 
 const LIST: Kernel = Kernel::new("list_covered");
-const ARRANGE: Kernel = Kernel::of("arrange_covered", [1; 3]);
 
 /// The most words that a band's list can take.
 pub fn words(band: &Band) -> u64 {
@@ -49,22 +48,13 @@ pub fn restart(plan: &Plan, band: usize) -> Clear {
     Clear::of("nearest", start(plan, band), COVERED_LIST.into())
 }
 
-/// The clears before the list is made: the list's header, and the image, because only covered tiles
-/// are written later.
-pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
-    let mut clears = vec![restart(plan, band)];
-    if !plan.lists_empty || super::asks_for_order(&plan.needs) {
-        let words = plan.image_pixels(band) * u64::from(plan.pixel.image_words);
-        clears.push(Clear::of("image", 0, words));
-    }
-    clears
+/// The clear of the image before covered tiles are resolved, because only they are written.
+pub fn clear(plan: &Plan, band: usize) -> Option<Clear> {
+    let words = plan.image_pixels(band) * u64::from(plan.pixel.image_words);
+    (!plan.lists_empty || super::asks_for_order(&plan.needs)).then(|| Clear::of("image", 0, words))
 }
 
-/// The dispatch that lists the tiles with a nearest depth.
+/// The dispatch that lists the tiles that the rasteriser covered. Without the rasteriser, the
+/// kernel that finds the farthest of the nearest depths ([`visibility`](super::visibility)) lists
+/// the tiles.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
-
-/// The dispatches that make the list: `lists`, which lists the tiles, and one that writes the
-/// numbers of workgroups of the dispatches over the list.
-pub fn runs(lists: Run) -> [Run; 2] {
-    [lists, Run { kernel: ARRANGE, over: Over::Once }]
-}

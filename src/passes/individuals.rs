@@ -8,7 +8,7 @@
 //! one, and eight more words per pixel, or sixteen with maps or triangles.
 
 use super::resolve::Surface;
-use super::{Strip, accumulate, covered, resolve, visibility};
+use super::{Strip, accumulate, resolve, visibility};
 use crate::plan::Plan;
 use crate::plan::extra;
 use crate::plan::pass::Pass;
@@ -36,16 +36,13 @@ pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 /// The stage that shades the sums of an input and keeps its surface at the pixels where that is the
 /// nearest so far.
 pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
-    let mut runs = covered::runs(covered::LISTS).to_vec();
-    runs.push(Run { kernel: KEEP, over: Over::Covered });
-    Stage::new("resolve", band, runs).after(clears(plan, band, first))
+    let runs = vec![Run { kernel: KEEP, over: Over::Covered }];
+    Stage::new("resolve", band, runs).after(clear(plan, band, first).into_iter().collect())
 }
 
-/// The clears before an input's tiles are listed. Before the `first` input they include the kept
-/// surfaces.
-pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
-    let kept = extra::clear("individuals", plan, band).filter(|_| first);
-    [covered::restart(plan, band)].into_iter().chain(kept).collect()
+/// The clear of the kept surfaces before the `first` input is kept.
+pub fn clear(plan: &Plan, band: usize, first: bool) -> Option<Clear> {
+    extra::clear("individuals", plan, band).filter(|_| first)
 }
 
 /// The f64 twin: the surfaces of one input at the pixels of `strip`.

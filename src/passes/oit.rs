@@ -29,10 +29,10 @@ use super::accumulate::{PixelSums, decision};
 use super::footprint::footprint;
 use super::moments::{self, Moments};
 use super::splat::{Intersection, Splat};
-use super::{Strip, attributes};
+use super::{Strip, attributes, covered};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage};
-use crate::plan::{Oit, SceneNeeds, Settings};
+use crate::plan::{Oit, Plan, SceneNeeds, Settings};
 use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Composite, Map};
 
@@ -145,6 +145,7 @@ pub fn marks(needs: &SceneNeeds) -> bool {
 }
 
 /// The stage that marks the pixels that are not empty.
-pub fn mark(band: usize) -> Stage {
+pub fn mark(plan: &Plan, band: usize) -> Stage {
     Stage::new("visibility", band, vec![Run { kernel: MARK, over: Over::Pixels }])
+        .after(vec![covered::restart(plan, band)])
 }

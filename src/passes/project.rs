@@ -11,6 +11,7 @@ use super::curved::{self, Curve, Seen};
 use super::homography::{self, slope};
 use super::lowpass::{self, Design};
 use super::splat::Splat;
+use super::visibility;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -144,7 +145,9 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "project",
-    files: |_| vec!["project.wgsl"],
+    files: |needs| {
+        vec!["project.wgsl", if needs.draws_projected { "project_draws.wgsl" } else { "project_draws_absent.wgsl" }]
+    },
     kernels: |_| vec![PROJECT, PROJECT_RARE],
     constants: |making| {
         vec![
@@ -160,14 +163,25 @@ const PROJECT_RARE: Kernel = Kernel::new("project_rare");
 /// The stage that projects `part` of the surfels, for `band` or for it and all later bands.
 ///
 /// If [`cull`](super::cull) leaves batches out, it has already listed the batches to project.
-/// Splats that take long to project are listed and projected by a dispatch of their own.
+/// Splats that take long to project are listed and projected by a dispatch of their own. Both
+/// dispatches also draw the nearest depths of small splats if
+/// [`SceneNeeds::draws_projected`](crate::plan::SceneNeeds::draws_projected) says so.
 pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
-    let mut clears = vec![start("rare")];
+    let draws = plan.needs.draws_projected;
+    let mut clears = Vec::new();
+    if part != Part::Far || !draws {
+        clears.push(start("rare"));
+    }
     if !plan.needs.cull {
         clears.push(start("queue"));
     }
+    if part != Part::Far && draws {
+        clears.extend(visibility::clears(plan, band));
+    }
     let run = |kernel, over| Run { kernel, over };
-    let runs = vec![run(PROJECT, Over::Slots(part)), run(PROJECT_RARE, Over::Rare)];
+    let mut runs = vec![run(PROJECT, Over::Slots(part))];
+    // A kernel of its own that draws the near part reads the records of rare splats too.
+    runs.extend((part != Part::Near || !draws).then(|| run(PROJECT_RARE, Over::Rare)));
     Stage::new("project", band, runs).after(clears).as_twin(Twin::Project)
 }

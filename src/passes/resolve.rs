@@ -275,8 +275,16 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 
 /// The stage that resolves the covered tiles.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
-    let lists = if plan.needs.surface.separate() { individuals::LISTS } else { covered::LISTS };
-    let mut runs = covered::runs(lists).to_vec();
+    let surface = plan.needs.surface;
+    // Without separate inputs the visibility pass has listed the covered tiles, and the rasteriser
+    // has no such pass.
+    let lists = match (surface.separate(), surface.raster()) {
+        (true, _) => Some(individuals::LISTS),
+        (false, Some(_)) => Some(covered::LISTS),
+        (false, None) => None,
+    };
+    let clears = lists.map(|_| covered::restart(plan, band)).into_iter().chain(covered::clear(plan, band));
+    let mut runs: Vec<Run> = lists.into_iter().collect();
     runs.extend(long_lists::composites(plan));
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
     let twin = match plan.needs.surface.lists() {
@@ -284,7 +292,7 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
         Some(Lists::Layers) => Twin::Layers,
         Some(Lists::Sorted) => Twin::Sorted,
     };
-    Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(twin)
+    Stage::new("resolve", band, runs).after(clears.collect()).as_twin(twin)
 }
 
 /// Words per pixel of [`Map::Surfaces`].

@@ -238,12 +238,11 @@ pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
 /// The attribute pass of all splats of a page, which also resolves the sums: to the image, or to
 /// the surfaces of a separate input.
 pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
-    let mut runs = covered::runs(covered::LISTS).to_vec();
     let over = if staged(&plan.needs) { Over::Covered } else { Over::CoveredEights };
-    runs.push(Run { kernel: drawing(&plan.needs, RESOLVE), over });
+    let runs = vec![Run { kernel: drawing(&plan.needs, RESOLVE), over }];
     let separate = plan.needs.surface.separate();
-    let clears = if separate { individuals::clears(plan, band, page == 0) } else { covered::clears(plan, band) };
-    let stage = Stage::new("accumulate", band, runs).of_page(page).after(clears);
+    let clear = if separate { individuals::clear(plan, band, page == 0) } else { covered::clear(plan, band) };
+    let stage = Stage::new("accumulate", band, runs).of_page(page).after(clear.into_iter().collect());
     vec![bin(plan, Listed::Small, (band, page), page == 0, true), stage]
 }
 

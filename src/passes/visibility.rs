@@ -11,7 +11,7 @@
 use super::footprint::footprint;
 use super::splat::Splat;
 use super::{covered, oit, winner};
-use crate::gpu::layout::TILE;
+use crate::gpu::layout::{COVERED_LIST, TILE};
 use crate::plan::extra::{self, EXTRA};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -87,8 +87,10 @@ pub const PASS: Pass = Pass {
     },
     kernels: |needs| match (needs.surface.raster(), needs.cull) {
         (None, false) if oit::marks(needs) => vec![OCCLUDE],
-        (None, false) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE],
-        (None, true) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE, OCCLUDE_OPEN],
+        (None, culls) => {
+            let small = (!needs.draws_projected).then_some(VISIBILITY);
+            small.into_iter().chain([VISIBILITY_LARGE, OCCLUDE]).chain(culls.then_some(OCCLUDE_OPEN)).collect()
+        }
         (Some(_), _) => Vec::new(),
     },
     constants: |making| {
@@ -109,19 +111,23 @@ pub fn nearest_words(band: &Band) -> u64 {
     band.pixels + band.tiles + covered::words(band)
 }
 
-/// The stage that draws `part` of the small splats.
-pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
+/// The clears before the first splats of a band are drawn.
+pub fn clears(plan: &Plan, band: usize) -> impl Iterator<Item = Clear> {
+    // Pixels, occlusion tiles and the header of the list of covered tiles are neighbours.
+    let nearest = Clear::of("nearest", 0, covered::start(plan, band) + u64::from(COVERED_LIST));
+    let summed = EXTRA.iter().filter(|extra| extra.summed);
+    let summed = summed.filter_map(move |extra| extra::clear(extra.name, plan, band));
+    [nearest].into_iter().chain(winner::clears(plan, band)).chain(summed)
+}
+
+/// The stage that draws `part` of the small splats; `None` if [`project`](super::project) does.
+pub fn steps(plan: &Plan, band: usize, part: Part) -> Option<Stage> {
     let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Slots(part) }]);
-    match part {
+    let stage = match part {
         Part::Far => stage,
-        Part::All | Part::Near => {
-            let nearest = Clear::of("nearest", 0, plan.bands[band].pixels);
-            let clears = [nearest].into_iter().chain(winner::clears(plan, band));
-            let summed = EXTRA.iter().filter(|extra| extra.summed);
-            let summed = summed.filter_map(|extra| extra::clear(extra.name, plan, band));
-            stage.after(clears.chain(summed).collect()).as_twin(Twin::Visibility)
-        }
-    }
+        Part::All | Part::Near => stage.after(clears(plan, band).collect()).as_twin(Twin::Visibility),
+    };
+    (!plan.needs.draws_projected).then_some(stage)
 }
 
 /// The stage that draws the large splats, one workgroup each.
@@ -129,11 +135,15 @@ pub fn large(band: usize) -> Stage {
     Stage::new("visibility", band, vec![Run { kernel: VISIBILITY_LARGE, over: Over::Large }])
 }
 
-/// The stage that stores the farthest of the nearest depths in each tile.
+/// The stage that stores the farthest of the nearest depths in each tile and, after
+/// [`Part::All`], lists the tiles that are not empty ([`covered`](super::covered)).
 ///
 /// After [`Part::Near`], a tile with an empty pixel hides nothing, since far splats may still fill
 /// that pixel.
 pub fn occlude(band: usize, part: Part) -> Stage {
-    let kernel = if part == Part::Near { OCCLUDE_OPEN } else { OCCLUDE };
-    Stage::new("visibility", band, vec![Run { kernel, over: Over::Occlusion }])
+    let run = match part {
+        Part::Near => Run { kernel: OCCLUDE_OPEN, over: Over::Occlusion },
+        Part::All | Part::Far => Run { kernel: OCCLUDE, over: Over::OcclusionBlocks },
+    };
+    Stage::new("visibility", band, vec![run])
 }

@@ -177,6 +177,10 @@ impl Plan {
                 "the rasteriser peels layers of the whole image, and this one is too large: choose a smaller one";
             return Err(adapter.error(what));
         }
+        let projects_each_band = several && (cull || gather);
+        let splits = tuning::splits(adapter, options.has(Optimisation::Splitting));
+        let draws_projected = !splits && (!several || projects_each_band) && needs.surface.draws_small_once();
+        let needs = SceneNeeds { draws_projected, ..needs };
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
                 Listed::Large => needs.surface.tiles() && (gather || known.large != Some(false)),
@@ -197,7 +201,7 @@ impl Plan {
             individuals,
             longest_list: known.longest_list,
             lists_empty: options.shows_where_nothing_is() || needs.surface.peels().is_some(),
-            projects_each_band: several && (cull || gather),
+            projects_each_band,
             looks_for_slots: cull && (several || !known.slots),
             large_by_tiles: needs.surface.tiles() && (looks[0] || known.entries_of(Listed::Large).is_some()),
             looks_for_lists: looks,

@@ -46,6 +46,9 @@ pub struct SceneNeeds {
     /// the number of pixels, because the search for hidden batches visits every pixel
     /// ([`tuning::PIXELS_A_CULLED_SURFEL`], [`tuning::PIXELS_A_CULLED_CHOICE`]).
     pub cull: bool,
+    /// The invocation that projects a small splat also draws its nearest depths. This requires that
+    /// every band is drawn from a projection of its own.
+    pub draws_projected: bool,
     /// The needs of the triangles drawn with the splats.
     pub mesh: Option<MeshNeeds>,
     /// The formula of the blending kernel.
@@ -207,6 +210,7 @@ impl SceneNeeds {
             node_caps,
             fades: if facts.nodes_of(options).is_some() { options.detail_fades } else { facts.fades },
             cull: false,
+            draws_projected: false,
             mesh: mesh(facts, camera, options),
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
@@ -299,7 +303,7 @@ impl SceneNeeds {
 
     /// Returns these needs without those that depend on the number of drawn surfels.
     pub fn before_cut(&self) -> Self {
-        Self { cull: false, surface: self.surface.before_cut(), ..*self }
+        Self { cull: false, draws_projected: false, surface: self.surface.before_cut(), ..*self }
     }
 
     /// Whether records store the surfels' places in the octree, which decide the order of sorted
@@ -368,6 +372,7 @@ impl SceneNeeds {
             (self.node_caps, "node-caps"),
             (self.fades, "fades"),
             (self.cull, "cull"),
+            (self.draws_projected, "draws-projected"),
             (self.surface.tiles(), "tiles"),
             (self.surface.gathers(), "gather"),
             (self.epsilon == EpsilonForm::Radius, "epsilon-radius"),

@@ -31,6 +31,9 @@ pub enum Optimisation {
     Gathering,
     /// The invocations of a tile share what they fetch (`wgsl/tiles/splat_shared.wgsl`).
     Sharing,
+    /// Processors project and draw splats by two kernels (`passes/project.rs`). Graphics cards use
+    /// one, which saves a dispatch and the reading of all records.
+    Splitting,
     /// Loops that are proved to end have no counters (`gpu/loops.rs`).
     UncountedLoops,
     /// Processors divide, take roots and convert integers by their own instructions, which round to
@@ -40,7 +43,7 @@ pub enum Optimisation {
 
 impl Optimisation {
     /// Every optimisation and its name.
-    pub const ALL: [(Self, &'static str); 11] = [
+    pub const ALL: [(Self, &'static str); 12] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
@@ -50,6 +53,7 @@ impl Optimisation {
         (Self::LongWords, "long-words"),
         (Self::Gathering, "gathering"),
         (Self::Sharing, "sharing"),
+        (Self::Splitting, "splitting"),
         (Self::UncountedLoops, "uncounted-loops"),
         (Self::Division, "division"),
     ];

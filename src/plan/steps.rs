@@ -79,6 +79,8 @@ pub enum Over {
     Pixels,
     /// One invocation per tile of the occlusion test.
     Occlusion,
+    /// The same tiles in squares of 8 x 8, a workgroup for each.
+    OcclusionBlocks,
     /// All tiles of the large splats: eight invocations for each, or one workgroup where a tile has
     /// an invocation for each pixel.
     Tiles,

@@ -207,6 +207,17 @@ impl Surface {
         }
     }
 
+    /// Whether all small splats of a band are drawn into its nearest depths by one dispatch that
+    /// could also project them. Separate inputs are drawn one after the other. Frames with lists
+    /// may be cut into bands once their fragments are counted.
+    pub fn draws_small_once(&self) -> bool {
+        match self {
+            Self::Blended { separate, .. } => !separate,
+            Self::Nearest(_) | Self::OrderFree(Oit::Moments) => true,
+            _ => false,
+        }
+    }
+
     /// The rasteriser's options, if it draws the splats.
     pub fn raster(&self) -> Option<Raster> {
         match self {

@@ -61,6 +61,12 @@ pub fn large(tiles: bool, options: &Settings) -> u32 {
     })
 }
 
+/// Whether two kernels project small splats and draw their nearest depths. On llvmpipe one kernel
+/// takes 1.17 times as long as the two for 100,000 splats of a sphere.
+pub fn splits(adapter: &AdapterDescription, wanted: bool) -> bool {
+    adapter.is_software() && wanted
+}
+
 /// How the invocations of a tile get splats. A processor should fetch a splat once for all the
 /// pixels of a column: on the bunny llvmpipe takes 100 times as long with a pixel an invocation. A
 /// graphics card (RDNA 2, by Mesa's compiler) keeps 4 of 32 waves with the registers of a column,

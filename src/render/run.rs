@@ -11,8 +11,8 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Image};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID, TILE_WIDTH,
-    WORKGROUP,
+    COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, OCCLUSION_BLOCK, OCCLUSION_TILE, QUEUE_GRID,
+    QUEUE_LISTING, SPREAD_GRID, TILE_WIDTH, WORKGROUP,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, list_name};
@@ -338,6 +338,10 @@ pub(super) fn over<'a>(
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
         Over::Occlusion => plan.bands[band].tiles,
+        Over::OcclusionBlocks => {
+            let blocks = |side: u32| u64::from(side.div_ceil(OCCLUSION_BLOCK * OCCLUSION_TILE));
+            blocks(plan.width) * blocks(plan.bands[band].rows) * u64::from(WORKGROUP)
+        }
         Over::Vertices => plan.mesh.vertices,
         Over::Triangles => plan.mesh.triangles,
         Over::Rows => plan.bands[band].rows.into(),

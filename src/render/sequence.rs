@@ -70,7 +70,8 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
             steps.extend(plan.looks_for_slots.then_some(Step::Look(Look::Slots(part))));
             steps.push(Step::Stage(project::steps(plan, band, part)));
         }
-        steps.extend(on(plan, pages, visibility::steps(plan, band, part)).map(Step::Stage));
+        let drawn = visibility::steps(plan, band, part).into_iter();
+        steps.extend(drawn.flat_map(|stage| on(plan, pages, stage)).map(Step::Stage));
         if part == Part::Near {
             steps.push(Step::Stage(visibility::occlude(band, part)));
         }
@@ -102,8 +103,12 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.projects_in(band) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
-    let count = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
-    let count = count.into_iter().chain(veils::steps(plan, band)).chain([visibility::occlude(band, Part::All)]);
+    let small = visibility::steps(plan, band, Part::All).map(Stage::without_twin);
+    let count = small
+        .into_iter()
+        .chain([visibility::large(band)])
+        .chain(veils::steps(plan, band))
+        .chain([visibility::occlude(band, Part::All)]);
     steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
     steps.extend(fragments::steps(band).into_iter().chain(long_lists::sorts(plan, band)).map(Step::Stage));
 }
@@ -113,10 +118,11 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.projects_in(band) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
-    let of_all = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
-    let before = of_all.into_iter().filter(|_| plan.needs.surface.oit() == Some(Oit::Moments));
+    let small = visibility::steps(plan, band, Part::All).map(Stage::without_twin);
+    let of_all = small.into_iter().chain([visibility::large(band)]);
+    let before = of_all.filter(|_| plan.needs.surface.oit() == Some(Oit::Moments));
     let sums = [accumulate::steps(plan, band, true).as_twin(Twin::Oit), accumulate::large(band)];
-    let covered = oit::marks(&plan.needs).then(|| oit::mark(band)).into_iter();
+    let covered = oit::marks(&plan.needs).then(|| oit::mark(plan, band)).into_iter();
     let covered = covered.chain([visibility::occlude(band, Part::All)]);
     steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
 }

@@ -12,7 +12,7 @@ use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::source::Source;
 use crate::passes::upload::{Uploaded, shared, upload};
-use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility};
+use crate::passes::{MAP_PASSES, accumulate, covered, resolve as resolve_pass, visibility};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
 use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, Settings, check};
@@ -204,7 +204,8 @@ pub fn resolve(
     for band in 0..plan.bands.len() {
         sums.put(gpu, &plan, run.store, band)?;
         // The nearest depths tell which tiles are covered.
-        let stages = [visibility::occlude(band, Part::All), resolve_pass::steps(&plan, band)];
+        let lists = visibility::occlude(band, Part::All).after(vec![covered::restart(&plan, band)]);
+        let stages = [lists, resolve_pass::steps(&plan, band)];
         let steps = stages.into_iter().map(Step::Stage).chain([Step::ReadBack(band)]);
         run.steps(&steps.collect::<Vec<_>>(), &mut frame, &())?;
     }

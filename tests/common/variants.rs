@@ -16,7 +16,7 @@ use super::any_scene::{self, Sampled};
 use super::{Random, any_options::without};
 
 /// The number of random scenes.
-const SCENES: u64 = 300;
+const SCENES: u64 = 330;
 
 /// The number of random renders of each scene.
 const PICTURES: usize = 120;

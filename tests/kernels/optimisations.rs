@@ -61,6 +61,7 @@ fn no_optimisation_shows() {
                     Optimisation::Pairs => assert!(left_out("atomics-u64")),
                     Optimisation::Spreading => assert!(left_out("spreads")),
                     Optimisation::LongWords => assert!(left_out("long-words")),
+                    Optimisation::Splitting => assert!(!left_out("draws-projected")),
                     Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),
                     Optimisation::Order
                     | Optimisation::Hiding

@@ -72,15 +72,21 @@ fn lines(plan: &Plan) -> Vec<String> {
 }
 
 const PROJECT: &str = "project: project/Slots(All), project_rare/Rare";
-const RESOLVE: &str = "resolve: list_covered/Occlusion, arrange_covered, resolve/Covered";
+const RESOLVE: &str = "resolve: resolve/Covered";
 
-/// The steps of scatter.
-fn scattered() -> [&'static str; 8] {
+/// The steps of scatter by a graphics card. A processor projects and draws by two kernels.
+fn scattered() -> [&'static str; 7] {
+    let [project, _, large, occlude, accumulate, accumulate_large, resolve, end] = split();
+    [project, large, occlude, accumulate, accumulate_large, resolve, end]
+}
+
+/// The steps of scatter by a processor.
+fn split() -> [&'static str; 8] {
     [
         PROJECT,
         "visibility: visibility/Slots(All)",
         "visibility: visibility_large/Large",
-        "visibility: occlude/Occlusion",
+        "visibility: occlude/OcclusionBlocks",
         "accumulate: accumulate/Slots(All)",
         "accumulate: accumulate_large/Large",
         RESOLVE,
@@ -96,11 +102,10 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
         lines(&first),
         [
             PROJECT,
-            "visibility: visibility/Slots(All)",
             "look for lists of Large",
             "bin: bin_count_large/Listing, bin_scan_large, bin_place_large/Listing page 0, then \
              visibility: tile_visibility/Tiles page 0, or visibility: visibility_large/Large",
-            "visibility: occlude/Occlusion",
+            "visibility: occlude/OcclusionBlocks",
             "accumulate: accumulate/Slots(All)",
             "accumulate: tile_accumulate/Tiles page 0, or accumulate: accumulate_large/Large",
             RESOLVE,
@@ -114,7 +119,7 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
     let known = Known { large: Some(true), entries: [Some(100), None], ..Known::default() };
     let second = lines(&planned(&scene, 256, &core, &Settings::default(), &known));
     let listed: Vec<_> = second.iter().filter(|line| line.contains("tile_") || line.starts_with("bin")).collect();
-    assert_eq!((listed.len(), second.len()), (3, 9), "{second:?}");
+    assert_eq!((listed.len(), second.len()), (3, 8), "{second:?}");
     assert!(!second.iter().any(|line| line.contains("look") || line.contains("_large/Large")), "{second:?}");
 }
 
@@ -127,7 +132,9 @@ fn other_accumulators_and_scatter_have_no_tiles() {
         Settings { organisation: Organisation::Scatter, low_pass: LowPass::Ewa, ..Settings::default() },
     ];
     for options in options {
-        assert_eq!(lines(&planned(&scene, 256, &software, &options, &Known::default())), scattered());
+        assert_eq!(lines(&planned(&scene, 256, &software, &options, &Known::default())), split());
+        let merged = Settings { without: vec![Optimisation::Splitting], ..options };
+        assert_eq!(lines(&planned(&scene, 256, &software, &merged, &Known::default())), scattered());
     }
 }
 
@@ -137,21 +144,24 @@ fn many_surfels_are_drawn_near_ones_first() {
     let options = Settings { organisation: Organisation::Scatter, ..Settings::default() };
     let culled = planned(&scene, 128, &core, &options, &Known::default());
     assert_eq!(
-        lines(&culled)[..11],
+        lines(&culled)[..9],
         [
             "project: cull_near/Batches",
             "look for slots of Near",
-            "project: project/Slots(Near), project_rare/Rare",
-            "visibility: visibility/Slots(Near)",
+            "project: project/Slots(Near)",
             "visibility: occlude_open/Occlusion",
             "project: cull_far/Batches",
             "look for slots of Far",
             "project: project/Slots(Far), project_rare/Rare",
-            "visibility: visibility/Slots(Far)",
             "visibility: visibility_large/Large",
-            "visibility: occlude/Occlusion",
+            "visibility: occlude/OcclusionBlocks",
         ]
     );
+    let split = lines(&planned(&scene, 128, &software(), &options, &Known::default()));
+    let drawn = ["Near", "Far"].map(|part| {
+        [format!("project: project/Slots({part}), project_rare/Rare"), format!("visibility: visibility/Slots({part})")]
+    });
+    assert!(drawn.iter().all(|pair| split.windows(2).any(|lines| lines == pair)), "{split:?}");
     let known = Known { slots: true, ..Known::default() };
     assert!(!lines(&planned(&scene, 128, &core, &options, &known)).iter().any(|line| line.starts_with("look")));
     // Culling does not pay with more than six pixels per surfel.
@@ -171,7 +181,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
         [
             "look for lists of Small",
             "bin: bin_count/Slots(All), bin_scan, bin_place/Slots(All) page 0",
-            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights page 0",
+            "accumulate: tile_resolve/CoveredEights page 0",
             "read back 0",
         ]
     );
@@ -256,7 +266,7 @@ fn copies_are_drawn_once_and_without_tiles() {
     scene.colors = Colors::Constant([1.0; 4]);
     let plan = planned(&scene, 64, &software(), &Settings::default(), &Known::default());
     assert!(plan.needs.surface.copies() && !plan.needs.surface.tiles() && !plan.needs.cull && !plan.needs.atomics_u64);
-    assert_eq!(lines(&plan), scattered());
+    assert_eq!(lines(&plan), split());
     let tile = Settings { organisation: Organisation::Tile, ..Settings::default() };
     assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.surface.copies());
 }
@@ -274,7 +284,7 @@ fn what_shows_through_is_listed() {
             PROJECT,
             "visibility: visibility/Slots(All)",
             "visibility: visibility_large/Large",
-            "visibility: occlude/Occlusion",
+            "visibility: occlude/OcclusionBlocks",
             "bin: fragments_of_rows/Rows, start_rows, start_pixels/Rows",
             "look for fragments of 0",
             "accumulate: list_fragments/Slots(All), list_fragments_large/Large",
@@ -321,7 +331,8 @@ fn the_rasteriser_projects_draws_and_resolves() {
     let scene = sphere(1000, 1.5);
     let options = Settings { raster: Some(Raster::default()), ..Settings::default() };
     let plan = planned(&scene, 64, &AdapterDescription::core(), &options, &Known::default());
-    assert_eq!(lines(&plan), [PROJECT, "draw", RESOLVE, "read back 0"]);
+    let resolve = "resolve: list_covered/Occlusion, resolve/Covered";
+    assert_eq!(lines(&plan), [PROJECT, "draw", resolve, "read back 0"]);
     assert!(plan.needs.surface.by_triangles() && plan.sum_words == 0);
 }
 

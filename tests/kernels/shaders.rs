@@ -85,10 +85,12 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let drawn = drawn.iter().chain(of_mesh).copied();
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
         // Some modules contain entry points that they do not run: tiles and cuts share files with
-        // other modules, and order-free weights need no visibility pass.
+        // other modules, order-free weights need no visibility pass, and splats that are drawn as
+        // they are projected need no kernel for it.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles()
             || needs.levels
+            || needs.draws_projected
             || needs.surface.gathers()
             || needs.surface == Surface::OrderFree(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");

@@ -187,7 +187,7 @@ fn a_wrong_tile_is_noticed() {
         ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
         ("tile_sums.wgsl", "if (slot == 5u)", "if (slot == 55u)"),
-        ("occlusion.wgsl", "farthest |= atomicLoad", "farthest = atomicLoad"),
+        ("occlusion.wgsl", "farthest_in(at, 0u) != 0u)", "farthest_in(at, 0u) != 0u && inner.y % 2u == 0u)"),
         ("covered.wgsl", "place < visible[covered_start()]", "place + 1u < visible[covered_start()]"),
         ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
     ];

@@ -38,7 +38,13 @@ fn a_frame_is_one_submission() {
             assert!(common::bits(&frame) == common::bits(&first.0));
             let Traffic { submits, waits, dispatches, bind_groups, bytes_written, bytes_read } = report.traffic;
             assert_eq!((submits, waits, bind_groups), (1, 1, 0), "{organisation:?}: {:?}", report.traffic);
-            let most = if organisation == Organisation::Tile { 20 } else { 16 };
+            // Graphics cards draw as they project, which saves a dispatch; with culling, three.
+            let most = match (organisation, gpu.adapter.is_software()) {
+                (Organisation::Tile, true) => 18,
+                (Organisation::Tile, false) => 15,
+                (_, true) => 14,
+                (_, false) => 11,
+            };
             assert!((5..=most).contains(&dispatches), "{organisation:?}: {:?}", report.traffic);
             assert_eq!(bytes_written, size_of::<View>() as u64);
             let image = 16 * camera.pixels() as u64;

@@ -1,9 +1,10 @@
 // Stage 1: projects every surfel to a splat, once. One invocation per surfel. Large splats are
 // queued, and so are the rare surfels that take longer (thin splats, disks that reach the near
 // depth). Queued ones are processed together later, so that the other invocations of a subgroup
-// need not wait.
+// need not wait. Where project_draws.wgsl is part of the module, the invocation also draws the
+// splat's nearest depths, which is stage 2.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x3de544e197f6d12a
+// All loops end, by 1 of src/gpu/loops.rs: 0xcef1f98530961466
 // #import axes_*::{half_axes}
 // #import camera_*::{homography}
 // #import center|center_doubled::{relative_center}
@@ -14,8 +15,9 @@
 // #import double::{Double, product, sum}
 // #import fade::{fade_of}
 // #import footprint::{QUEUE_START, is_large}
-// #import layout::{AWAY, Splat, WORKGROUP, held, hold_view, linear_index}
+// #import layout::{AWAY, Splat, WORKGROUP, held, hold, linear_index}
 // #import lowpass_*::{low_pass}
+// #import project_draws::{draw_projected}
 // #import records::{SplatRecord, splat_record}
 // #import select::{is_filled, places_held, surfel_of}
 // #import vectors::{dot3}
@@ -153,6 +155,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
         queue_large(slot);
     }
     splats[slot] = splat_record(splat, place, filter_);
+    draw_projected(splat, filter_, index);
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 
@@ -174,7 +177,7 @@ fn project(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    hold_view();
+    hold();
     let slot = slot_of(workgroup, workgroups, local);
     var fate = IN_VIEW;
     if (slot < arrayLength(&splats)) {
@@ -192,7 +195,7 @@ fn project_rare(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    hold_view();
+    hold();
     let place = linear_index(workgroup, workgroups, local);
     var slot = 0u;
     var fate = IN_VIEW;

@@ -1,9 +1,10 @@
 // Sums by the rasteriser's blender, four channels per target. The terms of a fragment are collected
 // and returned together. The result of blending depends on the format of the targets and on the
 // order of the fragments. Error bounds: src/passes/raster.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x9dd5c527955ba572
-// #import covered::{TILE_ROWS, TILE_WIDTH, tiles_across}
-// #import layout::{WEIGHT_CHANNEL, held, held_band}
+// All loops end, by 1 of src/gpu/loops.rs: 0x7ebbbab195878c9c
+// #import covered::{TILE_ROWS, TILE_WIDTH, is_always_listed, list_tile, tiles_across}
+// #import covered::{tiles_in_band}
+// #import layout::{WEIGHT_CHANNEL, WORKGROUP, held, held_band, hold, linear_index}
 // #import raster_targets_*::{target_at}
 
 // The factor on terms that keeps sums below 1 in formats that cannot hold more.
@@ -62,7 +63,20 @@ fn covered_start() -> u32 {
     return 0u;
 }
 
-fn has_any(tile: u32) -> bool {
+// Lists the covered tiles. One invocation per tile.
+@compute @workgroup_size(WORKGROUP)
+fn list_covered(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let tile = linear_index(workgroup, workgroups, local);
+    list_tile(tile, tile < tiles_in_band() && (is_always_listed(tile) || has_weight(tile)), local);
+}
+
+// Whether a tile has a fragment.
+fn has_weight(tile: u32) -> bool {
     let first = vec2<u32>(tile % tiles_across() * TILE_WIDTH, tile / tiles_across() * TILE_ROWS);
     let end = min(first + vec2<u32>(TILE_WIDTH, TILE_ROWS), vec2<u32>(held.width, held_band.rows));
     var any = false;

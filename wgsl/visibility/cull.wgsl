@@ -5,7 +5,7 @@
 // of the listed batches are stored in slots, one batch after the other: batches that are left out
 // take no memory.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x415c0fee9351bae2
+// All loops end, by 1 of src/gpu/loops.rs: 0xb67ab5811d887c68
 // #import accumulator_raster|front::{visible}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
 // #import balls_*::{batches_held, sphere_of}
@@ -134,7 +134,9 @@ fn occlude_open(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    farthest_in(linear_index(workgroup, workgroups, local), NOTHING);
+    let tile = linear_index(workgroup, workgroups, local);
+    let across = occlusion_tiles().x;
+    _ = farthest_in(vec2<u32>(tile % across, tile / across), NOTHING);
 }
 
 // Runs after occlude_open(). One invocation per batch in `rest`; further invocations have no batch.

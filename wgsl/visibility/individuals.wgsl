@@ -1,11 +1,9 @@
 // Inputs that are blended separately, the individuals of Tien 2008. They are drawn one after the
 // other, and each pixel keeps the nearest of their blended surfaces, compared by blended depth
 // (section 5.3). Twin: src/passes/individuals.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4f9b625f5cb1d36b
+// All loops end, by 1 of src/gpu/loops.rs: 0xc8e03ae27b9173ec
 // #import *::{front_at}
-// #import accumulator_raster|occlusion::{covered_start}
-// #import accumulator_raster|visibility::{nearest}
-// #import covered::{COVERED_LIST, LIST_EMPTY, TILE_ROWS, TILE_WIDTH, covered_tile, tiles_across}
+// #import covered::{LIST_EMPTY, TILE_ROWS, TILE_WIDTH, covered_tile, list_tile, tiles_across}
 // #import covered::{tiles_in_band}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
 // #import resolve_surface::{Surface, surface_of}
@@ -113,10 +111,7 @@ fn list_individuals(
             any_shows = any_shows || individuals[(at.y * held.width + at.x) * INDIVIDUAL_VECTORS + 1u].w != 0.0;
         }
     }
-    if (tile < tiles_in_band() && (any_shows || has_triangles(tile))) {
-        let place = atomicAdd(&nearest[covered_start()], 1u);
-        atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
-    }
+    list_tile(tile, tile < tiles_in_band() && (any_shows || has_triangles(tile)), local);
 }
 
 // The surface of a pixel's splats.

@@ -1,8 +1,9 @@
 // Stage 2: the nearest depth at every pixel. One invocation per splat, one workgroup per large
-// splat. Depths are stored so that the nearest one is the greatest number (kept_depth in
+// splat. Where stage 1 draws small splats itself (project_draws.wgsl), the kernel `visibility` is
+// left out. Depths are stored so that the nearest one is the greatest number (kept_depth in
 // layout.wgsl).
 // Twin: src/passes/visibility.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x0036556a3decb52f
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x276af496a9cf6f78
 // #import *::{keep_nearest, mark_of}
 // #import cull::{slot_of, surfel_in}
 // #import fade::{takes_sample}
@@ -21,6 +22,21 @@ fn cover(splat: Splat, filter_: Filter, mark: u32, x: u32, y: u32) {
     }
 }
 
+// Draws a small splat with one invocation. Large and empty ones have no pixels here.
+fn draw_small_splat(splat: Splat, filter_: Filter, surfel: u32) {
+    if (is_large(splat)) {
+        return;
+    }
+    let pixels = reach(splat);
+    let mark = mark_of(surfel);
+    var at = pixels.first;
+    while (at.y <= pixels.last.y) {
+        cover(splat, filter_, mark, at.x, at.y);
+        at.x++;
+        at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
+    }
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn visibility(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -33,19 +49,7 @@ fn visibility(
         return;
     }
     let record = projected[slot];
-    let splat = splat_of(record);
-    if (is_large(splat)) {
-        return;
-    }
-    let pixels = reach(splat);
-    let filter_ = filter_in(record);
-    let mark = mark_of(surfel_in(record, slot));
-    var at = pixels.first;
-    while (at.y <= pixels.last.y) {
-        cover(splat, filter_, mark, at.x, at.y);
-        at.x++;
-        at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
-    }
+    draw_small_splat(splat_of(record), filter_in(record), surfel_in(record, slot));
 }
 
 @compute @workgroup_size(TILE, TILE)

@@ -16,8 +16,8 @@ use epsplat::low_level::gpu::Sources;
 use epsplat::low_level::gpu::interface::reflect;
 use epsplat::low_level::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, JUDGED, KIND_SHIFT,
-    LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
-    QUEUE_START, RUN, SPREAD_GRID, TILE, WORKGROUP,
+    LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_BLOCK, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID,
+    QUEUE_LISTING, QUEUE_START, RUN, SPREAD_GRID, TILE, WORKGROUP,
 };
 use epsplat::low_level::gpu::sources::FILES;
 use epsplat::low_level::passes;
@@ -150,6 +150,7 @@ fn constants_agree() {
         }
         let tile = needs.surface.raster().is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
+        assert_eq!(constant("OCCLUSION_BLOCK"), tile.map(|_| f64::from(OCCLUSION_BLOCK)));
         let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
         let of_cuts = [

@@ -16,6 +16,8 @@ use crate::error::Result;
 pub(super) struct Module {
     interface: Interface,
     counts_loops: bool,
+    /// The workgroup variables that kernels set before they read them.
+    set_memory: Vec<String>,
 }
 
 /// The bindings of a pipeline, on its device.
@@ -94,7 +96,7 @@ impl Module {
         let interface = interface
             .settled(capabilities, needs)
             .map_err(|e| format!("the arithmetic of a kernel cannot be settled: {e}"))?;
-        Ok(Self { interface, counts_loops: text.counts_loops })
+        Ok(Self { interface, counts_loops: text.counts_loops, set_memory: text.set_memory })
     }
 
     /// Checks that a draw's two stages and its targets match.
@@ -170,7 +172,8 @@ impl Module {
     ) -> Result<Vec<u32>, String> {
         let numbers = bindings.of_text.iter().zip(&bindings.entries).map(|(&of_text, entry)| (of_text, entry.binding));
         let options = spirv::options(features, numbers, self.counts_loops);
-        spirv::translate(&self.interface, (stage, name), &self.declared(constants), (&options, limits))
+        let constants = self.declared(constants);
+        spirv::translate(&self.interface, (stage, name), &constants, (options, limits), &self.set_memory)
     }
 
     /// Returns those of `constants` that the module declares.
@@ -212,8 +215,8 @@ fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
     //   device itself bounds (`robustBufferAccess`: all of Vulkan has it, and wgpu asks for it). An
     //   index outside reads or writes another part of the same buffer at worst; wgpu's own
     //   translation would clamp it on devices without `robustBufferAccess2`.
-    // - Memory is initialised: workgroup memory is zeroed in the kernel, and wgpu initialises
-    //   buffers.
+    // - Memory is initialised: workgroup memory is zeroed in the kernel, or is that of a built-in
+    //   kernel that sets it before it reads it, and wgpu initialises buffers.
     // - Loops end: they have counters, unless they are proven to end (src/gpu/loops.rs). Integer
     //   division by zero is checked.
     // - Workgroups and their memory are within the device's limits: `spirv::translate` checks that.

@@ -10,12 +10,17 @@ use crate::error::{Error, Result};
 // Defines `FILES`, the name and text of each file of `wgsl/`, as the build script found them.
 include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 
+/// The line by which a file claims that kernels set its workgroup memory before they read it.
+const SETS_MEMORY: &str = "// Kernels set the workgroup memory of this file before they read it.";
+
 /// The source of a module.
 #[derive(PartialEq)]
 pub(crate) struct Text {
     pub joined: String,
     /// Whether every loop gets a counter that ends it.
     pub counts_loops: bool,
+    /// The workgroup variables that kernels set before they read them.
+    pub set_memory: Vec<String>,
     /// Whether kernels divide and take roots by functions of their own on every device.
     pub divides: bool,
     /// The name of each joined file in messages, and its number of lines.
@@ -26,7 +31,7 @@ impl Text {
     /// Creates a module of one text, in which every loop gets a counter.
     pub fn alone(text: &str) -> Self {
         let joined = format!("{text}\n{}", Sources::default().join(&[ARITHMETIC]));
-        Self { joined, counts_loops: true, divides: false, files: Vec::new() }
+        Self { joined, counts_loops: true, divides: false, set_memory: Vec::new(), files: Vec::new() }
     }
 
     /// Maps a line of the joined text to its file and the line in that file. Both line numbers
@@ -131,6 +136,7 @@ impl Sources {
             joined: self.join(files),
             counts_loops: !self.all_end(files),
             divides: self.divides,
+            set_memory: self.set_memory(files),
             files: files.iter().map(shown).collect(),
         }
     }
@@ -139,6 +145,21 @@ impl Sources {
     pub(super) fn all_end(&self, files: &[&str]) -> bool {
         let ends = |file: &&str| matches!(self.texts.get(file), Some(Cow::Borrowed(text)) if loops::all_end(text));
         !self.counts_loops && files.iter().all(ends)
+    }
+
+    /// The workgroup variables of `files` that kernels set before they read them, as their files
+    /// claim; none if a file is not built in.
+    fn set_memory(&self, files: &[&str]) -> Vec<String> {
+        let built_in: Option<Vec<&str>> = files
+            .iter()
+            .map(|file| match self.texts.get(file) {
+                Some(Cow::Borrowed(text)) => Some(*text),
+                _ => None,
+            })
+            .collect();
+        let claiming = built_in.unwrap_or_default().into_iter().filter(|text| text.contains(SETS_MEMORY));
+        let variables = claiming.flat_map(str::lines).filter_map(|line| line.strip_prefix("var<workgroup> "));
+        variables.filter_map(|line| Some(line.split_once(':')?.0.to_owned())).collect()
     }
 
     /// Joins `files` into one module. WGSL's module scope is free of order, so joining is

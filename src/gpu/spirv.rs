@@ -35,7 +35,8 @@ fn is_arithmetic(opcode: u32) -> bool {
 }
 
 /// Translates one entry point of a module to SPIR-V, with `constants` set and without what only
-/// other entry points use.
+/// other entry points use. Its workgroup memory is zeroed first, unless all of it is in
+/// `set_memory`: the translator lets one invocation zero all words, while the others wait.
 ///
 /// # Errors
 /// A message if the translator refuses the module, or its workgroup is too large for `limits`.
@@ -43,13 +44,18 @@ pub(super) fn translate(
     interface: &Interface,
     entry: (naga::ShaderStage, &str),
     constants: &[(&str, f64)],
-    (options, limits): (&spv::Options<'_>, &wgpu::Limits),
+    (mut options, limits): (spv::Options<'_>, &wgpu::Limits),
+    set_memory: &[String],
 ) -> Result<Vec<u32>, String> {
     let (module, info) = interface.resolved(entry, constants)?;
     let (shader_stage, name) = entry;
     check_workgroup(&module, limits)?;
+    let mut memory = module.global_variables.iter().filter(|(_, of)| of.space == naga::AddressSpace::WorkGroup);
+    if memory.all(|(_, variable)| variable.name.as_ref().is_some_and(|name| set_memory.contains(name))) {
+        options.zero_initialize_workgroup_memory = spv::ZeroInitializeWorkgroupMemoryMode::None;
+    }
     let pipeline = spv::PipelineOptions { shader_stage, entry_point: name.to_owned() };
-    let words = spv::write_vec(&module, &info, options, Some(&pipeline)).map_err(|e| e.to_string())?;
+    let words = spv::write_vec(&module, &info, &options, Some(&pipeline)).map_err(|e| e.to_string())?;
     uncontracted(&words)
 }
 
@@ -201,7 +207,8 @@ mod tests {
         assert_eq!(layout.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["by", "numbers"]);
         let options = options(wgpu::Features::empty(), [(3, 0), (7, 1)].into_iter(), false);
         let entry = (naga::ShaderStage::Compute, "double");
-        let words = translate(&interface, entry, &[("TWICE", 2.0)], (&options, &wgpu::Limits::default())).unwrap();
+        let words =
+            translate(&interface, entry, &[("TWICE", 2.0)], (options.clone(), &wgpu::Limits::default()), &[]).unwrap();
         let all = instructions(&words);
         let arithmetic: Vec<u32> = all.iter().filter(|(op, _)| is_arithmetic(*op)).map(|(_, of)| of[1]).collect();
         let is_ours = |(op, of): &&(u32, &[u32])| *op == DECORATE && of[1] == NO_CONTRACTION;
@@ -243,7 +250,7 @@ mod tests {
     fn translated(text: &str, features: wgpu::Features, limits: &wgpu::Limits) -> Result<Vec<u32>, String> {
         let interface = Interface::of(text, capabilities(features)).map_err(|invalid| invalid.told(|_| None))?;
         let options = options(features, [(0, 0)].into_iter(), true);
-        translate(&interface, (naga::ShaderStage::Compute, "go"), &[], (&options, limits))
+        translate(&interface, (naga::ShaderStage::Compute, "go"), &[], (options, limits), &[])
     }
 
     /// Kernels that need more than the device grants are refused before the driver sees them.

@@ -2,7 +2,8 @@
 // are neighbours in most cases. It spreads their pixels evenly over its invocations, so that none
 // waits for another with a larger splat, and sums them in its memory (sums_window.wgsl).
 // Same interface as accumulate_alone.wgsl.
-// All loops end, by 1, 5 of src/gpu/loops.rs: 0xe0d7abd6423178a4
+// Kernels set the workgroup memory of this file before they read it.
+// All loops end, by 1, 5 of src/gpu/loops.rs: 0x8d63d579e6e47f8c
 // #import *::{front_at}
 // #import blend|winner::{Attributes, attributes_of}
 // #import blend|winner_second::{blend}
@@ -25,6 +26,15 @@ override SPREAD_SPLATS: u32;
 var<workgroup> spread_attributes: array<Attributes, WORKGROUP>;
 // The number of pixels of the splats up to and including each one.
 var<workgroup> pixel_ends: array<u32, SPREAD>;
+
+fn clear_window(local: u32) {
+    for (var word = local; word < WINDOW_WORDS; word += SPREAD) {
+        atomicStore(&window[word], 0u);
+    }
+    for (var block = local; block < MOST_BLOCKS; block += SPREAD) {
+        atomicStore(&window_owners[block], 0u);
+    }
+}
 
 // Replaces the numbers in pixel_ends by the sums of all numbers up to and including each one.
 fn sum_ends(local: u32) {
@@ -125,9 +135,13 @@ fn accumulate(
         return;
     }
     let end = min(arrayLength(&projected), workgroups.x * workgroups.y * WORKGROUP);
+    clear_window(local);
+    workgroupBarrier();
+    var count = 0u;
     if (local < SPREAD_SPLATS && slot + local < end) {
-        pixel_ends[local] = prepared(slot + local);
+        count = prepared(slot + local);
     }
+    pixel_ends[local] = count;
     sum_ends(local);
     if (workgroupUniformLoad(&pixel_ends[SPREAD - 1u]) == 0u) {
         return;

@@ -1,6 +1,6 @@
 // Sums of the terms of terms.wgsl in fixed point. A term fills one word; a sum has two, (low,
 // high), with an exact carry. Error bound: src/passes/accumulate.rs.
-// All loops end, by 3 of src/gpu/loops.rs: 0x383207936f3c0571
+// All loops end, by 3 of src/gpu/loops.rs: 0x8c027b22d5fca93b
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
@@ -19,7 +19,7 @@ fn add_stored(pixel: u32, channel: u32, value: Term) {
 
 // Adds the carries of a fragment. They are rare, so one loop over all channels costs less than a
 // branch for each.
-fn settle(pixel: u32) {
+fn settle_stored(pixel: u32) {
     while (carries != 0u) {
         let channel = firstTrailingBit(carries);
         atomicAdd(&sums[2u * (pixel * CHANNELS + channel) + 1u], 1u);

@@ -3,7 +3,7 @@
 // low half that wraps carries into the high half. The next u64 counts the carries of both halves.
 // Readers subtract the carries of the low half from the high half again.
 // Error bound: src/passes/accumulate.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x7cfc7c460f245b6e
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xfc00a8777b1d06b0
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
@@ -14,8 +14,8 @@ override CHANNELS: u32;
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
 // The carries of the current fragment, three bits per pair: one bit for the carry of the low half,
-// and two that count the carries of the high half. The high half may wrap twice if add_stored() adds the
-// halves one after the other, the first time by a carry from the low half.
+// and two that count the carries of the high half. The high half may wrap twice if add_stored()
+// adds the halves one after the other, the first time by a carry from the low half.
 var<private> carries: u32;
 
 fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
@@ -57,7 +57,7 @@ fn deposit_stored(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>)
 
 // Adds the carries of a fragment. They are rare, so one loop over all pairs costs less than a
 // branch for each.
-fn settle(pixel: u32) {
+fn settle_stored(pixel: u32) {
     while (carries != 0u) {
         let pair = firstTrailingBit(carries) / 3u;
         let wraps = (carries >> (3u * pair)) & 7u;

@@ -2,9 +2,10 @@
 // meet before they go to storage. The memory is a hash table with places for WINDOW blocks of 2x2
 // pixels. Fragments in blocks that find no places go to storage one by one.
 // Same interface as sums_direct.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0x64153bb8e81edb7c
+// Kernels set the workgroup memory of this file before they read it.
+// All loops end, by 1 of src/gpu/loops.rs: 0x72d799ca323be5f7
 // #import *::{CHANNELS, Term}
-// #import accumulator_*::{add_pair_stored, add_stored, deposit_stored}
+// #import accumulator_*::{add_pair_stored, deposit_stored, settle_stored}
 // #import footprint::{pixel_index}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{term_words}
@@ -84,25 +85,34 @@ fn carries_word(place: u32, channel: u32) -> u32 {
     return (CHANNELS + channel / 4u) * WINDOW * BLOCK_PIXELS + place;
 }
 
+// The terms of the current fragment; a compiler drops those that are not used.
+const MOST_TERMS: u32 = 18u;
+var<private> fragment_terms: array<u32, MOST_TERMS>;
+
 fn add(pixel: u32, channel: u32, value: Term) {
-    if (window_place == OUTSIDE) {
-        add_stored(pixel, channel, value);
-        return;
-    }
-    let term = term_words(value).x;
-    let before = atomicAdd(&window[sum_word(window_place, channel)], term);
-    if (before + term < before) {
-        atomicAdd(&window[carries_word(window_place, channel)], 1u << (8u * (channel % 4u)));
-    }
+    fragment_terms[channel] = term_words(value).x;
 }
 
-// Adds to two neighbouring sums, of which the first has an even channel.
 fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add(pixel, channel, first);
+    add(pixel, channel + 1u, second);
+}
+
+// Adds the terms of a fragment.
+fn settle(pixel: u32) {
     if (window_place == OUTSIDE) {
-        add_pair_stored(pixel, channel, first, second);
-    } else {
-        add(pixel, channel, first);
-        add(pixel, channel + 1u, second);
+        for (var channel = 0u; channel < CHANNELS; channel += 2u) {
+            add_pair_stored(pixel, channel, fragment_terms[channel], fragment_terms[channel + 1u]);
+        }
+        settle_stored(pixel);
+        return;
+    }
+    for (var channel = 0u; channel < CHANNELS; channel++) {
+        let term = fragment_terms[channel];
+        let before = atomicAdd(&window[sum_word(window_place, channel)], term);
+        if (before + term < before) {
+            atomicAdd(&window[carries_word(window_place, channel)], 1u << (8u * (channel % 4u)));
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 // tile has 16x16 pixels, and each of its invocations draws one of them. They look at 256 splats of
 // the lists at once, and copy those that reach the tile into workgroup memory, from where all of
 // them draw these splats. Every bit of the result is that of visibility.wgsl and accumulate.wgsl.
+// Kernels set the workgroup memory of this file before they read it.
 // Same interface as tile.wgsl. Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xf5a32725221354f2
 // #import *::{resolve_column, show}

@@ -1,5 +1,6 @@
 // Resolves the samples of a tile, one an invocation. A pixel's samples are added in the order of
 // resolve_samples.wgsl. Same interface as tile_pixels.wgsl.
+// Kernels set the workgroup memory of this file before they read it.
 // All loops end, by 1 of src/gpu/loops.rs: 0x06d05d4e246b6fed
 // #import column::{Column}
 // #import layout::{held_band}

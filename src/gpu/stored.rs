@@ -46,15 +46,28 @@ fn keeps(adapter: &AdapterDescription, root: bool) -> bool {
     KEEPERS.iter().any(|keeper| adapter.driver.contains(keeper.driver) && (keeper.for_root || !root))
 }
 
-/// Whether the process runs as root.
-fn is_root() -> bool {
+/// The number of the user who owns a file; `None` where users have none.
+fn owner(path: &Path) -> Option<u32> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;
-        fs::metadata("/proc/self").is_ok_and(|own| own.uid() == 0)
+        fs::metadata(path).ok().map(|of| of.uid())
     }
     #[cfg(not(unix))]
-    false
+    {
+        let _ = path;
+        None
+    }
+}
+
+/// The user that the process runs as; `None` where the system does not tell.
+fn own_user() -> Option<u32> {
+    owner(Path::new("/proc/self"))
+}
+
+/// Whether the process runs as root.
+fn is_root() -> bool {
+    own_user() == Some(0)
 }
 
 /// The user's folder for caches of this program.
@@ -100,9 +113,12 @@ fn sum(path: &Path, content: &[u8]) -> u64 {
     hash(name.iter().chain(content).copied())
 }
 
-/// Returns the content of a file, and its hash. `None` for a file that is missing, too large, or
-/// not as it was written under its name.
+/// Returns the content of a file, and its hash. `None` for a file that is missing, too large, of
+/// another user, or not as it was written under its name.
 fn read(path: &Path) -> Option<(Vec<u8>, u64)> {
+    if own_user().is_some_and(|user| owner(path) != Some(user)) {
+        return None;
+    }
     let mut bytes = Vec::new();
     let file = File::open(path).ok().filter(|file| file.metadata().is_ok_and(|about| about.is_file()))?;
     file.take(MOST_BYTES + HEAD as u64 + 1).read_to_end(&mut bytes).ok()?;
@@ -151,7 +167,7 @@ impl Stored {
         // and the file has the hash of its name and its bytes. wgpu then compares vendor, device,
         // size of pointers, and the identity of driver and version (Vulkan's `pipelineCacheUUID`),
         // and drops data that differ. The driver checks its own header once more. The hash keeps
-        // out accidents, not forgers: the folder is the user's alone.
+        // out accidents, not forgers: files of other users are not read (`read`).
         #[allow(unsafe_code)]
         let cache = unsafe { device.create_pipeline_cache(&descriptor) };
         if let Some(error) = pollster::block_on(scope.pop()) {

@@ -109,9 +109,6 @@ pub(super) fn terms_file(needs: &SceneNeeds) -> &'static str {
 /// The files that store the sums of a render with `needs` in storage buffers.
 pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     match needs.accumulator {
-        Accumulator::Fixed if needs.spreads => {
-            vec![terms_file(needs), fixed_file(needs), "sums_window.wgsl", "accumulate_spread.wgsl"]
-        }
         Accumulator::Fixed if needs.terms_fit() => vec![terms_file(needs), fixed_file(needs), "sums_direct.wgsl"],
         Accumulator::Fixed => vec![terms_file(needs), fixed_file(needs)],
         Accumulator::Fixed64 => vec!["terms_wide.wgsl", "accumulator_fixed64.wgsl"],
@@ -315,7 +312,8 @@ pub const PASS: Pass = Pass {
         files
     },
     kernels: |needs| match needs.surface.accumulates() && !needs.surface.gathers() {
-        true => vec![accumulating(needs), ACCUMULATE_LARGE],
+        true if needs.spreads => vec![ACCUMULATE_LARGE],
+        true => vec![ACCUMULATE, ACCUMULATE_LARGE],
         false => Vec::new(),
     },
     constants: |making| {
@@ -331,6 +329,15 @@ pub const PASS: Pass = Pass {
     },
 };
 
+/// The kernel that spreads fragments, with its files. It has a module of its own, because a kernel
+/// holds all the workgroup memory that its functions name.
+pub const SPREADING: Pass = Pass {
+    name: "spread",
+    files: |needs| vec![terms_file(needs), fixed_file(needs), "sums_window.wgsl", "accumulate_spread.wgsl"],
+    kernels: |needs| if needs.surface.gathers() { Vec::new() } else { vec![SPREAD] },
+    constants: |_| Vec::new(),
+};
+
 /// The files that store the sums, for a render's main module.
 pub const SUMS: Pass = Pass {
     name: "sums",
@@ -340,7 +347,8 @@ pub const SUMS: Pass = Pass {
 };
 
 const ACCUMULATE: Kernel = Kernel::new("accumulate");
-const SPREAD: Kernel = Kernel::of("accumulate", [256, 1, 1]);
+/// The kernel that accumulates small splats on graphics cards.
+pub const SPREAD: Kernel = Kernel::of("accumulate", [256, 1, 1]);
 const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1]);
 
 /// The kernel that accumulates the small splats.

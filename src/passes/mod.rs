@@ -217,15 +217,17 @@ fn passes(needs: &SceneNeeds) -> impl Iterator<Item = &'static Pass> {
     PASSES.into_iter().chain(own_maps(needs).map(|own| &own.pass))
 }
 
-/// The modules of a render with `needs`: the main module, then, if needed, the module of the tiles
-/// and the module that chooses a cut.
+/// The modules of a render with `needs`: the main module, then, if needed, the module of the tiles,
+/// the module that spreads fragments and the module that chooses a cut.
 pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
-    let tiles = || Module { files: files_with(&tiles::PASS, needs).collect(), kernels: (tiles::PASS.kernels)(needs) };
+    let with = |own: &Pass| Module { files: files_with(own, needs).collect(), kernels: (own.kernels)(needs) };
     // This module is compiled before the size of the cut is known, so with the needs at that time.
     let cut = || Module { files: first_files(&needs.before_cut()), kernels: select::CHOOSING.into() };
     let kernels = passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect();
     let first = Module { files: first_files(needs), kernels };
-    std::iter::once(first).chain(needs.surface.tiles().then(tiles)).chain(needs.levels.then(cut)).collect()
+    let tiles = needs.surface.tiles().then(|| with(&tiles::PASS));
+    let spread = (needs.spreads && !needs.surface.gathers()).then(|| with(&accumulate::SPREADING));
+    std::iter::once(first).chain(tiles).chain(spread).chain(needs.levels.then(cut)).collect()
 }
 
 /// The files that every module includes, and those of one more pass.

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::gpu::kernel::{compiles_alone, side_by_side};
 use crate::gpu::program::Program;
 use crate::gpu::{Gpu, Sources};
+use crate::passes::accumulate::SPREAD;
 use crate::passes::select::CHOOSING;
 use crate::passes::{constants, modules, raster};
 use crate::plan::known::Listed;
@@ -41,6 +42,7 @@ impl Kernels {
         let certain = |index: usize| match &self.modules[index].0 {
             _ if index == 0 => drawn,
             module if module.kernels.contains(&CHOOSING[0]) => true,
+            module if module.kernels.contains(&SPREAD) => drawn,
             _ => drawn && (listed || plan.needs.surface.gathers()),
         };
         let wanted: Vec<usize> = (0..self.modules.len()).filter(|&index| certain(index) || (large && drawn)).collect();

@@ -203,7 +203,7 @@ fn a_wrong_tile_is_noticed() {
         ("staged.wgsl", "deepest_accepted(farthest_of_all(front, local))", "farthest_of_all(0.5 * front, local)"),
         ("staged.wgsl", "SIDE, deepest)) {", "SIDE / 2u, deepest)) {"),
         ("staged_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
-        ("occlusion.wgsl", "vec2<u32>(TILE_WIDTH, TILE_ROWS) /", "vec2<u32>(8u, TILE_ROWS) /"),
+        ("occlusion.wgsl", "at.y / size.y * tiles_across()", "at.y * tiles_across()"),
     ];
     let all = [(&gathered[..], true, false), (&stored[..], false, false), (&of_cards[..], true, true)];
     for (wrong, gathers, on_card) in all {

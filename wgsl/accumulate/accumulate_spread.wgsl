@@ -3,7 +3,7 @@
 // waits for another with a larger splat, and sums them in its memory (sums_window.wgsl).
 // Same interface as accumulate_alone.wgsl.
 // Kernels set the workgroup memory of this file before they read it.
-// All loops end, by 1, 5 of src/gpu/loops.rs: 0x8d63d579e6e47f8c
+// All loops end, by 1, 5 of src/gpu/loops.rs: 0x00f79b0ab65f1a01
 // #import *::{front_at}
 // #import blend|winner::{Attributes, attributes_of}
 // #import blend|winner_second::{blend}
@@ -27,12 +27,16 @@ var<workgroup> spread_attributes: array<Attributes, WORKGROUP>;
 // The number of pixels of the splats up to and including each one.
 var<workgroup> pixel_ends: array<u32, SPREAD>;
 
+fn clear_owners(local: u32) {
+    for (var block = local; block < MOST_BLOCKS; block += SPREAD) {
+        atomicStore(&window_owners[block], 0u);
+    }
+}
+
+// A barrier must follow.
 fn clear_window(local: u32) {
     for (var word = local; word < WINDOW_WORDS; word += SPREAD) {
         atomicStore(&window[word], 0u);
-    }
-    for (var block = local; block < MOST_BLOCKS; block += SPREAD) {
-        atomicStore(&window_owners[block], 0u);
     }
 }
 
@@ -135,7 +139,7 @@ fn accumulate(
         return;
     }
     let end = min(arrayLength(&projected), workgroups.x * workgroups.y * WORKGROUP);
-    clear_window(local);
+    clear_owners(local);
     workgroupBarrier();
     var count = 0u;
     if (local < SPREAD_SPLATS && slot + local < end) {
@@ -146,6 +150,7 @@ fn accumulate(
     if (workgroupUniformLoad(&pixel_ends[SPREAD - 1u]) == 0u) {
         return;
     }
+    clear_window(local);
     for (var first = 0u; first < SPREAD_SPLATS; first += WORKGROUP) {
         accumulate_splats(slot, first, local);
     }

@@ -136,7 +136,7 @@ pub fn large(band: usize) -> Stage {
 }
 
 /// The stage that stores the farthest of the nearest depths in each tile and, after
-/// [`Part::All`], lists the tiles that are not empty ([`covered`](super::covered)).
+/// [`Part::All`], lists the tiles that are not empty ([`covered`]).
 ///
 /// After [`Part::Near`], a tile with an empty pixel hides nothing, since far splats may still fill
 /// that pixel.

@@ -16,8 +16,8 @@
 // #import raster|visibility::{projected}
 // #import records::{splat_of}
 // #import side::{is_shown}
-// #import sums_window::{BLOCK_PIXELS, WINDOW, WINDOW_BLOCK, claim_block, flush, place_in_window}
-// #import sums_window::{window_place}
+// #import sums_window::{BLOCK_PIXELS, MOST_BLOCKS, WINDOW, WINDOW_BLOCK, WINDOW_WORDS, claim_block}
+// #import sums_window::{flush, place_in_window, window, window_owners, window_place}
 
 // The invocations of a workgroup, and its splats: a multiple of WORKGROUP, and no more than
 // invocations. The attributes of WORKGROUP splats are in its memory at a time.

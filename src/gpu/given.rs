@@ -75,8 +75,8 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// What the kernels have done since the last call, if this is the f32 twin; other devices do
-    /// not count.
+    /// Returns what the kernels have done since the last call, if this is the f32 twin; other
+    /// devices do not count.
     pub fn tally(&self) -> Option<Tally> {
         twin::tally(&self.device)
     }

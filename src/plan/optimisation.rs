@@ -22,8 +22,8 @@ pub enum Optimisation {
     /// (`wgsl/accumulate/accumulator_fixed_pairs.wgsl`), or the nearest depth and its colour
     /// (`wgsl/visibility/nearest_color.wgsl`).
     Pairs,
-    /// Graphics cards spread the fragments of a workgroup's splats over its invocations and sum them
-    /// in its memory first (`wgsl/accumulate/accumulate_spread.wgsl`).
+    /// Graphics cards spread the fragments of a workgroup's splats over its invocations and sum
+    /// them in its memory first (`wgsl/accumulate/accumulate_spread.wgsl`).
     Spreading,
     /// Records are read and written 64 bits at a time (`wgsl/common/words_long.wgsl`).
     LongWords,

@@ -18,13 +18,13 @@ pub struct Calls {
 }
 
 impl Calls {
-    /// The share of the invocations that took part.
+    /// Returns the share of the invocations that took part.
     pub fn at_work(self) -> f64 {
         self.lanes as f64 / self.slots.max(1) as f64
     }
 }
 
-/// What a kernel did.
+/// The counts of one kernel.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KernelTally {
     /// The number of atomic operations on each storage buffer, by its name in WGSL.
@@ -44,7 +44,7 @@ impl KernelTally {
         }
     }
 
-    /// The sum of both.
+    /// Returns the sum of both.
     pub(super) fn and(mut self, other: Self) -> Self {
         for (name, count) in other.atomics {
             *self.atomics.entry(name).or_default() += count;
@@ -58,5 +58,5 @@ impl KernelTally {
     }
 }
 
-/// What all kernels did, by their names.
+/// The counts of all kernels, by their names.
 pub type Tally = BTreeMap<String, KernelTally>;

@@ -85,12 +85,13 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let drawn = drawn.iter().chain(of_mesh).copied();
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
         // Some modules contain entry points that they do not run: tiles and cuts share files with
-        // other modules, order-free weights need no visibility pass, and splats that are drawn as
-        // they are projected need no kernel for it.
+        // other modules, order-free weights need no visibility pass, splats that are drawn as they
+        // are projected need no kernel for it, and one module spreads fragments alone.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles()
             || needs.levels
             || needs.draws_projected
+            || files.contains(&"accumulate_spread.wgsl")
             || needs.surface.gathers()
             || needs.surface == Surface::OrderFree(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
@@ -401,7 +402,16 @@ fn absent_parts_have_their_partners_signatures() {
         }
     };
     let alike = |prefix: &str, functions: &[&str]| alike_in(prefix, starting(prefix), functions);
-    alike("accumulator_", &["add", "add_pair", "settle", "show", "sum_at", "weight_at"]);
+    alike("accumulator_", &["show", "sum_at", "weight_at"]);
+    let in_words = ["accumulator_fixed.wgsl", "accumulator_fixed_pairs.wgsl"];
+    alike_in(
+        "accumulator_fixed",
+        in_words.to_vec(),
+        &["add_stored", "add_pair_stored", "settle_stored", "deposit_stored"],
+    );
+    let with_sums = [starting("accumulator_"), starting("sums_")].concat();
+    let with_sums = with_sums.into_iter().filter(|name| !in_words.contains(name));
+    alike_in("sums_", with_sums.collect(), &["add", "add_pair", "settle"]);
     let apart = [
         "accumulator_fixed.wgsl",
         "accumulator_fixed64.wgsl",

@@ -1,6 +1,6 @@
 // Sums of the terms of terms.wgsl in fixed point. A term fills one word; a sum has two, (low,
 // high), with an exact carry. Error bound: src/passes/accumulate.rs.
-// All loops end, by 3 of src/gpu/loops.rs: 0x8c027b22d5fca93b
+// All loops end, by 3 of src/gpu/loops.rs: 0x1ba1a3f356b11b29
 // #import *::{Term}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{ONE}
@@ -34,8 +34,11 @@ fn add_pair_stored(pixel: u32, channel: u32, first: Term, second: Term) {
 }
 
 fn deposit_one_stored(word: u32, value: vec2<u32>) {
-    let before = atomicAdd(&sums[word], value.x);
-    let high = value.y + select(0u, 1u, before + value.x < before);
+    var high = value.y;
+    if (value.x > 0u) {
+        let before = atomicAdd(&sums[word], value.x);
+        high += select(0u, 1u, before + value.x < before);
+    }
     if (high > 0u) {
         atomicAdd(&sums[word + 1u], high);
     }

@@ -3,7 +3,7 @@
 // pixels. Fragments in blocks that find no places go to storage one by one.
 // Same interface as sums_direct.wgsl.
 // Kernels set the workgroup memory of this file before they read it.
-// All loops end, by 1 of src/gpu/loops.rs: 0x72d799ca323be5f7
+// All loops end, by 1 of src/gpu/loops.rs: 0xe246c60b3d4ba92a
 // #import *::{CHANNELS, Term}
 // #import accumulator_*::{add_pair_stored, deposit_stored, settle_stored}
 // #import footprint::{pixel_index}
@@ -102,7 +102,12 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 fn settle(pixel: u32) {
     if (window_place == OUTSIDE) {
         for (var channel = 0u; channel < CHANNELS; channel += 2u) {
-            add_pair_stored(pixel, channel, fragment_terms[channel], fragment_terms[channel + 1u]);
+            // The last channel may be unused.
+            if (fragment_terms[channel + 1u] == 0u) {
+                add_stored(pixel, channel, fragment_terms[channel]);
+            } else {
+                add_pair_stored(pixel, channel, fragment_terms[channel], fragment_terms[channel + 1u]);
+            }
         }
         settle_stored(pixel);
         return;

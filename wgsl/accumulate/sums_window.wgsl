@@ -5,7 +5,7 @@
 // Kernels set the workgroup memory of this file before they read it.
 // All loops end, by 1 of src/gpu/loops.rs: 0xe246c60b3d4ba92a
 // #import *::{CHANNELS, Term}
-// #import accumulator_*::{add_pair_stored, deposit_stored, settle_stored}
+// #import accumulator_*::{add_pair_stored, add_stored, deposit_stored, settle_stored}
 // #import footprint::{pixel_index}
 // #import layout::{WEIGHT_CHANNEL}
 // #import terms|terms_wide::{term_words}

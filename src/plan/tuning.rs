@@ -43,7 +43,7 @@ pub const REFERENCE_ROWS: u32 = 8;
 /// Whether workgroups sum fragments in their memory before they add them to the image
 /// (`wgsl/accumulate/accumulate_spread.wgsl`): on graphics cards, whose workgroups have memory of
 /// their own of at least 32 KiB. Processors have none; llvmpipe takes minutes to compile the
-/// kernel. By the f32 twin's counts the atomic operations on sums are 0.44 to 0.48 times as many
+/// kernel. By the f32 twin's counts the atomic operations on sums are 0.43 to 0.46 times as many
 /// (`tests/kernels/spread.rs`). A Radeon card (RDNA 2) keeps 10 of 32 waves instead of 20, because
 /// of the memory (`tests/golden/registers.txt`); which counts more was not measured on a card.
 pub fn spreads(adapter: &AdapterDescription) -> bool {

@@ -43,8 +43,8 @@ fn alone(of: (&Scene, &Camera), options: &Settings) -> (Frame, Report, KernelTal
 
 #[test]
 fn spreading_halves_the_atomics_and_doubles_the_lanes_at_work() {
-    // With several threads the order of the listed batches, and so the counts, would change by some
-    // percent from run to run.
+    // With several threads the order of the listed batches changes from run to run, and the counts
+    // change a little with it.
     rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(compare_counts);
 }
 

@@ -1,6 +1,7 @@
 //! Counts what the kernels do: atomic operations, and the invocations that take part in each call.
 //!
-//! Counts of the twin do not depend on the machine, so kernels can be compared without a card.
+//! The counts compare kernels without a card. They change a little with the number of threads where
+//! the order of a list does.
 
 use std::collections::BTreeMap;
 

@@ -271,7 +271,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
         let _ = writeln!(text, "What it lacks{colors} is estimated at each reading; to store it, run {command}");
     }
     if info.is_mesh {
-        let _ = writeln!(text, "Its triangles are drawn without surfels by epsplat render --triangles FILE.");
+        let _ = writeln!(text, "It is drawn as its triangles; --mesh surfels draws surfels that cover them.");
     }
     for note in info.preparation.notes() {
         let _ = writeln!(text, "{note}");

@@ -1,5 +1,7 @@
 //! A triangle mesh as its file gives it.
 
+mod of_points;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -34,7 +34,7 @@ pub use settle::Suggested;
 pub use surface::SurfaceOptions;
 pub use surfels::{LimitOptions, SurfelOptions};
 pub use transparency::TransparencyOptions;
-pub use triangles::TriangleOptions;
+pub use triangles::{CreaseAngle, MeshAs, TriangleOptions};
 
 pub use crate::gpu::Replacement;
 pub use crate::plan::{Accumulator, BackendName, BlendFormat, Optimisation, Organisation, RasterDepth};

@@ -47,6 +47,29 @@ impl Clip {
         along(self.0[0]).min(along(self.0[1]))
     }
 
+    /// Returns the point (u, v) of the clipped unit disk that lies farthest in the direction `(a,
+    /// b)`; the centre if nothing of the disk is kept.
+    ///
+    /// It is the disk's own farthest point, an end of a line's chord, or the corner of both lines.
+    pub fn farthest(&self, a: f64, b: f64) -> [f64; 2] {
+        let along = DVec2::new(a, b);
+        let rim = along.normalize_or_zero();
+        let lines = self.0.map(|line| DVec3::from(line.map(f64::from)));
+        let chord = |line: DVec3| {
+            let (normal, length) = (line.truncate(), line.truncate().length());
+            let foot = -line.z / length;
+            let half = (1.0 - foot * foot).sqrt();
+            [1.0, -1.0].map(|sign| (normal * foot + normal.perp() * (sign * half)) / length)
+        };
+        let [one, other] = lines;
+        let corner = one.cross(other);
+        let corner = DVec2::new(corner.x, corner.y) / corner.z;
+        // A point of one line is a rounding off it; NaN, where lines do not meet, is not kept.
+        let is_kept = |p: &DVec2| p.length() <= 1.0 + 1e-9 && self.inside(p.x, p.y) >= -1e-9;
+        let all = [rim, corner].into_iter().chain(lines.into_iter().flat_map(chord)).filter(is_kept);
+        all.max_by(|p, q| p.dot(along).total_cmp(&q.dot(along))).unwrap_or_default().to_array()
+    }
+
     /// The fraction of the segment from the disk's centre to (u, v) that is kept; 0 if the centre
     /// is clipped away.
     pub fn reach(&self, u: f64, v: f64) -> f64 {
@@ -80,6 +103,19 @@ mod tests {
         assert!(corner.inside(-0.3, -0.5) < 0.0 && corner.inside(0.5, 0.1) < 0.0);
         assert_eq!(Clip::NONE.inside(1.0, -1.0), 1.0);
         assert_eq!((corner.reach(-1.0, 0.0), corner.reach(1.0, -1.0), corner.reach(0.0, 1.0)), (0.25, 1.0, 0.0));
+        let (u, v) = (0.6f64.sqrt(), 0.4f64.sqrt());
+        for ([a, b], expected) in [
+            ([-1.0, 0.0], [-0.25, 0.0]),
+            ([0.0, 1.0], [0.0, 0.0]),
+            ([0.0, -1.0], [0.0, -1.0]),
+            ([u, -v], [u, -v]),
+            ([-1.0, -1e-3], [-0.25, -(1.0 - 0.0625f64).sqrt()]),
+        ] {
+            let [x, y] = corner.farthest(a, b);
+            assert!((x * a + y * b) - (expected[0] * a + expected[1] * b) < 1e-12, "{a} {b}: {x} {y}");
+            assert!((x * a + y * b) - (expected[0] * a + expected[1] * b) > -1e-12, "{a} {b}: {x} {y}");
+        }
+        assert_eq!(Clip([[1.0, 0.0, -2.0], [0.0, 0.0, 1.0]]).farthest(1.0, 0.0), [0.0, 0.0]);
         let line = Clip::line(DVec2::Y, -0.5, [DVec2::X * 3.0, DVec2::Y * 2.0]);
         assert_eq!(line, [0.0, 1.0, 0.25]);
         let odd = Clip([[f32::NAN, 0.0, 0.0], [0.0, 3e38, -3e38]]);

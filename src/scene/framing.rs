@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::camera::check_size;
 use super::side::unit;
-use super::{Bounds, Camera, Lens, Projection, Scene, Side, Surfel};
+use super::{Bounds, Camera, Clip, Lens, Projection, Scene, Side, Surfel};
 use crate::error::Result;
 
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
@@ -118,18 +118,23 @@ struct Framing<'a> {
     clearance: f64,
 }
 
-/// A disk in the camera's axes, relative to the centre of the body.
+/// A clipped disk in the camera's axes, relative to the centre of the body.
 #[derive(Clone, Copy)]
 struct Disk {
     p: DVec3,
     s: DVec3,
     t: DVec3,
+    clip: Clip,
 }
 
 impl Disk {
     /// The disk's farthest point in the direction `along`.
     fn farthest(self, along: DVec3) -> DVec3 {
         let (s, t) = (self.s.dot(along), self.t.dot(along));
+        if !self.clip.is_none() {
+            let [u, v] = self.clip.farthest(s, t);
+            return self.p + self.s * u + self.t * v;
+        }
         let length = s.hypot(t);
         if length > 0.0 { self.p + (self.s * s + self.t * t) / length } else { self.p }
     }
@@ -177,7 +182,8 @@ impl<'a> Framing<'a> {
             let inside = p.cmpge(self.body.min).all() && p.cmple(self.body.max).all();
             let whole = of == Of::Disks && s.length().max(t.length()) <= 2.0 * self.radius;
             let [s, t] = if whole { [local(s), local(t)] } else { [DVec3::ZERO; 2] };
-            inside.then(|| f(Disk { p: local(p - self.center), s, t }))
+            let clip = self.scene.clips.get(index).copied().unwrap_or_default();
+            inside.then(|| f(Disk { p: local(p - self.center), s, t, clip }))
         };
         let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
         let none = || [f64::NEG_INFINITY; N];

@@ -79,6 +79,8 @@ pub struct MapRow {
     pub raster: bool,
     /// Whether the map describes all surfaces of a pixel instead of the nearest one.
     pub composited: bool,
+    /// Whether only surfels have values of the map.
+    pub of_surfels: bool,
     /// Whether the values are integers, stored in the bits of an f32.
     pub numbers: bool,
     /// Whether comparisons of two images include this map.
@@ -102,6 +104,7 @@ pub const MAPS: [MapRow; 11] = [
     },
     MapRow {
         raster: false,
+        of_surfels: true,
         numbers: true,
         compared: false,
         ..row(Map::Index, "index", &["input", "point"], "index", Some("INDEX_IMAGE"))
@@ -120,6 +123,7 @@ pub const MAPS: [MapRow; 11] = [
     MapRow { raster: false, composited: true, ..row(Map::Tail, "tail", &["Y"], "tail-map", Some("TAIL_IMAGE")) },
     MapRow {
         raster: false,
+        of_surfels: true,
         nothing: &[0.0, 0.0, f32::INFINITY],
         ..row(Map::TexZ, "texz", &["U", "V", "Z"], "texz-map", Some("TEXZ_IMAGE"))
     },
@@ -147,6 +151,7 @@ const fn row(
         image_word,
         raster: true,
         composited: false,
+        of_surfels: false,
         numbers: false,
         compared: true,
         nothing: &[],

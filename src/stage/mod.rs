@@ -12,6 +12,7 @@ mod files;
 mod in_part;
 mod levels;
 mod memory;
+mod meshes;
 mod octrees;
 mod renderer;
 mod settings;

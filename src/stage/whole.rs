@@ -1,18 +1,18 @@
 //! Builds the scene of a picture from all inputs and triangle meshes.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Request;
+use super::meshes::Meshes;
 use crate::error::{Error, Result};
-use crate::io::{self, Mesh, Points, ReadOptions, Texture};
-use crate::options::{RenderOptions, Suggested};
+use crate::io::{Points, Texture};
+use crate::options::{MeshAs, RenderOptions, Suggested};
 use crate::plan::check::textured;
 use crate::plan::{Facts, composited};
 use crate::progress::Progress;
 use crate::scene::{Blend, Colors, Composite, Map, PointSize, Scene};
-use crate::surfels::{self, FromPoints, Preparation, Surfels, from_points, with_triangles};
+use crate::surfels::{self, FromPoints, Preparation, Surfels, from_points};
 
 /// A scene, and counts of how its points became surfels.
 pub(super) type Made = (Scene, Preparation);
@@ -32,6 +32,8 @@ pub(super) struct Whole {
 pub(super) struct Making {
     /// The size of points that face the camera.
     facing: Option<PointSize>,
+    /// How meshes are drawn.
+    mesh: MeshAs,
     /// Surfels are painted by the images of their meshes' materials.
     paints: bool,
     /// How surfaces show through each other: [`seen_through`].
@@ -47,6 +49,7 @@ impl Making {
         let settings = request.options.settle(request.backend(), Suggested::default());
         Self {
             facing: points.facing.map(|_| points.point_size.unwrap_or_default()),
+            mesh: request.scene.options.mesh(request.options).0,
             paints: paints(request),
             composite: settings.composite,
             levels: !settings.detail.is_finest(),
@@ -65,64 +68,28 @@ pub(super) fn scene(request: &Request<'_>, progress: &dyn Progress) -> Result<Ma
 }
 
 /// Builds one scene from the points of the inputs, reading the triangle meshes to draw with them.
-pub(super) fn scene_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+pub(super) fn scene_of(request: &Request<'_>, mut inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+    let mut meshes = Meshes::of_inputs(request, &mut inputs, progress)?;
     if inputs.is_empty() && !request.surfels().textures.is_empty() {
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
     }
-    // A file of `epsplat hybrid` names the mesh of its remaining triangles.
-    let beside = inputs.iter().filter_map(|points| points.beside.clone());
-    let mut paths: Vec<PathBuf> = request.triangles().meshes.iter().cloned().chain(beside).collect();
-    // A mesh that is named twice is drawn once.
-    let mut known = BTreeSet::new();
-    paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
     // Inputs with neither points nor triangles fail in `surfels_of`, whose error says so.
-    let none = !inputs.is_empty() && inputs.iter().all(|points| points.beside.is_none());
+    let none = !inputs.is_empty() && meshes.is_empty() && inputs.iter().all(|points| points.beside.is_none());
+    // A file of `epsplat hybrid` names the mesh of its remaining triangles.
+    let beside = inputs.iter().filter_map(|points| points.beside.clone()).collect();
     let of_surfels = if none || inputs.iter().any(|points| !points.positions.is_empty()) {
         Some(surfels_of(request, inputs, progress)?)
     } else {
         inputs.iter().flat_map(|points| &points.unread).for_each(|line| progress.note(line));
         None
     };
-    if paths.is_empty() {
+    meshes.read_named(request, beside, progress)?;
+    if meshes.is_empty() {
         request.check_triangles(false)?;
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
-    let options = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
-    let meshes = paths.iter().map(|path| io::read_mesh_with(path, options, progress)).collect::<Result<Vec<_>>>()?;
-    let meshes = painted(meshes, &paths, request.triangles().texture.as_deref(), progress)?;
-    meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| progress.note(line));
-    let (scene, preparation) = of_surfels.unzip();
-    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| error.of_inputs(&paths))?;
-    of_triangles.notes().iter().for_each(|line| progress.note(line));
-    let guessed_up = of_triangles.guessed_up;
-    Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
-}
-
-/// Paints meshes whose materials have no texture with `image`, if that is given.
-///
-/// # Errors
-///
-/// [`Error::Malformed`] if such a mesh has no texture coordinates.
-fn painted(
-    mut meshes: Vec<Mesh>,
-    paths: &[PathBuf],
-    image: Option<&Path>,
-    progress: &dyn Progress,
-) -> Result<Vec<Mesh>> {
-    let Some(image) = image else { return Ok(meshes) };
-    let texture = Texture::read(image)?;
-    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
-    if !meshes.iter().any(bare) {
-        progress.note("warning: --triangle-texture is not used, as every mesh has a texture of its own");
-    }
-    for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
-        if mesh.texture.is_none() {
-            return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
-        }
-        mesh.paint(texture.clone());
-    }
-    Ok(meshes)
+    meshes.joined(of_surfels, progress)
 }
 
 /// Returns true if these options can paint surfels with the images of their meshes' materials.

@@ -36,6 +36,7 @@ pub mod sampling;
 mod sheets;
 pub mod simplify;
 mod sizes;
+pub mod smooth;
 mod spacing;
 #[cfg(test)]
 mod tests;

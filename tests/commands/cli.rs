@@ -530,10 +530,20 @@ fn triangles_are_drawn_alone_and_beside_surfels() {
     assert!(told.contains("3674 triangles drawn") && !told.contains("surfels"), "{told}");
     let beside =
         ["render", &bunny, "--triangles", &cube, "--triangle-texture", &painted, "-o", image, "--size", "32x32"];
-    let told = String::from_utf8(succeeds(&[&beside[..], &["--backend", "reference"]].concat()).stderr).unwrap();
-    assert!(told.contains("surfels and 12 triangles drawn"), "{told}");
+    let told = |more: &[&str]| {
+        let all = [&beside[..], &["--backend", "reference"], more].concat();
+        String::from_utf8(succeeds(&all).stderr).unwrap()
+    };
+    assert!(told(&[]).contains(" 3686 triangles drawn"), "{}", told(&[]));
+    let surfels = told(&["--mesh", "surfels"]);
+    assert!(surfels.contains("surfels and 12 triangles drawn"), "{surfels}");
+    // An option of surfels has them drawn, with a note.
+    let kernel = told(&["--kernel", "hat"]);
+    assert!(kernel.contains("as surfels, which --kernel is for") && kernel.contains("surfels and 12"), "{kernel}");
+    fails(&[&beside[..], &["--mesh", "quads"]].concat(), 2, &["triangles or surfels"]);
+    fails(&[&beside[..], &["--smooth", "200"]].concat(), 2, &["0 and 180"]);
     let info = String::from_utf8(succeeds(&["info", &bunny]).stdout).unwrap();
-    assert!(info.contains("--triangles"), "{info}");
+    assert!(info.contains("--mesh surfels"), "{info}");
     let points = folder.file("p.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
     let flat = folder.file("f.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n");
     let scan = format!("{DATA}/autzen.laz");

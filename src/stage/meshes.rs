@@ -1,0 +1,138 @@
+//! The meshes of a scene that are drawn as their triangles: those among the inputs, and those that
+//! options or inputs name.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use super::Request;
+use super::whole::Made;
+use crate::error::{Error, Result};
+use crate::io::{self, Mesh, Points, ReadOptions, Texture};
+use crate::options::MeshAs;
+use crate::progress::Progress;
+use crate::surfels::smooth::smooth_normals;
+use crate::surfels::{Preparation, with_triangles};
+
+/// Meshes with the paths that they were read from; a mesh in memory has an empty path.
+#[derive(Default)]
+pub(super) struct Meshes {
+    meshes: Vec<Mesh>,
+    paths: Vec<PathBuf>,
+}
+
+/// Returns how the meshes among `inputs` are drawn, and why if nobody said so and they are surfels.
+fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> (MeshAs, Option<String>) {
+    let (drawn_as, needed) = request.scene.options.mesh(request.options);
+    let chosen = request.triangles().mesh.is_some();
+    if !chosen && needed.is_none() && inputs.iter().any(|points| points.encoded) {
+        return (MeshAs::Surfels, Some("as Gaussians show through each other and triangles do not".into()));
+    }
+    (drawn_as, needed.map(|option| format!("which {option} is for")))
+}
+
+impl Meshes {
+    /// Takes the meshes that are drawn as triangles out of `inputs`, where inputs without points
+    /// remain in their places. All meshes get smooth normals if the options ask for it.
+    ///
+    /// # Errors
+    ///
+    /// An error of reading an image of `--texture`, and [`Error::Malformed`] if it cannot paint a
+    /// mesh.
+    pub fn of_inputs(request: &Request<'_>, inputs: &mut [Points], progress: &dyn Progress) -> Result<Self> {
+        let mut meshes = Self::default();
+        if !inputs.iter().any(Points::is_mesh) {
+            return Ok(meshes);
+        }
+        let (drawn_as, because) = drawn_as(request, inputs);
+        if let Some(because) = because {
+            progress.note(&format!("meshes are drawn as surfels, {because} (--mesh chooses)"));
+        }
+        if let Some(angle) = request.triangles().smooth {
+            for Points { positions, faces, .. } in inputs.iter_mut().filter(|points| points.is_mesh()) {
+                let faces = faces.as_mut();
+                faces.into_iter().for_each(|of| of.normals = Some(smooth_normals(positions, &of.triangles, angle.0)));
+            }
+        }
+        if drawn_as == MeshAs::Surfels {
+            return Ok(meshes);
+        }
+        let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+        for (number, points) in inputs.iter_mut().enumerate().filter(|(_, points)| points.is_mesh()) {
+            let path = request.files().paths().get(number).cloned().unwrap_or_default();
+            let mut mesh = Mesh::of_points(std::mem::take(points));
+            // One image paints all inputs; several belong to the inputs in order.
+            if let Some(texture) = textures.get(if textures.len() == 1 { 0 } else { number }) {
+                paint(&mut mesh, &path, texture)?;
+            }
+            meshes.meshes.push(mesh);
+            meshes.paths.push(path);
+        }
+        Ok(meshes)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.meshes.is_empty()
+    }
+
+    /// Reads the meshes that `--triangles` names, and those `beside` the inputs. A mesh that is
+    /// named twice is drawn once.
+    ///
+    /// # Errors
+    ///
+    /// An error of reading, and [`Error::Malformed`] if a mesh cannot be painted.
+    pub fn read_named(&mut self, request: &Request<'_>, beside: Vec<PathBuf>, progress: &dyn Progress) -> Result<()> {
+        let options = request.triangles();
+        let mut paths: Vec<PathBuf> = options.meshes.iter().cloned().chain(beside).collect();
+        let resolved = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+        let mut known: BTreeSet<PathBuf> = self.paths.iter().map(resolved).collect();
+        paths.retain(|path| known.insert(resolved(path)));
+        let read = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
+        let mut named = paths.iter().map(|path| io::read_mesh_with(path, read, progress)).collect::<Result<Vec<_>>>()?;
+        if let Some(angle) = options.smooth {
+            named.iter_mut().for_each(|mesh| {
+                mesh.normals = Some(smooth_normals(&mesh.positions, &mesh.triangles, angle.0));
+            });
+        }
+        if let Some(image) = options.texture.as_deref().filter(|_| !named.is_empty()) {
+            paint_bare(&mut named, &paths, image, progress)?;
+        }
+        self.meshes.append(&mut named);
+        self.paths.append(&mut paths);
+        Ok(())
+    }
+
+    /// Joins the triangles of all meshes with a scene of surfels, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::EmptyScene`] if there are no triangles to draw.
+    pub fn joined(self, of_surfels: Option<Made>, progress: &dyn Progress) -> Result<Made> {
+        let Self { meshes, paths } = self;
+        meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| progress.note(line));
+        let (scene, preparation) = of_surfels.unzip();
+        let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| error.of_inputs(&paths))?;
+        of_triangles.notes().iter().for_each(|line| progress.note(line));
+        let guessed_up = of_triangles.guessed_up;
+        Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+    }
+}
+
+/// Paints the meshes whose materials have no texture with `image`.
+fn paint_bare(meshes: &mut [Mesh], paths: &[PathBuf], image: &Path, progress: &dyn Progress) -> Result<()> {
+    let texture = Texture::read(image)?;
+    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    if !meshes.iter().any(bare) {
+        progress.note("warning: --triangle-texture is not used, as every mesh has a texture of its own");
+    }
+    let all = meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh));
+    all.into_iter().try_for_each(|(mesh, path)| paint(mesh, path, &texture))
+}
+
+/// Paints all triangles of a mesh with an image.
+fn paint(mesh: &mut Mesh, path: &Path, texture: &Texture) -> Result<()> {
+    if mesh.texture.is_none() {
+        return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
+    }
+    mesh.paint(texture.clone());
+    Ok(())
+}

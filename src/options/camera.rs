@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
+use super::values::Ortho;
 use crate::scene::Side;
 
 /// The view of a picture. Without an eye or a camera file it shows the whole scene.
@@ -13,18 +14,31 @@ use crate::scene::Side;
 // Brackets in help texts hold defaults, not links.
 #[allow(rustdoc::broken_intra_doc_links)]
 pub struct CameraOptions {
-    /// Image size in pixels [default: 1024x1024, or the camera file's]
+    /// Image size in pixels, or one number for a square [default: 1024x1024, or the camera file's]
     #[cfg_attr(feature = "cli", arg(long, value_name = "WxH", value_parser = super::parse::size))]
     pub size: Option<(u32, u32)>,
     /// Position of the camera, world coordinates [default: a view of the whole scene]
     #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true))]
     pub eye: Option<DVec3>,
-    /// Side from which the whole scene is in view: north, east, south, west, above or X,Y,Z
+    /// Side from which the whole scene is in view: front, back, left, right, top, bottom, iso,
+    /// north, sw, ... or X,Y,Z
     ///
-    /// Compass directions are those of maps (north is +y, or -z where y is up), seen from 30
-    /// degrees above the horizon. X,Y,Z points from the scene to the camera
-    #[cfg_attr(feature = "cli", arg(long, value_name = "SIDE", allow_hyphen_values = true, conflicts_with = "eye"))]
+    /// front, back, left and right are level. Compass directions are those of maps (north is +y, or
+    /// -z where y is up), seen from 30 degrees above the horizon. top has north at its top, and
+    /// X,Y,Z points from the scene to the camera
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, visible_alias = "view", value_name = "SIDE", allow_hyphen_values = true, conflicts_with = "eye")
+    )]
     pub from: Option<Side>,
+    /// Compass direction from the scene to the camera, which has the whole scene in view: 0 for
+    /// north, 90 for east, degrees [default: 180]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", allow_hyphen_values = true, conflicts_with_all = ["eye", "from"]))]
+    pub azimuth: Option<f64>,
+    /// Angle of the camera above the horizon, which has the whole scene in view: -90 to 90 degrees
+    /// [default: 30]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", allow_hyphen_values = true, conflicts_with_all = ["eye", "from"]))]
+    pub elevation: Option<f64>,
     /// Point that the camera looks at [default: the scene's centre]
     #[cfg_attr(feature = "cli", arg(long, value_name = "X,Y,Z", value_parser = super::parse::vector, allow_hyphen_values = true, requires = "eye"))]
     pub target: Option<DVec3>,
@@ -37,14 +51,14 @@ pub struct CameraOptions {
     /// Vertical field of view in degrees [default: 45]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", conflicts_with_all = ["ortho", "intrinsics"]))]
     pub fov: Option<f64>,
-    /// Orthographic view; the image is HEIGHT world units high
-    #[cfg_attr(feature = "cli", arg(long, value_name = "HEIGHT", conflicts_with = "intrinsics"))]
-    pub ortho: Option<f64>,
+    /// Orthographic view; the image is HEIGHT world units high, or as high as the scene needs
+    #[cfg_attr(feature = "cli", arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "fit", conflicts_with = "intrinsics"))]
+    pub ortho: Option<Ortho>,
     /// Focal lengths and principal point in pixels
     #[cfg_attr(feature = "cli", arg(long, value_name = "FX,FY,CX,CY", value_parser = super::parse::intrinsics, allow_hyphen_values = true, hide_short_help = true))]
     pub intrinsics: Option<[f64; 4]>,
     /// Camera file (see the guide), in place of all other camera options except --size
-    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
+    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
     /// Smallest depth drawn, world units [default: a millionth of the scene's extent]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]

@@ -2,7 +2,7 @@
 
 use super::group::group;
 use super::values::Rgba;
-use crate::scene::{Light, Samples, Shading};
+use crate::scene::{EyeDome, Light, Samples, Shading};
 
 group! {
     /// Light, background and the smoothness of edges.
@@ -20,12 +20,19 @@ group! {
         /// X,Y,Z is the direction toward the light. The option may be given several times
         #[cfg_attr(feature = "cli", arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true))]
         pub lights: Vec<Light>,
+        /// Eye-dome lighting: darken what lies behind its neighbours in the image, with this
+        /// strength [default: 1]
+        ///
+        /// It shows the shape of clouds without normals, and of points drawn with --facing
+        #[cfg_attr(feature = "cli", arg(long, value_name = "STRENGTH", num_args = 0..=1, default_missing_value = "1"))]
+        pub edl: Option<EyeDome>,
         /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller the
         /// highlights [default: 32]
         #[cfg_attr(feature = "cli", arg(long, value_name = "EXPONENT", hide_short_help = true))]
         pub shininess: Option<f32>,
-        /// Colour behind the scene, linear [default: transparent]
-        #[cfg_attr(feature = "cli", arg(long, value_name = "R,G,B[,A]"))]
+        /// Colour behind the scene: a name (white, black, gray), #RRGGBB, or linear R,G,B[,A]
+        /// [default: transparent]
+        #[cfg_attr(feature = "cli", arg(long, value_name = "COLOUR"))]
         pub background: Option<Rgba>,
         /// Samples per pixel: 1, 4, 8 or 16 [default: 4; 1 for Gaussians]
         ///

@@ -39,7 +39,7 @@ pub use triangles::{CreaseAngle, MeshAs, TriangleOptions};
 pub use crate::gpu::Replacement;
 pub use crate::plan::{Accumulator, BackendName, BlendFormat, Optimisation, Organisation, RasterDepth};
 pub use crate::scene::{
-    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Join, Kernel, Light, LowPass, NodeShape, Outline,
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, EyeDome, Join, Kernel, Light, LowPass, NodeShape, Outline,
     PointShape, PointSize, Samples, Shading, ShadingAt, Tail,
 };
 pub use crate::surfels::Size;

@@ -65,6 +65,7 @@ impl RenderOptions {
             fetch: research.fetch,
             large: research.large,
             raster,
+            edl: look.edl,
             shading: look.shading.or(unlit.then_some(Shading::Unlit)).or(suggested.shading).unwrap_or(default.shading),
             shading_at: research.shading_at.unwrap_or_default(),
             shininess: look.shininess.unwrap_or(default.shininess),

@@ -36,7 +36,9 @@ impl FromStr for CreaseAngle {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let angle = text.parse().ok().filter(|angle| (0.0..=180.0).contains(angle));
-        angle.map(Self).ok_or_else(|| Error::Usage(format!("an angle of creases lies between 0 and 180 degrees, {text:?} does not")))
+        angle.map(Self).ok_or_else(|| {
+            Error::Usage(format!("an angle of creases lies between 0 and 180 degrees, {text:?} does not"))
+        })
     }
 }
 

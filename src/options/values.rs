@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use crate::error::{Error, Result};
+use crate::scene::color::decoded;
 
 /// Parses finite numbers between commas.
 ///
@@ -31,7 +32,8 @@ impl FromStr for Diameters {
     }
 }
 
-/// A linear colour with straight alpha: `R,G,B` or `R,G,B,A`; alpha is 1 unless given.
+/// A linear colour with straight alpha: `R,G,B` or `R,G,B,A`, where alpha is 1 unless given; a name;
+/// or an sRGB code `#RRGGBB`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rgba(pub [f32; 4]);
 
@@ -39,11 +41,15 @@ impl FromStr for Rgba {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let values: Vec<f32> = numbers(text)?.into_iter().map(|value| value as f32).collect();
+        if let Some(color) = named(text).or_else(|| coded(text)) {
+            return Ok(Self(color));
+        }
+        let values = numbers(text).map_err(|_| Error::Usage(format!("{EXPECTED}, not {text:?}")))?;
+        let values: Vec<f32> = values.into_iter().map(|value| value as f32).collect();
         let color = match values[..] {
             [r, g, b] => [r, g, b, 1.0],
             [r, g, b, a] => [r, g, b, a],
-            _ => return Err(Error::Usage("three or four numbers are needed: R,G,B[,A]".into())),
+            _ => return Err(Error::Usage(EXPECTED.into())),
         };
         if color.iter().any(|channel| !channel.is_finite()) {
             return Err(Error::Usage("a colour must be finite".into()));
@@ -53,6 +59,28 @@ impl FromStr for Rgba {
         }
         Ok(Self(color))
     }
+}
+
+/// What a colour may be.
+const EXPECTED: &str = "a colour is R,G,B[,A], #RRGGBB, white, black, gray or transparent";
+
+/// Returns the linear colour with this name.
+fn named(name: &str) -> Option<[f32; 4]> {
+    match name {
+        "white" => Some([1.0; 4]),
+        "black" => Some([0.0, 0.0, 0.0, 1.0]),
+        "gray" | "grey" => coded("#808080"),
+        "transparent" => Some([0.0; 4]),
+        _ => None,
+    }
+}
+
+/// Returns the linear colour of an sRGB code `#RRGGBB`.
+fn coded(text: &str) -> Option<[f32; 4]> {
+    let code = text.strip_prefix('#').filter(|code| code.len() == 6)?;
+    let code = code.bytes().all(|digit| digit.is_ascii_hexdigit()).then(|| u32::from_str_radix(code, 16).ok())??;
+    let [_, r, g, b] = code.to_be_bytes();
+    Some(decoded([r, g, b, 255]))
 }
 
 /// A switch: `on` or `off`; studies may write `true` or `false`.
@@ -67,6 +95,48 @@ impl FromStr for Switch {
             "on" | "true" => Ok(Self(true)),
             "off" | "false" => Ok(Self(false)),
             _ => Err(Error::Usage(format!("it is on or off, not {text:?}"))),
+        }
+    }
+}
+
+/// The height of an orthographic image: a number of world units, or `fit` for that which shows the
+/// whole scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ortho {
+    /// The height that shows the whole scene.
+    Fit,
+    /// A height in world units.
+    Height(f64),
+}
+
+impl FromStr for Ortho {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let height = text.parse().ok().filter(|height: &f64| *height > 0.0 && height.is_finite());
+        match (text, height) {
+            ("fit", _) => Ok(Self::Fit),
+            (_, Some(height)) => Ok(Self::Height(height)),
+            _ => Err(Error::Usage(format!("it is fit or a positive height in world units, not {text:?}"))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn colours_are_numbers_names_or_codes() {
+        let color = |text: &str| text.parse::<Rgba>().map(|color| color.0).ok();
+        assert_eq!(color("0.5,0,1"), Some([0.5, 0.0, 1.0, 1.0]));
+        assert_eq!(color("white"), color("#FFFFFF"));
+        assert_eq!(color("transparent"), Some([0.0; 4]));
+        // The code 128 is 21.6 % of the light of white.
+        assert!((color("gray").unwrap()[0] - 0.2159).abs() < 1e-4 && color("#808080") == color("grey"));
+        for wrong in ["whit", "#fff", "#gggggg", "1,2", "0,0,0,2", "nan,0,0", "", "#+12345"] {
+            assert_eq!(color(wrong), None, "{wrong}");
         }
     }
 }

@@ -23,7 +23,7 @@
 //! | [`resolve`], [`join`] | sums, shaded triangles | [`Frame`] |
 //! | [`layers`], [`sorted`] | fragment lists | [`Frame`] |
 //!
-//! [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
+//! [`eye_dome`] filters the finished frame. [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the
 //! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. It also chooses the file
@@ -52,6 +52,7 @@ pub mod branches;
 pub mod covered;
 pub mod cull;
 pub mod curved;
+pub mod eye_dome;
 pub mod facing;
 pub mod footprint;
 pub mod fragments;

@@ -6,8 +6,8 @@ use super::{Accumulator, Fetch, Optimisation, Raster};
 use crate::error::Error;
 use crate::gpu::Replacement;
 use crate::scene::{
-    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, Light, LowPass, Maps, Outline,
-    OwnKernel, Samples, Shading, ShadingAt, Tail,
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, EyeDome, Facing, Join, Kernel, Light, LowPass, Maps,
+    Outline, OwnKernel, Samples, Shading, ShadingAt, Tail,
 };
 
 /// The renderer of a picture.
@@ -121,6 +121,8 @@ pub struct Settings {
     pub large: Option<u32>,
     /// The rasteriser makes the sums, instead of compute kernels.
     pub raster: Option<Raster>,
+    /// Eye-dome lighting of the finished picture ([`eye_dome`](crate::passes::eye_dome)).
+    pub edl: Option<EyeDome>,
     /// Shading model.
     pub shading: Shading,
     /// Where shading is computed: at pixels or at splats.
@@ -216,6 +218,7 @@ impl Default for Settings {
             fetch: None,
             large: None,
             raster: None,
+            edl: None,
             shading: Shading::Lambert,
             shading_at: ShadingAt::Pixel,
             shininess: 32.0,

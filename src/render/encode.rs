@@ -95,6 +95,11 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// The layouts of the pixels of all parts, that of the colour first.
     fn pixels(&self, camera: &Camera) -> Result<Vec<PixelLayout>> {
         let gpu = on_device(self.backend.borrow())?;
+        if self.eye_dome.is_some() {
+            return Err(Error::Usage(
+                "the host adds eye-dome lighting: leave --edl out of frames on the device".into(),
+            ));
+        }
         let of_part = |part: &Kept| {
             if let Some(own) = MAP_PASSES.iter().find(|own| part.options.maps.has(own.map)) {
                 let name = own.map.row().name;

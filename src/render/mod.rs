@@ -31,11 +31,12 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
+use crate::passes::eye_dome;
 use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
 use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
-use crate::scene::{Camera, Detail, KernelFaults};
+use crate::scene::{Camera, Detail, EyeDome, KernelFaults, Map};
 pub use encode::Target;
 pub use frame_layout::{FrameLayout, Plane};
 use kept::Kept;
@@ -99,6 +100,8 @@ pub struct Renderer<S, B> {
     /// The level of detail in the options. A number of splats is converted to a node size anew for
     /// each view.
     detail: Detail,
+    /// The strength of eye-dome lighting, and whether the map of depths is wanted too.
+    eye_dome: Option<(EyeDome, bool)>,
     /// State that recorded frames share.
     recorded: encode::Shared,
 }
@@ -115,13 +118,15 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::scene(&facts, options, reference)?;
         let (sources, options) = own::settled(backend.borrow(), options)?;
         let faults = own::faults(&options);
-        let options = &encoded::of(&facts, &options);
+        let eye_dome = options.edl.map(|strength| (strength, options.maps.has(Map::Depth)));
+        let maps = if eye_dome.is_some() { options.maps.and(&[Map::Depth]) } else { options.maps };
+        let options = &encoded::of(&facts, &Settings { maps, ..options.clone() });
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
         let (kept, recorded) = (Kept::new(facts, colors), encode::Shared::default());
-        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, recorded })
+        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, eye_dome, recorded })
     }
 
     /// Renders one frame.
@@ -152,7 +157,16 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         if kept.facts.encoded {
             encoded::decode(&mut frame);
         }
-        Ok((frame, report))
+        Ok((self.filtered(frame, camera), report))
+    }
+
+    /// Applies the filters of finished pictures, and removes a map that only they need.
+    fn filtered(&self, mut frame: Frame, camera: &Camera) -> Frame {
+        if let Some((strength, keeps_depth)) = self.eye_dome {
+            eye_dome::light(&mut frame, camera, strength);
+            frame = if keeps_depth { frame } else { frame.without(Map::Depth) };
+        }
+        frame
     }
 
     /// Returns the node size for the view of `camera`. The options of the colour's part determine

@@ -56,7 +56,8 @@ impl Meshes {
         if drawn_as == MeshAs::Surfels {
             return Ok(meshes);
         }
-        let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+        let textures =
+            request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
         for (number, points) in inputs.iter_mut().enumerate().filter(|(_, points)| points.is_mesh()) {
             let path = request.files().paths().get(number).cloned().unwrap_or_default();
             let mut mesh = Mesh::of_points(std::mem::take(points));
@@ -87,7 +88,8 @@ impl Meshes {
         let mut known: BTreeSet<PathBuf> = self.paths.iter().map(resolved).collect();
         paths.retain(|path| known.insert(resolved(path)));
         let read = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
-        let mut named = paths.iter().map(|path| io::read_mesh_with(path, read, progress)).collect::<Result<Vec<_>>>()?;
+        let mut named =
+            paths.iter().map(|path| io::read_mesh_with(path, read, progress)).collect::<Result<Vec<_>>>()?;
         if let Some(angle) = options.smooth {
             named.iter_mut().for_each(|mesh| {
                 mesh.normals = Some(smooth_normals(&mesh.positions, &mesh.triangles, angle.0));

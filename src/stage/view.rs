@@ -10,7 +10,10 @@ use crate::error::{Error, Result};
 use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
 use crate::options::parse::{up_argument, vector_argument};
+use crate::options::values::Ortho;
 use crate::scene::camera::{DEFAULT_FOV, check_near};
+use crate::scene::framing::fitted_height;
+use crate::scene::side::ELEVATION;
 use crate::scene::{Camera, Lens, Scene, Side, Up};
 
 /// A view, complete except for values from the scene, such as the scene's centre.
@@ -36,9 +39,15 @@ struct Given {
 
 #[derive(Clone, Debug)]
 enum Place {
-    /// Framed to show the whole scene, from this side and with this direction of up if they are
-    /// given.
-    Framed(Option<Side>, Option<DVec3>),
+    /// Framed to show the whole scene.
+    Framed {
+        /// The side, if it is given.
+        side: Option<Side>,
+        /// The direction of up, if it is given.
+        up: Option<DVec3>,
+        /// The view is orthographic, and as high as the scene needs.
+        fits: bool,
+    },
     /// At this eye, looking at the scene's centre, with this direction of up if it is given.
     Eye(DVec3, Option<DVec3>),
     /// A given pose.
@@ -48,7 +57,7 @@ enum Place {
 impl Default for View {
     fn default() -> Self {
         let (size, lens) = (Self::DEFAULT_SIZE, Lens::Fov(DEFAULT_FOV));
-        Self(Kind::Given(Given { size, lens, place: Place::Framed(None, None), near: None }))
+        Self(Kind::Given(Given { size, lens, place: Place::Framed { side: None, up: None, fits: false }, near: None }))
     }
 }
 
@@ -72,14 +81,20 @@ impl View {
         }
         let (lens, option) = match (options.intrinsics, options.ortho) {
             (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
-            (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
+            (None, Some(Ortho::Height(height))) => (Lens::OrthographicHeight(height), "--ortho"),
+            // The scene decides the height.
+            (None, Some(Ortho::Fit)) => (Lens::OrthographicHeight(1.0), "--ortho"),
             (None, None) => (Lens::Fov(options.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
         };
         let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_option(options)?;
+        let fits = options.ortho == Some(Ortho::Fit);
+        if fits && options.eye.is_some() {
+            return Err(Error::Usage("--ortho needs its HEIGHT with --eye: without --eye the scene decides it".into()));
+        }
         let place = match (options.eye, options.target) {
-            (None, _) => Place::Framed(options.from, options.up),
+            (None, _) => Place::Framed { side: side(options)?, up: options.up, fits },
             (Some(eye), None) => Place::Eye(eye, options.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, options.up)),
         };
@@ -143,7 +158,7 @@ impl Given {
     fn checked(self) -> Result<View> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
-            Place::Framed(side, up) => {
+            Place::Framed { side, up, .. } => {
                 if let (Some(side), Some(_)) = (side, up) {
                     side.view(*up, Up::Z)?;
                 }
@@ -169,10 +184,14 @@ impl Given {
     fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or(default_near);
         let (pose, up, by) = match &self.place {
-            Place::Framed(side, up) => {
-                let (camera, target) = Camera::framing_from(self.size, self.lens, scene, near, (*side, *up))?;
+            Place::Framed { side, up, fits } => {
+                let lens = match fits {
+                    true => Lens::OrthographicHeight(fitted_height(self.size, scene, (*side, *up))?),
+                    false => self.lens,
+                };
+                let (camera, target) = Camera::framing_from(self.size, lens, scene, near, (*side, *up))?;
                 let up = match side {
-                    Some(Side::Above) => Some(Side::Above.view(*up, scene.up)?.1),
+                    Some(vertical @ (Side::Above | Side::Below)) => Some(vertical.view(*up, scene.up)?.1),
                     _ => *up,
                 };
                 return Ok((camera, Seen { target, up, by: By::Choice }));
@@ -305,6 +324,14 @@ fn turned(camera: &Camera, up: DVec3, scene_up: Up) -> Option<String> {
 /// Returns an error of a value, prefixed with the option or file that it came from.
 fn said_by(who: impl Display, error: Error) -> Error {
     Error::Usage(format!("{who}: {error}"))
+}
+
+/// Returns the side from which the options have the scene in view, if they say so.
+fn side(options: &CameraOptions) -> Result<Option<Side>> {
+    match (options.azimuth, options.elevation) {
+        (None, None) => Ok(options.from),
+        (azimuth, elevation) => Side::at(azimuth.unwrap_or(180.0), elevation.unwrap_or(ELEVATION)).map(Some),
+    }
 }
 
 fn check_near_option(options: &CameraOptions) -> Result<()> {

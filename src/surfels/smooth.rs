@@ -162,7 +162,8 @@ mod tests {
     fn a_sphere_gets_its_own_normals() {
         // An octahedron that is divided four times, its vertices on the unit sphere.
         let mut triangles: Vec<[DVec3; 3]> = Vec::new();
-        for (x, y, z) in [(1, 1, 1), (1, 1, -1), (1, -1, 1), (1, -1, -1), (-1, 1, 1), (-1, 1, -1), (-1, -1, 1), (-1, -1, -1)]
+        for (x, y, z) in
+            [(1, 1, 1), (1, 1, -1), (1, -1, 1), (1, -1, -1), (-1, 1, 1), (-1, 1, -1), (-1, -1, 1), (-1, -1, -1)]
         {
             let (a, b, c) = (DVec3::X * f64::from(x), DVec3::Y * f64::from(y), DVec3::Z * f64::from(z));
             triangles.push(if x * y * z > 0 { [a, b, c] } else { [a, c, b] });

@@ -561,3 +561,62 @@ fn triangles_are_drawn_alone_and_beside_surfels() {
     fails(&[&with(&[])[..], &[image, "--join", "nearest", &bunny]].concat(), 2, &["--triangles"]);
     fails(&with(&["t.png"]), 2, &["INPUTS"]);
 }
+
+#[test]
+fn views_have_names_and_angles() {
+    let folder = Folder::new();
+    let (bunny, image) = (format!("{DATA}/bunny.obj"), folder.path("v.png"));
+    let eye = |more: &[&str]| {
+        let small = ["render", &bunny, "-o", text(&image), "--size", "16", "--backend", "reference", "--json", "-"];
+        let written = String::from_utf8(succeeds(&[&small[..], more].concat()).stdout).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&written).unwrap();
+        let at = |name: &str| [0, 1, 2].map(|axis| report["view"][name][axis].as_f64().unwrap());
+        let (eye, target) = (at("eye"), at("target"));
+        [0, 1, 2].map(|axis| eye[axis] - target[axis])
+    };
+    let along = |direction: [f64; 3]| {
+        let length = direction.map(|x| x * x).iter().sum::<f64>().sqrt();
+        direction.map(|x| ((x / length) * 1e6).round() / 1e6 + 0.0)
+    };
+    // The bunny's up is y, so its front is +z and west is -x.
+    assert_eq!(along(eye(&["--view", "front"])), [0.0, 0.0, 1.0]);
+    assert_eq!(along(eye(&["--from", "left"])), [-1.0, 0.0, 0.0]);
+    assert_eq!(along(eye(&["--view", "top", "--ortho"])), [0.0, 1.0, 0.0]);
+    let [rise, run] = [0.5, 0.75f64.sqrt()];
+    assert_eq!(along(eye(&["--azimuth", "270"])), along([-run, rise, 0.0]));
+    assert_eq!(along(eye(&["--elevation", "-90", "--azimuth", "7"])), [0.0, -1.0, 0.0]);
+    let refuses = |more: &[&str], words: &[&str]| {
+        fails(&[&["render", &bunny, "-o", text(&image)][..], more].concat(), 2, words);
+    };
+    refuses(&["--elevation", "91"], &["-90 and 90"]);
+    refuses(&["--view", "frnt"], &["front, back", "frnt"]);
+    refuses(&["--eye", "1,2,3", "--ortho"], &["--ortho", "HEIGHT"]);
+    refuses(&["--ortho", "-3"], &["fit or a positive height"]);
+    refuses(&["--background", "whit"], &["#RRGGBB"]);
+    refuses(&["--size", "0"], &["0x0"]);
+    refuses(&["--edl", "0"], &["above 0"]);
+}
+
+#[test]
+fn eye_dome_lighting_darkens_outlines_and_leaves_the_depths() {
+    let folder = Folder::new();
+    let bunny = format!("{DATA}/bunny.obj");
+    let draw = |name: &str, more: &[&str]| {
+        let image = folder.path(name);
+        let plain =
+            ["render", &bunny, "-o", text(&image), "--size", "48", "--backend", "reference", "--shading", "unlit"];
+        succeeds(&[&plain[..], more].concat());
+        epsplat::io::exr::read(&image).unwrap()
+    };
+    let plain = draw("plain.exr", &["--aov", "depth"]);
+    let lit = draw("lit.exr", &["--aov", "depth", "--edl"]);
+    let strong = draw("strong.exr", &["--edl", "4"]);
+    let depth = epsplat::low_level::scene::Map::Depth;
+    assert_eq!(plain.map(depth), lit.map(depth));
+    assert!(strong.map(depth).is_none());
+    let light = |frame: &epsplat::Frame| frame.color.iter().map(|color| f64::from(color[1])).sum::<f64>();
+    assert!(light(&lit) < 0.99 * light(&plain) && light(&strong) < 0.97 * light(&lit));
+    // The middle of the body faces the camera.
+    let middle = 24 * 48 + 24;
+    assert!(lit.color[middle][1] > 0.8 * plain.color[middle][1]);
+}

@@ -6,7 +6,7 @@
 use crate::common;
 
 use common::command::{Folder, succeeds, text};
-use epsplat::io::{self, Texture, png};
+use epsplat::io::{self, Mesh, Texture, png};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
@@ -40,8 +40,15 @@ fn painted(path: &Path) -> Scene {
     build_painted(vec![io::read(path, &()).unwrap()], &Limits::default(), &()).unwrap().0
 }
 
+/// The triangles of a file. Those made of its points and faces are the same.
 fn as_triangles(path: &Path) -> Scene {
-    with_triangles(None, &[io::read_mesh(path, &()).unwrap()]).unwrap().0
+    let scene = with_triangles(None, &[io::read_mesh(path, &()).unwrap()]).unwrap().0;
+    let points = io::read(path, &()).unwrap();
+    assert!(points.is_mesh(), "{}", path.display());
+    let of_points = with_triangles(None, &[Mesh::of_points(points)]).unwrap().0;
+    assert_eq!((of_points.up, of_points.origin), (scene.up, scene.origin));
+    assert_eq!(of_points.triangles, scene.triangles, "{}", path.display());
+    scene
 }
 
 fn seen(scene: &Scene, eye: DVec3) -> Frame {

@@ -212,6 +212,7 @@ fn what_cannot_be_divided_is_told() {
         1,
         &["no texture coordinates"],
     );
-    fails(&["render", bunny, "-o", text(&folder.path("o.png")), "--join", "nearest"], 2, &["--join", "none"]);
+    let joined = ["render", bunny, "--mesh", "surfels", "-o", text(&folder.path("o.png")), "--join", "nearest"];
+    fails(&joined, 2, &["--join", "none"]);
     assert_eq!(folder.names(), ["c.ply"]);
 }

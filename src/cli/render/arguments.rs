@@ -64,7 +64,7 @@ pub(super) struct ViewArguments {
     ///
     /// A transforms.json has the format of NeRF, instant-ngp or nerfstudio. Each picture is named
     /// after its camera's image, folders included
-    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "target", "up", "fov", "ortho", "intrinsics"])]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics"])]
     pub(super) cameras: Option<PathBuf>,
     /// Format of the images of --cameras [default: png; exr with --aov]
     #[arg(long, value_enum, requires = "cameras", hide_short_help = true)]

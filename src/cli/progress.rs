@@ -1,8 +1,8 @@
-//! Progress bars, on a terminal only.
+//! Progress: bars on a terminal, and elsewhere a line every few seconds for many views.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use epsplat::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -50,6 +50,39 @@ impl Progress for Bars {
 
     fn note(&self, line: &str) {
         super::note(line);
+    }
+}
+
+/// The time between two lines about views, where there is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// Counts the pictures of many views: by a bar on a terminal, else by a line every few seconds.
+pub struct Views<'a> {
+    bars: &'a Bars,
+    total: u64,
+    /// The number of finished views, and the time of the last line.
+    done: Mutex<(u64, Instant)>,
+}
+
+impl<'a> Views<'a> {
+    pub fn begin(bars: &'a Bars, total: u64) -> Self {
+        bars.begin("rendering views", total);
+        Self { bars, total, done: Mutex::new((0, Instant::now())) }
+    }
+
+    pub fn advance(&self) {
+        self.bars.advance(1);
+        let mut state = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+        let (done, last) = &mut *state;
+        *done += 1;
+        if self.bars.0.is_none() && last.elapsed() >= BETWEEN_LINES {
+            super::note(&format!("{done} of {} pictures are written", self.total));
+            *last = Instant::now();
+        }
+    }
+
+    pub fn end(&self) {
+        self.bars.end();
     }
 }
 

@@ -19,6 +19,7 @@ pub mod exr;
 mod fault;
 mod format;
 pub mod image;
+pub mod images;
 pub(crate) mod input;
 pub mod las;
 pub mod mesh;

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use crate::scene::Side;
+use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::{Lens, Side};
 
 /// The view of a picture. Without an eye or a camera file it shows the whole scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -49,4 +50,15 @@ pub struct CameraOptions {
     /// Smallest depth drawn, world units [default: a millionth of the scene's extent]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]
     pub near: Option<f64>,
+}
+
+impl CameraOptions {
+    /// Returns the lens, and the name of the option that gives it.
+    pub(crate) fn lens(&self) -> (Lens, &'static str) {
+        match (self.intrinsics, self.ortho) {
+            (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
+            (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
+            (None, None) => (Lens::Fov(self.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
+        }
+    }
 }

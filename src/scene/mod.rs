@@ -36,6 +36,7 @@ mod srgb;
 pub mod surfel;
 pub mod texture;
 pub mod triangles;
+mod turntable;
 pub mod whole;
 
 pub use atlas::Atlas;

@@ -16,6 +16,7 @@ mod octrees;
 mod renderer;
 mod settings;
 mod tree;
+mod turntable;
 mod view;
 mod whole;
 

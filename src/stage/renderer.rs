@@ -185,7 +185,7 @@ impl Renderer {
     }
 
     /// The scene, or an overview of files that are read in part.
-    fn scene(&self) -> &scene::Scene {
+    pub(super) fn scene(&self) -> &scene::Scene {
         match &self.drawn {
             Drawn::Whole { scene, .. } => scene,
             Drawn::Parts { parts, .. } => parts.overview(),

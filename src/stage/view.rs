@@ -70,11 +70,7 @@ impl View {
         if let Some(path) = &options.file {
             return Self::of_file(options, camera::read(path)?, path, None);
         }
-        let (lens, option) = match (options.intrinsics, options.ortho) {
-            (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
-            (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
-            (None, None) => (Lens::Fov(options.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
-        };
+        let (lens, option) = options.lens();
         let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_option(options)?;

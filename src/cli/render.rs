@@ -1,6 +1,7 @@
 //! `epsplat render`: renders files to an image with its maps, or to one image for each camera.
 
 mod arguments;
+mod map;
 mod output;
 mod target;
 mod views;
@@ -22,7 +23,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return target.closed_is_done(views::run(arguments, &target));
     }
     let target = Target::of_one(arguments)?;
-    target.closed_is_done(one(arguments, &target))
+    let render = if arguments.camera.pixel_size.is_some() { map::run } else { one };
+    target.closed_is_done(render(arguments, &target))
 }
 
 /// Renders a single picture.

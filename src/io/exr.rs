@@ -38,8 +38,7 @@ pub(super) fn encode(sink: &mut dyn Sink, frame: &Frame) -> std::io::Result<()> 
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let plane = |k: usize| FlatSamples::F32(frame.color.iter().map(|c| c[k]).collect());
     let colors = ["R", "G", "B", "A"].into_iter().enumerate();
-    let mut channels: Vec<_> =
-        colors.map(|(k, name)| AnyChannel::new(Text::new_or_panic(name), plane(k))).collect();
+    let mut channels: Vec<_> = colors.map(|(k, name)| AnyChannel::new(Text::new_or_panic(name), plane(k))).collect();
     for map in frame.maps().iter() {
         let plane = |k: usize| match (frame.numbers(map), frame.map(map)) {
             (Some(numbers), _) => FlatSamples::U32(numbers.iter().skip(k).step_by(map.width()).copied().collect()),
@@ -48,9 +47,7 @@ pub(super) fn encode(sink: &mut dyn Sink, frame: &Frame) -> std::io::Result<()> 
             }
         };
         let named = map.row().channels.iter().enumerate();
-        channels.extend(named.map(|(k, name)| {
-            AnyChannel::new(Text::new_or_panic(channel_name(map, name)), plane(k))
-        }));
+        channels.extend(named.map(|(k, name)| AnyChannel::new(Text::new_or_panic(channel_name(map, name)), plane(k))));
     }
     let channels = AnyChannels::sort(channels.into_iter().collect());
     let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);

@@ -27,6 +27,7 @@ pub mod obj;
 pub mod paint;
 #[cfg(feature = "pcd")]
 pub mod pcd;
+pub mod place;
 pub mod ply;
 pub mod png;
 pub mod points;

@@ -47,6 +47,17 @@ pub struct CameraOptions {
     /// Camera file (see the guide), in place of all other camera options except --size
     #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
+    /// Map from straight above with pixels of SIZE world units, north (+y) at the top
+    ///
+    /// The size of the image follows from the data or --bounds. The lines of its grid lie at
+    /// multiples of SIZE, so that maps with one SIZE fit together. A .tif has the place of the map
+    /// and the coordinate system of LAS files (GeoTIFF) and may be larger than memory; a .png or
+    /// .jpg gets a world file (.pgw, .jgw). z is up: files whose up is y need --up z
+    #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::scale, conflicts_with_all = ["size", "eye", "from", "target", "fov", "ortho", "intrinsics", "file", "near"]))]
+    pub pixel_size: Option<f64>,
+    /// Part of a map of --pixel-size, extended to whole pixels [default: all data]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", value_parser = super::parse::bounds, allow_hyphen_values = true, requires = "pixel_size"))]
+    pub bounds: Option<[f64; 4]>,
     /// Smallest depth drawn, world units [default: a millionth of the scene's extent]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]
     pub near: Option<f64>,

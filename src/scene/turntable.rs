@@ -62,16 +62,14 @@ mod tests {
     #[test]
     fn the_scene_stays_in_view_all_around() {
         let at = |x: f32, y: f32, z: f32| Surfel::disk(glam::Vec3::new(x, y, z), glam::Vec3::Z, 0.001);
-        let surfels: Vec<_> = (0..8)
-            .map(|k| at(9.0 * (k & 1) as f32, 3.0 * (k >> 1 & 1) as f32, 2.0 * (k >> 2) as f32))
-            .collect();
+        let surfels: Vec<_> =
+            (0..8).map(|k| at(9.0 * (k & 1) as f32, 3.0 * (k >> 1 & 1) as f32, 2.0 * (k >> 2) as f32)).collect();
         let origin = DVec3::new(4e5, 5e6, 0.0);
         let center = origin + DVec3::new(4.5, 1.5, 1.0);
         for up in [Up::Z, Up::Y] {
             let scene = Scene { origin, surfels: surfels.clone(), up, ..Scene::default() };
             let count = NonZeroU32::new(12).unwrap();
-            let cameras =
-                Camera::turntable((320, 200), Lens::Fov(45.0), &scene, 1e-3, (None, None), count).unwrap();
+            let cameras = Camera::turntable((320, 200), Lens::Fov(45.0), &scene, 1e-3, (None, None), count).unwrap();
             assert_eq!(cameras.len(), 12);
             let mut largest: f64 = 0.0;
             for camera in &cameras {

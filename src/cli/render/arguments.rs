@@ -35,6 +35,8 @@ use super::super::outputs::Source;
     epsplat render statue.ply -o hall.png --triangles hall.obj\n  \
     epsplat render skin.ply shirt.ply -o dressed.png --separate\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
+    epsplat render scan.laz -o ortho.tif --pixel-size 0.5\n  \
+    epsplat render scan.laz -o height.tif --pixel-size 0.5 --aov height\n  \
     epsplat render scan.laz -o views --cameras transforms.json\n  \
     epsplat render scan.laz -o depth.png --aov depth --depth-scale 100\n  \
     epsplat render scan.laz -o - --turntable 90 --format raw --size 640x480 |\n    \
@@ -101,14 +103,14 @@ pub(super) struct ViewArguments {
     ///
     /// A transforms.json has the format of NeRF, instant-ngp or nerfstudio. Each picture is named
     /// after its camera's image, folders included
-    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "target", "up", "fov", "ortho", "intrinsics"])]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "target", "up", "fov", "ortho", "intrinsics", "pixel_size"])]
     pub(super) cameras: Option<PathBuf>,
     /// N pictures around the scene, from the elevation of the default view or the side of --from
     ///
     /// The camera moves counter-clockwise, seen from above, in N equal steps around the up axis
     /// through the scene's centre, at one distance from which the whole scene stays in view. The
     /// pictures are named 0000.png and so on
-    #[arg(long, value_name = "N", conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics"], hide_short_help = true)]
+    #[arg(long, value_name = "N", conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics", "pixel_size"], hide_short_help = true)]
     pub(super) turntable: Option<NonZeroU32>,
     /// Factor of the width and height of --cameras' images; intrinsics are scaled too
     #[arg(long, value_name = "FACTOR", value_parser = scale, requires = "cameras", hide_short_help = true)]

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::Path;
 
 use epsplat::io::images::{Content, Image, ImageFormat};
+use epsplat::io::place::Place;
 use epsplat::{Error, Frame, Maps, Result};
 
 use super::Arguments;
@@ -68,7 +69,8 @@ impl Target {
         let is_standard = arguments.output == Path::new(STANDARD);
         if is_standard && std::io::stdout().is_terminal() {
             return Err(Error::Usage(
-                "standard output is a terminal, which shows no image: give a file, or a pipe as in '-o - | program'".into(),
+                "standard output is a terminal, which shows no image: give a file, or a pipe as in '-o - | program'"
+                    .into(),
             ));
         }
         if is_standard && arguments.file.json.as_deref() == Some(Path::new(STANDARD)) {
@@ -79,9 +81,19 @@ impl Target {
         Ok(Self { format, content, is_standard })
     }
 
+    /// The part of an image that a file gets.
+    pub fn content(&self) -> Content {
+        self.content
+    }
+
     /// Writes an image to the file at `path`, or to standard output.
     pub fn write(&self, path: &Path, frame: &Frame) -> Result<()> {
-        let image = Image { frame, content: self.content };
+        self.write_map(path, frame, None)
+    }
+
+    /// Writes an image that lies at `place` on the earth.
+    pub fn write_map(&self, path: &Path, frame: &Frame, place: Option<&Place>) -> Result<()> {
+        let image = Image { frame, content: self.content, place };
         if !self.is_standard {
             return self.format.write(path, &image);
         }

@@ -5,6 +5,8 @@ mod depth;
 #[cfg(feature = "textures")]
 mod jpeg;
 mod raw;
+#[cfg(feature = "geotiff")]
+pub mod tiff;
 #[cfg(feature = "arrays")]
 mod zipped;
 
@@ -13,6 +15,7 @@ use std::path::Path;
 use std::str::FromStr;
 
 use super::atomic::write_whole;
+use super::place::Place;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::scene::{Map, Maps};
@@ -41,6 +44,8 @@ pub struct Image<'a> {
     pub frame: &'a Frame,
     /// The part that is written.
     pub content: Content,
+    /// Where the image lies on the earth, if it is a map.
+    pub place: Option<&'a Place>,
 }
 
 /// A file or memory that images are encoded into.
@@ -57,6 +62,9 @@ struct Row {
     about: &'static str,
     /// Whether several images in one stream can be told apart.
     streams: bool,
+    /// The extension of a world file beside the image, which gives a map its place; None if the
+    /// format holds the place itself, or other programs read no such file.
+    world: Option<&'static str>,
     /// The content for these maps and this depth scale.
     content: fn(Maps, Option<f64>) -> Result<Content, &'static str>,
     encode: fn(&mut dyn Sink, &Image<'_>) -> io::Result<()>,
@@ -69,6 +77,7 @@ static FORMATS: &[Row] = &[
         extensions: &["png"],
         about: "8-bit sRGB, straight alpha",
         streams: true,
+        world: Some("pgw"),
         content: depth::content,
         encode: depth::encode,
     },
@@ -78,6 +87,7 @@ static FORMATS: &[Row] = &[
         extensions: &["exr"],
         about: "linear f32, with every map as channels",
         streams: false,
+        world: None,
         content: |_, scale| whole(scale),
         encode: |sink, image| super::exr::encode(sink, image.frame),
     },
@@ -87,6 +97,7 @@ static FORMATS: &[Row] = &[
         extensions: &["jpg", "jpeg"],
         about: "8-bit sRGB over white, quality 95",
         streams: true,
+        world: Some("jgw"),
         content: |maps, scale| color_alone(maps, scale, "a JPEG holds no maps: use an .exr or .npz output with --aov"),
         encode: jpeg::encode,
     },
@@ -95,6 +106,7 @@ static FORMATS: &[Row] = &[
         extensions: &["npy"],
         about: "linear f32 (H, W, 4), or with one map of --aov that map",
         streams: true,
+        world: None,
         content: |maps, scale| color_or_map(maps, scale, "an .npy file holds one array: give one map, or use .npz"),
         encode: array::encode,
     },
@@ -104,15 +116,29 @@ static FORMATS: &[Row] = &[
         extensions: &["npz"],
         about: "an array for the colour and for each map, by name",
         streams: false,
+        world: None,
         content: |_, scale| whole(scale),
         encode: zipped::encode,
+    },
+    #[cfg(feature = "geotiff")]
+    Row {
+        name: "tif",
+        extensions: &["tif", "tiff"],
+        about: "8-bit sRGB, straight alpha, or with one map of --aov that map in f32",
+        streams: false,
+        world: None,
+        content: tiff::content,
+        encode: tiff::encode,
     },
     Row {
         name: "raw",
         extensions: &["raw", "rgba"],
         about: "four bytes a pixel, as a PNG has them, without a header",
         streams: true,
-        content: |maps, scale| color_alone(maps, scale, "raw frames hold no maps: use an .exr or .npz output with --aov"),
+        world: None,
+        content: |maps, scale| {
+            color_alone(maps, scale, "raw frames hold no maps: use an .exr or .npz output with --aov")
+        },
         encode: raw::encode,
     },
 ];
@@ -166,9 +192,9 @@ impl ImageFormat {
         let row = FORMATS.iter().find(|row| row.extensions.contains(&extension.as_str()));
         row.map(Self).ok_or_else(|| {
             let all: Vec<_> = FORMATS.iter().map(|row| format!(".{}", row.extensions[0])).collect();
-            let (last, others) = all.split_last().map_or((String::new(), String::new()), |(last, others)| {
-                (last.clone(), others.join(", "))
-            });
+            let (last, others) = all
+                .split_last()
+                .map_or((String::new(), String::new()), |(last, others)| (last.clone(), others.join(", ")));
             Error::Usage(format!("the output must end in {others} or {last}, {} does not", path.display()))
         })
     }
@@ -186,6 +212,11 @@ impl ImageFormat {
     /// Whether several images in one stream can be told apart.
     pub fn streams(self) -> bool {
         self.0.streams
+    }
+
+    /// The extension of the world file beside a map.
+    pub fn world(self) -> Option<&'static str> {
+        self.0.world
     }
 
     /// Returns the content of a file of an image with `maps`, by a scale of depths if one is given.

@@ -77,7 +77,10 @@ fn tell(
     match &arguments.file.json {
         Some(path) => write_json(path, &Outcome { report, grid, tiles: *tiles, bits }),
         None => {
-            note(&summary(report, &arguments.output));
+            note(&match tiles {
+                1 => summary(report, &arguments.output),
+                _ => format!("{}: {tiles} images joined, {:.1} ms", arguments.output.display(), report.total_ms),
+            });
             Ok(())
         }
     }

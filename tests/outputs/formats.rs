@@ -102,7 +102,7 @@ fn arrays_have_the_bits_of_an_exr() {
 #[test]
 fn an_exr_has_one_part_with_the_names_that_others_expect() {
     let folder = Folder::new();
-    rendered(&folder, "a.exr", &["--aov", "depth,normal,surfaces"]);
+    rendered(&folder, "a.exr", &["--aov", "depth,normal,surfaces", "--composite", "layers"]);
     let file = exr::meta::MetaData::read_from_file(folder.path("a.exr"), true).unwrap();
     assert_eq!(file.headers.len(), 1);
     let names: Vec<String> = file.headers[0].channels.list.iter().map(|channel| channel.name.to_string()).collect();

@@ -189,7 +189,10 @@ fn tags<K: TiffKind>(
     let Some(Place { left, top, pixel, keys }) = layout.place else { return Ok(()) };
     directory.write_tag(Tag::ModelPixelScaleTag, &[*pixel, *pixel, 0.0][..])?;
     directory.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, *left, *top, 0.0][..])?;
-    directory.write_tag(Tag::GeoKeyDirectoryTag, &keys.directory()[..])?;
+    // Without keys a pixel is an area too.
+    if !keys.is_empty() {
+        directory.write_tag(Tag::GeoKeyDirectoryTag, &keys.directory()[..])?;
+    }
     if !keys.doubles.is_empty() {
         directory.write_tag(Tag::GeoDoubleParamsTag, &keys.doubles[..])?;
     }

@@ -61,12 +61,23 @@ impl Renderer {
         mut give: impl FnMut(Frame) -> Result<()>,
     ) -> Result<Survey> {
         let (mut first, mut tiles, mut visible): (Option<Picture>, u64, bool) = (None, 0, false);
+        let planned = grid.bands().count() as u64 * grid.tiles().count() as u64;
+        let counts = planned > 1;
+        // The bar counts tiles and not their stages.
+        let notes = Notes(progress);
+        let of_tile: &dyn Progress = if counts { &notes } else { progress };
+        if counts {
+            progress.begin("rendering tiles", planned);
+        }
         for rows in grid.bands() {
             let mut across = Vec::new();
             for columns in grid.tiles() {
                 let view = View::from(grid.camera(columns, rows.clone())?);
-                let mut picture = self.rendered(&view, false, progress)?;
+                let mut picture = self.rendered(&view, false, of_tile)?;
                 tiles += 1;
+                if counts {
+                    progress.advance(1);
+                }
                 visible |= picture.unseen.is_none();
                 across.push(std::mem::replace(&mut picture.frame, Frame::of_colors(0, 0, Vec::new())));
                 match &mut first {
@@ -76,10 +87,26 @@ impl Renderer {
             }
             Frame::joined(across).map_or(Ok(()), &mut give)?;
         }
+        if counts {
+            progress.end();
+        }
         let Some(Picture { report, unseen, .. }) = first else {
             return Err(Error::Usage("a map needs at least one pixel".into()));
         };
         Ok(Survey { report, tiles, unseen: unseen.filter(|_| !visible) })
+    }
+}
+
+/// Forwards notes alone.
+struct Notes<'a>(&'a dyn Progress);
+
+impl Progress for Notes<'_> {
+    fn begin(&self, _what: &str, _units: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+
+    fn note(&self, line: &str) {
+        self.0.note(line);
     }
 }
 

@@ -10,11 +10,11 @@ use std::time::Instant;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::low_level::frame::pixel_bytes;
-use epsplat::{Error, Files, Maps, Picture, ReadReport, Renderer, Report, Result, Scene, View};
+use epsplat::{Error, Files, Maps, Picture, Progress, ReadReport, Renderer, Report, Result, Scene, View};
 use serde::Serialize;
 
 use super::super::outputs::Source;
-use super::super::progress::{Bars, Notes, Views};
+use super::super::progress::{Bars, Notes};
 use super::super::{note, outputs, write_json};
 use super::Arguments;
 use super::output::{note_cut, note_overflows};
@@ -101,7 +101,7 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
         (None, count) => renderer.turntable(&arguments.camera, count.unwrap_or(NonZeroU32::MIN))?,
     };
     let start = Instant::now();
-    let counted = Views::begin(&bars, views.len() as u64);
+    bars.begin("rendering views", views.len() as u64);
     // The bar counts views and not their stages.
     let notes = Notes;
     // The first empty picture with the reason, and the number of empty pictures.
@@ -122,12 +122,12 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
         }
         let Picture { frame, report, read, .. } = picture;
         target.write(file, &frame)?;
-        counted.advance();
+        bars.advance(1);
         let write_ms = start.elapsed().as_secs_f64() * 1e3;
         let bits = arguments.file.json.as_ref().map(|_| frame.hashes());
         Ok(Written { file: file.clone(), report, read, bits, write_ms })
     });
-    counted.end();
+    bars.end();
     let pictures = pictures?;
     if let (Some((first, unseen)), count) = empty.into_inner() {
         note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));

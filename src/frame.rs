@@ -127,6 +127,26 @@ impl Frame {
         first
     }
 
+    /// Joins frames of the same height and maps, from left to right. Returns None for no frames.
+    pub(crate) fn joined(frames: Vec<Self>) -> Option<Self> {
+        if frames.len() < 2 {
+            return frames.into_iter().next();
+        }
+        let (width, height) = (frames.iter().map(|frame| frame.width).sum(), frames[0].height);
+        let mut whole = Self { width, height, color: Vec::new(), maps: BTreeMap::new() };
+        for row in 0..height as usize {
+            for frame in &frames {
+                let across = frame.width as usize;
+                whole.color.extend(&frame.color[row * across..][..across]);
+                for (map, values) in &frame.maps {
+                    let length = across * map.width();
+                    whole.maps.entry(*map).or_default().extend(&values[row * length..][..length]);
+                }
+            }
+        }
+        Some(whole)
+    }
+
     /// Appends the rows of `below`, which has the same width and maps.
     pub fn append(&mut self, below: Self) {
         self.height += below.height;

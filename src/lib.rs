@@ -65,10 +65,10 @@ pub use io::{Mesh, Points, Texture};
 pub use low_level::frame::Frame;
 pub use low_level::gpu::Gpu;
 pub use low_level::render::{FrameLayout, Plane, Receipt, Report, Target, Ticket};
-pub use low_level::scene::{Bounds, Camera, Lens, Map, Maps, Side, Up};
+pub use low_level::scene::{Bounds, Camera, Grid, Lens, Map, Maps, Side, Up};
 pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
-pub use stage::{Files, Picture, ReadReport, Renderer, Scene, View, ViewReport};
+pub use stage::{Files, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport};
 
 // Modules inside the library import these as `crate::...`, without `low_level`.
 #[cfg(feature = "bench")]

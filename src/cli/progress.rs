@@ -1,31 +1,57 @@
-//! Progress bars, on a terminal only.
+//! Progress: bars on a terminal, and elsewhere a line every few seconds for many pictures.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use epsplat::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// The time between two lines, where there is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// The stages that print lines where there is no terminal: each unit is a picture.
+const WITH_LINES: [&str; 2] = ["rendering views", "rendering tiles"];
+
 /// A progress bar on stderr for each stage, cleared when the stage ends.
 ///
-/// Nothing is printed if stderr is not a terminal.
-pub struct Bars(Option<Mutex<ProgressBar>>);
+/// If stderr is not a terminal, stages of many pictures print a line every few seconds, and others
+/// nothing.
+pub struct Bars {
+    bar: Option<Mutex<ProgressBar>>,
+    lines: Mutex<Option<Lines>>,
+}
+
+/// A stage that prints lines.
+struct Lines {
+    what: String,
+    done: u64,
+    units: u64,
+    last: Instant,
+}
 
 impl Bars {
     pub fn new() -> Self {
-        Self(std::io::stderr().is_terminal().then(|| Mutex::new(ProgressBar::hidden())))
+        let bar = std::io::stderr().is_terminal().then(|| Mutex::new(ProgressBar::hidden()));
+        Self { bar, lines: Mutex::default() }
     }
 
     fn with(&self, f: impl FnOnce(&mut ProgressBar)) {
-        if let Some(bar) = &self.0 {
+        if let Some(bar) = &self.bar {
             f(&mut bar.lock().unwrap_or_else(PoisonError::into_inner));
         }
+    }
+
+    fn lines(&self) -> MutexGuard<'_, Option<Lines>> {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Progress for Bars {
     fn begin(&self, what: &str, units: u64) {
+        if self.bar.is_none() && WITH_LINES.contains(&what) {
+            *self.lines() = Some(Lines { what: what.to_owned(), done: 0, units, last: Instant::now() });
+        }
         self.with(|bar| {
             *bar = if units > 0 { ProgressBar::new(units) } else { ProgressBar::new_spinner() };
             let template = if units > 0 {
@@ -42,10 +68,18 @@ impl Progress for Bars {
 
     fn advance(&self, units: u64) {
         self.with(|bar| bar.inc(units));
+        if let Some(lines) = &mut *self.lines() {
+            lines.done += units;
+            if lines.last.elapsed() >= BETWEEN_LINES {
+                super::note(&format!("{}: {} of {}", lines.what, lines.done, lines.units));
+                lines.last = Instant::now();
+            }
+        }
     }
 
     fn end(&self) {
         self.with(|bar| bar.finish_and_clear());
+        *self.lines() = None;
     }
 
     fn note(&self, line: &str) {

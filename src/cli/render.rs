@@ -1,33 +1,37 @@
 //! `epsplat render`: renders files to an image with its maps, or to one image for each camera.
 
 mod arguments;
+mod map;
 mod output;
+mod target;
 mod views;
 
 use std::collections::BTreeMap;
 
-use epsplat::{Error, Files, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
+use epsplat::{Files, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
 use serde::Serialize;
 
 pub use self::arguments::Arguments;
-use self::output::{Format, note_cut, note_overflows, summary};
+use self::output::{note_cut, note_overflows, summary};
+use self::target::Target;
 use super::progress::Bars;
 use super::{note, outputs, write_json};
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    match &arguments.views.cameras {
-        Some(path) => views::run(arguments, path),
-        None => one(arguments),
+    if arguments.views.cameras.is_some() || arguments.views.turntable.is_some() {
+        let target = Target::of_many(arguments)?;
+        return target.closed_is_done(views::run(arguments, &target));
     }
+    let target = Target::of_one(arguments)?;
+    let render = if arguments.camera.pixel_size.is_some() { map::run } else { one };
+    target.closed_is_done(render(arguments, &target))
 }
 
 /// Renders a single picture.
-fn one(arguments: &Arguments) -> Result<()> {
-    let format = Format::of(&arguments.output)?;
-    check_format(arguments, format)?;
+fn one(arguments: &Arguments, target: &Target) -> Result<()> {
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
     Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
-    outputs::check(arguments.files(&files), [&arguments.output].into_iter().chain(&arguments.json))?;
+    outputs::check(arguments.files(&files), [&arguments.output].into_iter().chain(&arguments.file.json))?;
     let view = View::new(&arguments.camera)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
 
@@ -37,8 +41,8 @@ fn one(arguments: &Arguments) -> Result<()> {
     note_overflows(&report);
     note_cut([&report], arguments.options.levels.splats);
     unseen.iter().for_each(|unseen| note(&unseen.sentence()));
-    format.write(&arguments.output, &frame)?;
-    match &arguments.json {
+    target.write(&arguments.output, &frame)?;
+    match &arguments.file.json {
         Some(path) => write_json(path, &Outcome { report: &report, view, read, bits: frame.hashes() }),
         None => {
             note(&summary(&report, &arguments.output));
@@ -56,14 +60,6 @@ struct Outcome<'a> {
     /// Numbers of nodes, points and bytes that were read; None if the inputs were read whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<ReadReport>,
-    /// A hash of the colour's and of each map's bits ([`Frame::hashes`]).
+    /// A hash of the colour's and of each map's bits ([`Frame::hashes`](epsplat::Frame::hashes)).
     bits: BTreeMap<&'static str, String>,
-}
-
-/// Fails if the arguments ask for maps that the format cannot store.
-fn check_format(arguments: &Arguments, format: Format) -> Result<()> {
-    if !arguments.options.maps.aov.is_empty() && format == Format::Png {
-        return Err(Error::Usage("a PNG holds no maps: use an .exr output with --aov".into()));
-    }
-    Ok(())
 }

@@ -1,13 +1,14 @@
-//! OpenEXR: linear f32, with each map as a named layer of one file.
+//! OpenEXR: linear f32 in one part, with the channels of each map named after it.
 //!
-//! | layer | channels |
+//! | channels | values |
 //! |---|---|
-//! | `color` | R G B A, straight alpha |
-//! | `depth` | Z, world units, +inf for background |
-//! | `normal` | X Y Z, world space |
-//! | `weight`, `count`, `decision` | Y |
+//! | `R` `G` `B` `A` | the colour, straight alpha |
+//! | `depth.Z` | world units, +inf for background |
+//! | `normal.X` `normal.Y` `normal.Z` | world space |
+//! | `weight.Y`, `count.Y`, `decision.Y` | |
 //!
-//! The layers follow from [`MAPS`](crate::scene::MAPS).
+//! The channels follow from [`MAPS`](crate::scene::MAPS). Files of versions before 0.2.0 have a
+//! part for each map; they are read too.
 
 use std::path::Path;
 
@@ -16,29 +17,28 @@ use exr::prelude::*;
 
 use super::atomic::write_whole;
 use super::image::check;
+use super::images::Sink;
 use super::input::check_regular;
 use crate::error::Error as EpsplatError;
 use crate::frame::Frame;
-use crate::scene::Map;
+use crate::scene::{MAPS, Map};
 
 type Outcome<T> = crate::error::Result<T>;
 
 /// Writes the colour and all maps of `frame`.
 pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
+    write_whole(path, |file| encode(file, frame))
+}
+
+/// Encodes the colour and all maps of `frame`.
+pub(super) fn encode(sink: &mut dyn Sink, frame: &Frame) -> std::io::Result<()> {
     let size = Vec2(frame.width as usize, frame.height as usize);
     // Scan lines in increasing order, so that equal frames give equal files.
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let layer = |name: &str, channels: Vec<AnyChannel<FlatSamples>>| {
-        let channels = AnyChannels::sort(channels.into_iter().collect());
-        Layer::new(size, LayerAttributes::named(Text::new_or_panic(name)), encoding, channels)
-    };
-    let channel = |name: &str, values: Vec<f32>| AnyChannel::new(Text::new_or_panic(name), FlatSamples::F32(values));
-    let plane = |k: usize| frame.color.iter().map(|c| c[k]).collect::<Vec<_>>();
-    let mut layers = vec![layer(
-        "color",
-        vec![channel("R", plane(0)), channel("G", plane(1)), channel("B", plane(2)), channel("A", plane(3))],
-    )];
+    let plane = |k: usize| FlatSamples::F32(frame.color.iter().map(|c| c[k]).collect());
+    let colors = ["R", "G", "B", "A"].into_iter().enumerate();
+    let mut channels: Vec<_> = colors.map(|(k, name)| AnyChannel::new(Text::new_or_panic(name), plane(k))).collect();
     for map in frame.maps().iter() {
         let plane = |k: usize| match (frame.numbers(map), frame.map(map)) {
             (Some(numbers), _) => FlatSamples::U32(numbers.iter().skip(k).step_by(map.width()).copied().collect()),
@@ -46,18 +46,24 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
                 FlatSamples::F32(values.into_iter().flatten().skip(k).step_by(map.width()).copied().collect())
             }
         };
-        let channels = map.row().channels.iter().enumerate();
-        let channels = channels.map(|(k, name)| AnyChannel::new(Text::new_or_panic(name), plane(k)));
-        layers.push(layer(map.row().name, channels.collect()));
+        let named = map.row().channels.iter().enumerate();
+        channels.extend(named.map(|(k, name)| AnyChannel::new(Text::new_or_panic(channel_name(map, name)), plane(k))));
     }
-    let bounds = IntegerBounds::from_dimensions(size);
-    let image = Image::from_layers(ImageAttributes::new(bounds), layers);
-    write_whole(path, |file| image.write().to_buffered(file).map_err(std::io::Error::other))
+    let channels = AnyChannels::sort(channels.into_iter().collect());
+    let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);
+    let image = Image::from_layer(layer);
+    image.write().to_buffered(sink).map_err(std::io::Error::other)
 }
 
-/// Reads the layers that [`write()`] writes; other layers are ignored.
+/// Returns the name of one of a map's channels.
+fn channel_name(map: Map, channel: &str) -> String {
+    format!("{}.{channel}", map.row().name)
+}
+
+/// Reads the channels that [`write()`] writes, in one part or in a part for each map; others are
+/// ignored.
 ///
-/// The colour is the layer `color`, or else the first layer with R, G and B.
+/// The colour is the part `color`, or else the first part with R, G and B.
 pub fn read(path: &Path) -> Outcome<Frame> {
     // The exr crate wraps a missing file in its own error; checking first gives the usual message.
     check_regular(path).and_then(|()| std::fs::File::open(path).map(drop)).map_err(|e| EpsplatError::read(path, e))?;
@@ -76,30 +82,16 @@ pub fn read(path: &Path) -> Outcome<Frame> {
         if layer.size != size {
             return Err(EpsplatError::malformed(path, "its layers differ in size"));
         }
-        let name = layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
-        let is_whole = name.parse::<Map>().is_ok_and(|map| map.row().numbers);
-        let channel = |name: &str| -> Option<Vec<f32>> {
-            let channel = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name))?;
-            Some(match &channel.sample_data {
-                // A frame stores whole numbers as the bits of f32.
-                FlatSamples::U32(numbers) if is_whole => numbers.iter().copied().map(f32::from_bits).collect(),
-                _ if is_whole => return None,
-                samples => samples.values_as_f32().collect(),
-            })
-        };
-        if let Ok(map) = name.parse::<Map>() {
-            if let Some(planes) = map.row().channels.iter().map(|name| channel(name)).collect::<Option<Vec<_>>>() {
-                let values = (0..pixels).flat_map(|pixel| planes.iter().map(move |plane| plane[pixel]));
-                frame = frame.with(map, values.collect());
+        let part = layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
+        let channels = &layer.channel_data.list;
+        for map in MAPS.iter().map(|row| row.map) {
+            if let Some(values) = map_values(channels, map, part == map.row().name, pixels) {
+                frame = frame.with(map, values);
             }
-            continue;
         }
-        if name != "color" && !frame.color.is_empty() {
-            continue;
-        }
-        if let (Some(r), Some(g), Some(b)) = (channel("R"), channel("G"), channel("B")) {
-            let a = channel("A").unwrap_or_else(|| vec![1.0; pixels]);
-            frame.color = (0..pixels).map(|i| [r[i], g[i], b[i], a[i]]).collect();
+        let is_first = frame.color.is_empty() && part.parse::<Map>().is_err();
+        if let Some(colors) = (part == "color" || is_first).then(|| colors(channels, pixels)).flatten() {
+            frame.color = colors;
         }
     }
     if frame.color.len() != pixels {
@@ -108,11 +100,41 @@ pub fn read(path: &Path) -> Outcome<Frame> {
     Ok(frame)
 }
 
+/// Returns the channel with this name, in capitals or not.
+fn channel<'a>(channels: &'a [AnyChannel<FlatSamples>], name: &str) -> Option<&'a FlatSamples> {
+    channels.iter().find(|channel| channel.name.eq_case_insensitive(name)).map(|channel| &channel.sample_data)
+}
+
+/// Returns the colours of a part; `None` if it lacks R, G or B. A missing alpha is 1.
+fn colors(channels: &[AnyChannel<FlatSamples>], pixels: usize) -> Option<Vec<[f32; 4]>> {
+    let plane = |name: &str| Some(channel(channels, name)?.values_as_f32().collect::<Vec<_>>());
+    let (r, g, b) = (plane("R")?, plane("G")?, plane("B")?);
+    let a = plane("A").unwrap_or_else(|| vec![1.0; pixels]);
+    Some((0..pixels).map(|i| [r[i], g[i], b[i], a[i]]).collect())
+}
+
+/// Returns the values of a map; `None` if one of its channels is missing. The `part` may be that of
+/// the map alone, whose channels are not prefixed.
+fn map_values(channels: &[AnyChannel<FlatSamples>], map: Map, is_part: bool, pixels: usize) -> Option<Vec<f32>> {
+    let plane = |name: &&str| -> Option<Vec<f32>> {
+        let own = || is_part.then(|| channel(channels, name)).flatten();
+        match channel(channels, &channel_name(map, name)).or_else(own)? {
+            // A frame stores whole numbers as the bits of f32.
+            FlatSamples::U32(numbers) if map.row().numbers => {
+                Some(numbers.iter().copied().map(f32::from_bits).collect())
+            }
+            _ if map.row().numbers => None,
+            samples => Some(samples.values_as_f32().collect()),
+        }
+    };
+    let planes = map.row().channels.iter().map(plane).collect::<Option<Vec<_>>>()?;
+    Some((0..pixels).flat_map(|pixel| planes.iter().map(move |plane| plane[pixel])).collect())
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::scene::MAPS;
 
     #[test]
     fn every_map_comes_back_and_equal_frames_make_equal_files() {

@@ -19,6 +19,7 @@ pub mod exr;
 mod fault;
 mod format;
 pub mod image;
+pub mod images;
 pub(crate) mod input;
 pub mod las;
 pub mod mesh;
@@ -26,6 +27,7 @@ pub mod obj;
 pub mod paint;
 #[cfg(feature = "pcd")]
 pub mod pcd;
+pub mod place;
 pub mod ply;
 pub mod png;
 pub mod points;

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::values::Ortho;
-use crate::scene::Side;
+use crate::error::Result;
+use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::side::ELEVATION;
+use crate::scene::{Lens, Side};
 
 /// The view of a picture. Without an eye or a camera file it shows the whole scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +63,42 @@ pub struct CameraOptions {
     /// Camera file (see the guide), in place of all other camera options except --size
     #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
+    /// Map from straight above with pixels of SIZE world units, north (+y) at the top
+    ///
+    /// The size of the image follows from the data or --bounds. The lines of its grid lie at
+    /// multiples of SIZE, so that maps with one SIZE fit together. A .tif has the place of the map
+    /// and the coordinate system of LAS files (GeoTIFF) and may be larger than memory; a .png or
+    /// .jpg gets a world file (.pgw, .jgw). z is up: files whose up is y need --up z
+    #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::scale, conflicts_with_all = ["size", "eye", "from", "azimuth", "elevation", "target", "fov", "ortho", "intrinsics", "file", "near"]))]
+    pub pixel_size: Option<f64>,
+    /// Part of a map of --pixel-size, extended to whole pixels [default: all data]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", value_parser = super::parse::bounds, allow_hyphen_values = true, requires = "pixel_size"))]
+    pub bounds: Option<[f64; 4]>,
     /// Smallest depth drawn, world units [default: a millionth of the scene's extent]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEPTH", hide_short_help = true))]
     pub near: Option<f64>,
+}
+
+impl CameraOptions {
+    /// Returns the side from which the options have the scene in view, if they say so.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) for angles that give no direction.
+    pub(crate) fn side(&self) -> Result<Option<Side>> {
+        match (self.azimuth, self.elevation) {
+            (None, None) => Ok(self.from),
+            (azimuth, elevation) => Side::at(azimuth.unwrap_or(180.0), elevation.unwrap_or(ELEVATION)).map(Some),
+        }
+    }
+
+    /// Returns the lens, and the name of the option that gives it.
+    pub(crate) fn lens(&self) -> (Lens, &'static str) {
+        match (self.intrinsics, self.ortho) {
+            (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
+            (None, Some(Ortho::Height(height))) => (Lens::OrthographicHeight(height), "--ortho"),
+            // The scene decides the height.
+            (None, Some(Ortho::Fit)) => (Lens::OrthographicHeight(1.0), "--ortho"),
+            (None, None) => (Lens::Fov(self.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
+        }
+    }
 }

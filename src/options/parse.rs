@@ -82,6 +82,14 @@ pub fn memory(text: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("'{text}' is not a size of memory: give a number and a unit, such as 2GiB or 512MiB"))
 }
 
+/// Parses the bounds of a map: `XMIN,YMIN,XMAX,YMAX`.
+pub fn bounds(text: &str) -> Result<[f64; 4], String> {
+    match numbers(text).map_err(|error| error.to_string())?[..] {
+        [left, bottom, right, top] if left < right && bottom < top => Ok([left, bottom, right, top]),
+        _ => Err("four numbers are needed, the lesser first: XMIN,YMIN,XMAX,YMAX".into()),
+    }
+}
+
 /// Parses intrinsics in pixels: `FX,FY,CX,CY`.
 pub fn intrinsics(text: &str) -> Result<[f64; 4], String> {
     numbers(text)

@@ -71,7 +71,7 @@ impl RenderOptions {
             shininess: look.shininess.unwrap_or(default.shininess),
             lights: if look.lights.is_empty() { default.lights } else { look.lights.clone() },
             background: look.background.map_or(default.background, |Rgba(color)| color),
-            maps: Maps::of(&maps.aov),
+            maps: Maps::of(&maps.aov).rendered(),
             without: research.without.clone(),
             sources: research.sources.clone(),
             own_kernel: None,

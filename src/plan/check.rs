@@ -80,6 +80,10 @@ fn maps(options: &Settings, reference: bool) -> Result<()> {
         if options.blend == Blend::Nearest && unknown.contains(&row.map) {
             return usage(format!("--blend nearest keeps colour and depth: leave the {} map out", row.name));
         }
+        if let Some(from) = row.from {
+            let from = from.row().name;
+            return usage(format!("the {} map is made from the {from} of a frame: ask for {from}", row.name));
+        }
         if !reference && row.image_word.is_none() {
             return usage(format!("only the reference backend makes the {} map: take --backend reference", row.name));
         }

@@ -63,19 +63,9 @@ impl Camera {
         near: f64,
         (side, up, of): (Option<Side>, Option<DVec3>, Of),
     ) -> Result<(Self, DVec3)> {
-        check_size(width, height)?;
-        let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
-        // The middle, half the size, and half the size less a border pixel, as X/Z (pinhole) or X
-        // (orthographic).
-        let interval = |size: u32, principal: f64, f: f64| {
-            let size = f64::from(size);
-            // Ending a pixel before the border leaves the border's own pixels free.
-            let free = (0.5 * size - 1.0).max(0.25 * size);
-            [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
-        };
-        let image = [interval(width, cx, fx), interval(height, cy, fy)];
+        let (pinhole, image) = image((width, height), lens)?;
         let (forward, up) = directions(side, up, scene)?;
-        let framing = Framing::new(scene, projection == Projection::Pinhole, image, (forward, up));
+        let framing = Framing::new(scene, pinhole, image, (forward, unit(up, "up")?));
         let mut eye = framing.eye(FILL, Of::Centers);
         if of == Of::Disks && framing.cuts(eye) {
             eye = framing.eye(FILL_OF_DISKS, Of::Disks);
@@ -99,9 +89,9 @@ pub fn fitted_height(
     (side, up): (Option<Side>, Option<DVec3>),
 ) -> Result<f64> {
     check_size(width, height)?;
-    let directions = directions(side, up, scene)?;
+    let (forward, up) = directions(side, up, scene)?;
     let image = [[0.0, 0.5, 0.5]; 2];
-    let framing = Framing::new(scene, false, image, directions);
+    let framing = Framing::new(scene, false, image, (forward, unit(up, "up")?));
     let [right, left, bottom, top] = framing.reach(framing.eye(FILL, Of::Centers), Of::Disks);
     let across = right.max(left) * f64::from(height) / f64::from(width);
     let reach = across.max(bottom).max(top);
@@ -110,14 +100,27 @@ pub fn fitted_height(
     Ok(2.0 * reach / FILL)
 }
 
-/// The direction in which a camera looks at a scene, and the direction that is up in its image,
-/// both of length 1.
-fn directions(side: Option<Side>, up: Option<DVec3>, scene: &Scene) -> Result<(DVec3, DVec3)> {
+/// Whether the camera is a pinhole, and for the image's width and height each: the middle, half the
+/// size, and half the size less a border pixel, as X/Z (pinhole) or X (orthographic).
+pub(super) fn image((width, height): (u32, u32), lens: Lens) -> Result<(bool, [[f64; 3]; 2])> {
+    check_size(width, height)?;
+    let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
+    let interval = |size: u32, principal: f64, f: f64| {
+        let size = f64::from(size);
+        // Ending a pixel before the border leaves the border's own pixels free.
+        let free = (0.5 * size - 1.0).max(0.25 * size);
+        [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
+    };
+    Ok((projection == Projection::Pinhole, [interval(width, cx, fx), interval(height, cy, fy)]))
+}
+
+/// The directions of the view and of up in its image, from `side` or by default.
+pub(super) fn directions(side: Option<Side>, up: Option<DVec3>, scene: &Scene) -> Result<(DVec3, DVec3)> {
     match side {
         Some(side) => side.view(up, scene.up),
         None => {
-            let up = unit(up.unwrap_or(scene.up.axis()), "up")?;
-            Ok((forward(up), up))
+            let given = up.unwrap_or(scene.up.axis());
+            Ok((forward(unit(given, "up")?), given))
         }
     }
 }
@@ -130,7 +133,7 @@ enum Of {
 }
 
 /// The scene in the axes of the camera.
-struct Framing<'a> {
+pub(super) struct Framing<'a> {
     scene: &'a Scene,
     pinhole: bool,
     /// For the image's width and height each: the middle, half the size, and half the size less a
@@ -140,7 +143,7 @@ struct Framing<'a> {
     axes: [DVec3; 3],
     /// The box of the centres that are framed, relative to the scene's origin.
     body: Bounds,
-    center: DVec3,
+    pub(super) center: DVec3,
     /// The radius of the scene, world units.
     radius: f64,
     /// The smallest depth that a centre may have, world units.
@@ -180,7 +183,7 @@ impl Disk {
 }
 
 impl<'a> Framing<'a> {
-    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], (forward, up): (DVec3, DVec3)) -> Self {
+    pub(super) fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], (forward, up): (DVec3, DVec3)) -> Self {
         let right = forward.cross(up).normalize();
         let (body, _) = scene.framed();
         // A scene whose points coincide has only the extent of its surfels.
@@ -262,6 +265,24 @@ impl<'a> Framing<'a> {
             eye.y += (0.5 * (reach[2] - reach[3]) - mid_y) * depth;
         }
         eye
+    }
+
+    /// The least distance from the centre of the body at which a camera that looks at it has the
+    /// whole body in view, world units. The principal point is the image's centre.
+    pub(super) fn distance(&self) -> f64 {
+        if !self.pinhole {
+            return 2.0 * self.radius;
+        }
+        let least = |of: Of, halves: [f64; 2]| {
+            let [x, y] = halves;
+            let planes = [DVec3::new(1.0, 0.0, -x), DVec3::new(-1.0, 0.0, -x), DVec3::new(0.0, 1.0, -y)];
+            let planes = [planes[0], planes[1], planes[2], DVec3::new(0.0, -1.0, -y), DVec3::NEG_Z];
+            let [left, right, above, below, front] =
+                self.largest(of, |disk| planes.map(|plane| disk.farthest(plane).dot(plane)));
+            (left.max(right) / x).max(above.max(below) / y).max(front + self.clearance)
+        };
+        let centers = least(Of::Centers, self.image.map(|[_, half, _]| FILL * half));
+        centers.max(least(Of::Disks, self.image.map(|[_, half, free]| free.min(FILL_OF_DISKS * half))))
     }
 
     /// Whether the image's border cuts a disk, seen from `eye`.

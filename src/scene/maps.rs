@@ -1,7 +1,7 @@
 //! The maps that an image may have beside its colour.
 //!
-//! Each map is a row of [`MAPS`], which determines its words per pixel on the device, its layer in
-//! an EXR, and its name on the command line and in studies.
+//! Each map is a row of [`MAPS`], which determines its words per pixel on the device, its channels
+//! in an EXR, and its name on the command line and in studies.
 
 use std::str::FromStr;
 
@@ -51,12 +51,16 @@ pub enum Map {
     /// [`Composite::Sorted`](super::Composite::Sorted). A tail has its nearest depth. +inf and 0
     /// where there are no more.
     Surfaces,
+    /// World coordinate along the scene's up axis of the surface at the depth of [`Map::Depth`],
+    /// world units; -inf where nothing is visible. It is made from the depth after a frame is
+    /// rendered.
+    Height,
 }
 
 /// The number of surfaces in [`Map::Surfaces`].
 pub const SURFACES: usize = 8;
 
-/// The channels of [`Map::Surfaces`]; in an EXR each surface is a layer.
+/// The channels of [`Map::Surfaces`], two for each surface.
 const SURFACE_CHANNELS: [&str; 2 * SURFACES] =
     ["1.Z", "1.A", "2.Z", "2.A", "3.Z", "3.A", "4.Z", "4.A", "5.Z", "5.A", "6.Z", "6.A", "7.Z", "7.A", "8.Z", "8.A"];
 
@@ -65,7 +69,7 @@ const SURFACE_CHANNELS: [&str; 2 * SURFACES] =
 pub struct MapRow {
     /// The map.
     pub map: Map,
-    /// The map's name in options and studies, and its layer in an EXR.
+    /// The map's name in options and studies, and before its channels in an EXR.
     pub name: &'static str,
     /// The channels in an EXR, one for each value of a pixel.
     pub channels: &'static [&'static str],
@@ -73,8 +77,10 @@ pub struct MapRow {
     /// ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
     pub need: &'static str,
     /// The WGSL override constant with the index of the map's first word in a pixel of the image.
-    /// None if only the reference backend makes the map.
+    /// None if no device makes the map.
     pub image_word: Option<&'static str>,
+    /// The map that this one is made from after a frame is rendered. None if the renderer makes it.
+    pub from: Option<Map>,
     /// Whether the rasteriser makes the map too.
     pub raster: bool,
     /// Whether the map describes all surfaces of a pixel instead of the nearest one.
@@ -91,7 +97,7 @@ pub struct MapRow {
 }
 
 /// All maps, in the order of [`Map`].
-pub const MAPS: [MapRow; 11] = [
+pub const MAPS: [MapRow; 12] = [
     MapRow { nothing: &[f32::INFINITY], ..row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")) },
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
@@ -134,6 +140,12 @@ pub const MAPS: [MapRow; 11] = [
         nothing: &[f32::INFINITY, 0.0],
         ..row(Map::Surfaces, "surfaces", &SURFACE_CHANNELS, "surfaces", Some("SURFACES_IMAGE"))
     },
+    MapRow {
+        raster: false,
+        from: Some(Map::Depth),
+        nothing: &[f32::NEG_INFINITY],
+        ..row(Map::Height, "height", &["Z"], "height", None)
+    },
 ];
 
 const fn row(
@@ -149,6 +161,7 @@ const fn row(
         channels,
         need,
         image_word,
+        from: None,
         raster: true,
         composited: false,
         of_surfels: false,
@@ -253,6 +266,11 @@ impl Maps {
     /// The number of maps in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
+    }
+
+    /// The set with each map that is made after a frame is rendered replaced by its source.
+    pub fn rendered(self) -> Self {
+        self.iter().fold(Self::NONE, |maps, map| maps.and(&[map.row().from.unwrap_or(map)]))
     }
 
     /// Whether the set is empty.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
+use crate::io::place::GeoKeys;
 use crate::io::ply::{Levels, Rows};
 use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions};
 use crate::options::{FormatOptions, InputOptions};
@@ -56,6 +57,20 @@ impl Files {
     /// The paths of all files, including those found in folders.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
+    }
+
+    /// Returns the keys of the coordinate system of the files; None if they name none, or if some
+    /// of them name others.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] and [`Error::Malformed`] for files whose header cannot be read.
+    pub fn geo_keys(&self) -> Result<Option<GeoKeys>> {
+        let of_file = |path: &PathBuf| GeoKeys::of_file(path, self.options.file.input_format);
+        let keys = self.each(|path| of_file(&path.to_owned()), || None)?.0;
+        let mut keys = keys.into_iter().flatten();
+        let first = keys.next();
+        Ok(first.filter(|first| keys.all(|other| other == *first)))
     }
 
     /// How the files are read.

@@ -9,14 +9,17 @@
 mod ahead;
 mod encode;
 mod files;
+mod heights;
 mod in_part;
 mod levels;
+mod map;
 mod memory;
 mod meshes;
 mod octrees;
 mod renderer;
 mod settings;
 mod tree;
+mod turntable;
 mod view;
 mod whole;
 
@@ -26,6 +29,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 pub use self::files::Files;
 pub use self::in_part::ReadReport;
+pub use self::map::Survey;
 pub use self::renderer::{Picture, Renderer};
 pub use self::view::{View, ViewReport};
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::in_part::{Part, Parts};
-use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, levels, memory};
+use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, levels, memory};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
@@ -12,7 +12,7 @@ use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
-use crate::scene::{self, Bounds, Camera, KernelFaults};
+use crate::scene::{self, Bounds, Camera, KernelFaults, Maps};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -185,7 +185,7 @@ impl Renderer {
     }
 
     /// The scene, or an overview of files that are read in part.
-    fn scene(&self) -> &scene::Scene {
+    pub(super) fn scene(&self) -> &scene::Scene {
         match &self.drawn {
             Drawn::Whole { scene, .. } => scene,
             Drawn::Parts { parts, .. } => parts.overview(),
@@ -208,12 +208,18 @@ impl Renderer {
     /// [`Error::Limit`] if a limit of the adapter is too small, [`Error::Usage`] if the limit of
     /// memory is too small, and errors of reading and of the device.
     pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
+        let is_told = !self.views;
+        self.rendered(view, is_told, progress)
+    }
+
+    /// Renders a view, and describes it in a note if `is_told`: many views would give a line each.
+    pub(super) fn rendered(&mut self, view: &View, is_told: bool, progress: &dyn Progress) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
-        // Many views would give a line each.
+        let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
-            if !*views {
+            if is_told {
                 progress.note(&view.sentence());
                 view.warning().iter().for_each(|warning| progress.note(warning));
             }
@@ -223,7 +229,7 @@ impl Renderer {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let rendered = renderer.frame(&camera, progress)?;
-                Ok(picture(scene, settings, rendered, (camera, view), None))
+                Ok(picture(scene, settings, rendered, (camera, view), (None, maps)))
             }
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read } =
@@ -234,13 +240,13 @@ impl Renderer {
                 }
                 let view = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
                 tell(&view);
-                if !*views {
+                if is_told {
                     progress.note(&read.sentence());
                 }
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), Some(read)))
+                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), maps)))
             }
         }
     }
@@ -292,14 +298,16 @@ fn whole(
     Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
 }
 
-/// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
+/// Combines a rendered frame with its view and counts, with `maps` that are made from others, and
+/// with the reason if the frame is empty.
 fn picture(
     scene: &scene::Scene,
     settings: &Settings,
     (frame, report): (Frame, Report),
     (camera, view): (Camera, ViewReport),
-    read: Option<ReadReport>,
+    (read, maps): (Option<ReadReport>, Maps),
 ) -> Picture {
+    let frame = heights::made(frame, &camera, scene.up.axis(), maps);
     let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
     Picture { frame, report, camera, view, read, unseen }
 }

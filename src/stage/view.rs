@@ -13,7 +13,6 @@ use crate::options::parse::{up_argument, vector_argument};
 use crate::options::values::Ortho;
 use crate::scene::camera::{DEFAULT_FOV, check_near};
 use crate::scene::framing::fitted_height;
-use crate::scene::side::ELEVATION;
 use crate::scene::{Camera, Lens, Scene, Side, Up};
 
 /// A view, complete except for values from the scene, such as the scene's centre.
@@ -79,13 +78,7 @@ impl View {
         if let Some(path) = &options.file {
             return Self::of_file(options, camera::read(path)?, path, None);
         }
-        let (lens, option) = match (options.intrinsics, options.ortho) {
-            (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
-            (None, Some(Ortho::Height(height))) => (Lens::OrthographicHeight(height), "--ortho"),
-            // The scene decides the height.
-            (None, Some(Ortho::Fit)) => (Lens::OrthographicHeight(1.0), "--ortho"),
-            (None, None) => (Lens::Fov(options.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
-        };
+        let (lens, option) = options.lens();
         let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_option(options)?;
@@ -94,7 +87,7 @@ impl View {
             return Err(Error::Usage("--ortho needs its HEIGHT with --eye: without --eye the scene decides it".into()));
         }
         let place = match (options.eye, options.target) {
-            (None, _) => Place::Framed { side: side(options)?, up: options.up, fits },
+            (None, _) => Place::Framed { side: options.side()?, up: options.up, fits },
             (Some(eye), None) => Place::Eye(eye, options.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, options.up)),
         };
@@ -324,14 +317,6 @@ fn turned(camera: &Camera, up: DVec3, scene_up: Up) -> Option<String> {
 /// Returns an error of a value, prefixed with the option or file that it came from.
 fn said_by(who: impl Display, error: Error) -> Error {
     Error::Usage(format!("{who}: {error}"))
-}
-
-/// Returns the side from which the options have the scene in view, if they say so.
-fn side(options: &CameraOptions) -> Result<Option<Side>> {
-    match (options.azimuth, options.elevation) {
-        (None, None) => Ok(options.from),
-        (azimuth, elevation) => Side::at(azimuth.unwrap_or(180.0), elevation.unwrap_or(ELEVATION)).map(Some),
-    }
 }
 
 fn check_near_option(options: &CameraOptions) -> Result<()> {

@@ -6,7 +6,9 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod formats;
 mod limits;
+mod maps;
 mod rule;
 mod second_hand;
 #[cfg(unix)]

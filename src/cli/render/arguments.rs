@@ -1,21 +1,23 @@
 //! The arguments of `epsplat render`: inputs, views and the options of a picture.
 
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::Files;
+use epsplat::io::images::ImageFormat;
 use epsplat::options::parse::scale;
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 
 use super::super::inputs::help_of_all;
 use super::super::outputs::Source;
-use super::output::Format;
 
-/// Render point clouds and meshes to a PNG or EXR image.
+/// Render point clouds and meshes to images: PNG, EXR, JPEG or NumPy arrays.
 ///
 /// Without a camera the scene is framed from its bounds. Several inputs make one scene. With
-/// --cameras there is a picture for each camera of a file, in a folder; pictures that are already
-/// written stay if a later one fails.
+/// --cameras there is a picture for each camera of a file, and with --turntable one for each step
+/// around the scene, in a folder; pictures that are already written stay if a later one fails.
 #[derive(Args)]
 #[command(
     allow_negative_numbers = true,
@@ -33,13 +35,24 @@ use super::output::Format;
     epsplat render statue.ply -o hall.png --triangles hall.obj\n  \
     epsplat render skin.ply shirt.ply -o dressed.png --separate\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
-    epsplat render scan.laz -o views --cameras transforms.json"
+    epsplat render scan.laz -o ortho.tif --pixel-size 0.5\n  \
+    epsplat render scan.laz -o height.tif --pixel-size 0.5 --aov height\n  \
+    epsplat render scan.laz -o views --cameras transforms.json\n  \
+    epsplat render scan.laz -o depth.png --aov depth --depth-scale 100\n  \
+    epsplat render scan.laz -o - --turntable 90 --format raw --size 640x480 |\n    \
+    ffmpeg -f rawvideo -pix_fmt rgba -s 640x480 -r 30 -i - turntable.mp4"
 )]
 pub struct Arguments {
     #[arg(required_unless_present = "triangles", help = help_of_all("Point clouds or meshes, which become surfels"))]
     pub(super) inputs: Vec<PathBuf>,
-    /// The image, .png (8-bit sRGB) or .exr (linear, with maps); with --cameras a folder of images
-    #[arg(short, long)]
+    /// The image, .png, .exr (linear, with maps), .jpg, .npy or .npz; - for standard output; with
+    /// --cameras or --turntable a folder of images
+    ///
+    /// .png: 8-bit sRGB, straight alpha; with --depth-scale 16-bit depths. .exr: linear f32, with
+    /// the maps of --aov as channels. .jpg: 8-bit sRGB over white, or over an opaque --background.
+    /// .npy: linear f32 (H, W, 4), or the only map of --aov. .npz: an array for the colour and for
+    /// each map. Standard output has to be a pipe or a file; all notes go to stderr
+    #[arg(short, long, allow_hyphen_values = true)]
     pub(super) output: PathBuf,
     #[command(flatten)]
     pub(super) camera: CameraOptions,
@@ -51,9 +64,35 @@ pub struct Arguments {
     pub(super) scene: SceneOptions,
     #[command(flatten)]
     pub(super) device: DeviceOptions,
+    #[command(flatten)]
+    pub(super) file: FileArguments,
+}
+
+/// The files that are written.
+#[derive(Args)]
+#[command(next_help_heading = "Output")]
+pub(super) struct FileArguments {
+    /// Format of images in a folder or on standard output [default: png; exr in a folder with --aov]
+    ///
+    /// The format of a single file follows from its extension. raw: four bytes a pixel (red, green,
+    /// blue, alpha as in a PNG) without a header, for pipes to video encoders
+    #[arg(long, value_parser = formats(), hide_short_help = true)]
+    pub(super) format: Option<ImageFormat>,
+    /// Write --aov depth as 16-bit PNG: each value is depth times SCALE, and 0 is nothing
+    ///
+    /// Depths are rounded to the nearest integer. With coordinates in metres, 1000 makes the
+    /// millimetres of ScanNet and others, and 5000 the unit of TUM's files. A depth above
+    /// 65535/SCALE is an error
+    #[arg(long, value_name = "SCALE", value_parser = scale, hide_short_help = true)]
+    pub(super) depth_scale: Option<f64>,
     /// Write times, counts and adapter as JSON, to a file or - for standard output
-    #[arg(long, value_name = "FILE|-", help_heading = "Output")]
+    #[arg(long, value_name = "FILE|-")]
     pub(super) json: Option<PathBuf>,
+}
+
+/// Parses the names of the image formats that this build writes.
+fn formats() -> impl TypedValueParser<Value = ImageFormat> {
+    PossibleValuesParser::new(ImageFormat::names()).try_map(|name| name.parse::<ImageFormat>())
 }
 
 /// The cameras of many pictures.
@@ -64,11 +103,15 @@ pub(super) struct ViewArguments {
     ///
     /// A transforms.json has the format of NeRF, instant-ngp or nerfstudio. Each picture is named
     /// after its camera's image, folders included
-    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics"])]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics", "pixel_size"])]
     pub(super) cameras: Option<PathBuf>,
-    /// Format of the images of --cameras [default: png; exr with --aov]
-    #[arg(long, value_enum, requires = "cameras", hide_short_help = true)]
-    pub(super) format: Option<Format>,
+    /// N pictures around the scene, from the elevation of the default view or the side of --from
+    ///
+    /// The camera moves counter-clockwise, seen from above, in N equal steps around the up axis
+    /// through the scene's centre, at one distance from which the whole scene stays in view. The
+    /// pictures are named 0000.png and so on
+    #[arg(long, value_name = "N", conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics", "pixel_size"], hide_short_help = true)]
+    pub(super) turntable: Option<NonZeroU32>,
     /// Factor of the width and height of --cameras' images; intrinsics are scaled too
     #[arg(long, value_name = "FACTOR", value_parser = scale, requires = "cameras", hide_short_help = true)]
     pub(super) scale: Option<f64>,

@@ -1,53 +1,11 @@
-//! Outputs of a render: images, the summary and notes on stderr.
+//! The summary of a render and notes on stderr.
 
 use std::num::NonZeroU64;
 use std::path::Path;
 
-use clap::ValueEnum;
-use epsplat::low_level::frame::Frame;
 use epsplat::low_level::render::Report;
-use epsplat::{Error, Result, io};
 
 use super::super::note;
-
-/// File format of images.
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-pub(super) enum Format {
-    /// 8-bit sRGB
-    Png,
-    /// Linear f32, every map a layer
-    Exr,
-}
-
-impl Format {
-    /// Returns the format of an output by its extension.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Usage`] if the extension is neither png nor exr.
-    pub(super) fn of(path: &Path) -> Result<Self> {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
-            Some("png") => Ok(Self::Png),
-            Some("exr") => Ok(Self::Exr),
-            _ => Err(Error::Usage(format!("the output must end in .png or .exr, {} does not", path.display()))),
-        }
-    }
-
-    /// Returns the file extension.
-    pub(super) fn extension(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Exr => "exr",
-        }
-    }
-
-    pub(super) fn write(self, path: &Path, frame: &Frame) -> Result<()> {
-        match self {
-            Self::Png => io::png::write(path, frame),
-            Self::Exr => io::exr::write(path, frame),
-        }
-    }
-}
 
 /// Prints a note if sums overflowed, so that the frame was rendered twice.
 pub(super) fn note_overflows(report: &Report) {

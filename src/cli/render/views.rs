@@ -1,9 +1,9 @@
-//! `epsplat render --cameras`: renders a picture for each camera. While one picture is rendered,
-//! earlier pictures are encoded and written.
+//! `epsplat render` with `--cameras` or `--turntable`: renders a picture for each camera. While one
+//! picture is rendered, earlier pictures are encoded and written.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -16,8 +16,9 @@ use serde::Serialize;
 use super::super::outputs::Source;
 use super::super::progress::{Bars, Notes};
 use super::super::{note, outputs, write_json};
-use super::output::{Format, note_cut, note_overflows};
-use super::{Arguments, check_format};
+use super::Arguments;
+use super::output::{note_cut, note_overflows};
+use super::target::Target;
 
 /// Limit of host memory for frames that wait for a writer or are being written, bytes.
 ///
@@ -53,29 +54,59 @@ struct Reports {
     total_ms: f64,
 }
 
-/// Renders a picture for each camera of the set at `path`.
-pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
+/// The pictures of a command: their files, and their views unless these depend on the scene.
+struct Shots {
+    files: Vec<PathBuf>,
+    views: Option<Vec<View>>,
+}
+
+impl Shots {
+    fn of(arguments: &Arguments, target: &Target) -> Result<Self> {
+        if let Some(path) = &arguments.views.cameras {
+            let (files, views) = views(arguments, path, target)?.into_iter().unzip();
+            return Ok(Self { files, views: Some(views) });
+        }
+        // Finds faults of the lens before anything is read.
+        View::new(&arguments.camera)?;
+        let count = arguments.views.turntable.map_or(0, |count| count.get());
+        let digits = count.saturating_sub(1).to_string().len().max(4);
+        let files = (0..count).map(|step| file_of(arguments, target, &format!("{step:0digits$}"))).collect();
+        Ok(Self { files, views: None })
+    }
+
+    /// Returns the number of pixels of the largest picture.
+    fn pixels(&self, arguments: &Arguments) -> u64 {
+        let (width, height) = arguments.camera.size.unwrap_or(View::DEFAULT_SIZE);
+        let views = self.views.iter().flatten().map(View::pixels).max();
+        views.unwrap_or(u64::from(width) * u64::from(height))
+    }
+}
+
+/// Renders a picture for each camera.
+pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     let maps = Maps::of(&arguments.options.maps.aov);
-    let format = arguments.views.format.unwrap_or(if maps == Maps::NONE { Format::Png } else { Format::Exr });
-    check_format(arguments, format)?;
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
     Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
-    let views = views(arguments, path, format)?;
-    check_outputs(arguments, &files, path, &views)?;
+    let shots = Shots::of(arguments, target)?;
+    check_outputs(arguments, &files, target, &shots.files)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
 
     let bars = Bars::new();
-    let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
-    let writers = writers(largest, maps);
+    // A stream has the pictures in order, so a single thread writes them.
+    let writers = if target.is_standard { NonZeroUsize::MIN } else { writers(shots.pixels(arguments), maps) };
     let renderer = Renderer::of_views(&scene, &arguments.options, &arguments.device, &bars)?;
     let mut renderer = renderer.with_frames(writers.get() as u64 + 1);
+    let views = match (shots.views, arguments.views.turntable) {
+        (Some(views), _) => views,
+        (None, count) => renderer.turntable(&arguments.camera, count.unwrap_or(NonZeroU32::MIN))?,
+    };
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
     // The bar counts views and not their stages.
     let notes = Notes;
     // The first empty picture with the reason, and the number of empty pictures.
     let empty = RefCell::new((None, 0));
-    let frames = views.iter().map(|(file, view)| {
+    let frames = shots.files.iter().zip(&views).map(|(file, view)| {
         let picture = renderer.frame(view, &notes).map_err(|error| error.of_view(file))?;
         if let Some(unseen) = &picture.unseen {
             let (first, count) = &mut *empty.borrow_mut();
@@ -86,14 +117,14 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     });
     let pictures = write_behind(writers, frames, |(file, picture)| {
         let start = Instant::now();
-        if let Some(folder) = file.parent() {
+        if let Some(folder) = file.parent().filter(|_| !target.is_standard) {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(file, error))?;
         }
         let Picture { frame, report, read, .. } = picture;
-        format.write(file, &frame)?;
+        target.write(file, &frame)?;
         bars.advance(1);
         let write_ms = start.elapsed().as_secs_f64() * 1e3;
-        let bits = arguments.json.as_ref().map(|_| frame.hashes());
+        let bits = arguments.file.json.as_ref().map(|_| frame.hashes());
         Ok(Written { file: file.clone(), report, read, bits, write_ms })
     });
     bars.end();
@@ -102,6 +133,12 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
         note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));
     }
     tell(arguments, pictures, writers, start)
+}
+
+/// Returns the file of the picture `name`. On standard output it is only a name for messages.
+fn file_of(arguments: &Arguments, target: &Target, name: &str) -> PathBuf {
+    let file = format!("{name}.{}", target.format.name());
+    if target.is_standard { file.into() } else { arguments.output.join(file) }
 }
 
 /// Prints notes and the summary or JSON of all pictures. `start` is the time at which the scene was
@@ -116,7 +153,7 @@ fn tell(arguments: &Arguments, views: Vec<Written>, writers: NonZeroUsize, start
         total_ms: start.elapsed().as_secs_f64() * 1e3,
         views,
     };
-    match &arguments.json {
+    match &arguments.file.json {
         Some(path) => write_json(path, &reports),
         None => {
             note(&summary(&reports, &arguments.output));
@@ -131,7 +168,7 @@ fn tell(arguments: &Arguments, views: Vec<Written>, writers: NonZeroUsize, start
 ///
 /// [`Error::Malformed`] if a lens is distorted, unless `--ignore-distortion` is given, or an error
 /// of a view that the arguments contradict.
-fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(PathBuf, View)>> {
+fn views(arguments: &Arguments, path: &Path, target: &Target) -> Result<Vec<(PathBuf, View)>> {
     let cameras = cameras::read(path, arguments.camera.size.unwrap_or(View::DEFAULT_SIZE))?;
     let distorted = cameras.iter().filter(|camera| camera.distortion.is_some());
     if let Some((first, (name, value))) = distorted.clone().find_map(|camera| Some((&camera.name, camera.distortion?)))
@@ -148,7 +185,7 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
         note(&format!("the lens distortion of {} cameras is left out", distorted.count()));
     }
     let view = |camera: cameras::NamedCamera| {
-        let file = arguments.output.join(format!("{}.{}", camera.name, format.extension()));
+        let file = file_of(arguments, target, &camera.name);
         let view = View::of_file(&arguments.camera, camera.camera, path, arguments.views.scale)
             .map_err(|error| error.of_view(&file))?;
         Ok((file, view))
@@ -157,13 +194,19 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
 }
 
 /// Fails, before anything is rendered, if a picture would overwrite an input or cannot be written.
-fn check_outputs(arguments: &Arguments, inputs: &Files, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
+fn check_outputs(arguments: &Arguments, inputs: &Files, target: &Target, files: &[PathBuf]) -> Result<()> {
+    let cameras = arguments.views.cameras.as_deref();
+    let of_colmap = cameras.map(|cameras| ["cameras.txt", "images.txt"].map(|name| cameras.join(name)));
+    let of_cameras = cameras.map(Source::other).into_iter().chain(of_colmap.iter().flatten().map(Source::other));
+    let read = arguments.files(inputs).chain(of_cameras);
+    let json = arguments.file.json.as_deref();
+    if target.is_standard {
+        return outputs::check(read, json);
+    }
     check_folder(&arguments.output, cameras)?;
-    let of_colmap = ["cameras.txt", "images.txt"].map(|name| cameras.join(name));
-    let read = arguments.files(inputs).chain([Source::other(cameras)]).chain(of_colmap.iter().map(Source::other));
-    let pictures = views.iter().map(|(file, _)| file.as_path());
-    outputs::check_distinct(read, pictures.clone().chain(arguments.json.as_deref()))?;
-    arguments.json.iter().try_for_each(|json| outputs::try_output(json))?;
+    let pictures = files.iter().map(PathBuf::as_path);
+    outputs::check_distinct(read, pictures.clone().chain(json))?;
+    json.iter().try_for_each(|json| outputs::try_output(json))?;
     if let Ok(root) = arguments.output.canonicalize()
         && let Some(file) =
             pictures.clone().find(|file| !atomic::place_of(file).is_some_and(|at| at.starts_with(&root)))
@@ -179,15 +222,18 @@ fn check_outputs(arguments: &Arguments, inputs: &Files, cameras: &Path, views: &
 ///
 /// Pictures have the names of the cameras' photographs, so in that folder they would overwrite
 /// these.
-fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
+fn check_folder(output: &Path, cameras: Option<&Path>) -> Result<()> {
     if output.metadata().is_ok_and(|output| !output.is_dir()) {
         return Err(Error::write(output, std::io::ErrorKind::NotADirectory.into()));
     }
     let or_current =
         |folder: &'_ Path| if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() };
-    let beside = if cameras.is_dir() { cameras } else { cameras.parent().unwrap_or(Path::new("")) };
-    if let (Ok(output), Ok(beside)) = (output.canonicalize(), or_current(beside).canonicalize())
-        && output == beside
+    let beside = cameras.map(|cameras| match cameras.is_dir() {
+        true => cameras,
+        false => cameras.parent().unwrap_or(Path::new("")),
+    });
+    if let (Ok(output), Some(beside)) = (output.canonicalize(), beside)
+        && or_current(beside).canonicalize().is_ok_and(|beside| output == beside)
     {
         return Err(Error::Usage(
             "the pictures would overwrite the cameras' photographs, which have the same names: choose another folder"

@@ -5,6 +5,7 @@ use super::extra::{self, Field, Normals};
 use super::system::{self, System};
 use crate::io::about::{About, Attribute, Role};
 use crate::io::fault::Fault;
+use crate::io::place::GeoKeys;
 use las::point::Format;
 use las::raw::{Header, Vlr};
 use std::io::{Read, Seek, SeekFrom};
@@ -34,6 +35,8 @@ pub(super) struct Found {
     pub about: About,
     /// Whether coordinates are degrees, if a coordinate system says so.
     pub geographic: Option<bool>,
+    /// The keys of the coordinate system.
+    pub keys: Option<GeoKeys>,
     /// The normals among the extra bytes of points.
     pub normals: Option<Normals>,
     /// Sentences about odd fields.
@@ -75,7 +78,8 @@ pub(super) fn look(
     let own = Format::new(header.point_data_record_format & 0x3f).map_or(0, |format| format.len());
     let normals = Normals::of(&extra, own);
     let about = about(header, system, &extra);
-    Ok(Found { about, geographic, normals, notes, bounds, step: scales.map(f64::abs) })
+    let keys = systems.geo_keys();
+    Ok(Found { about, geographic, keys, normals, notes, bounds, step: scales.map(f64::abs) })
 }
 
 impl Found {

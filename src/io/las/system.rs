@@ -1,11 +1,13 @@
 //! The coordinate system that the records of a LAS file name, by text (WKT) or by GeoTIFF keys.
 
+use crate::io::place::GeoKeys;
 use las::raw::Vlr;
 use std::io::{Read, Seek, SeekFrom};
 
 /// User and ids of the records: GeoTIFF keys, the texts of keys, and well-known text.
 const USER: &[u8] = b"LASF_Projection";
 const KEYS: u16 = 34735;
+const DOUBLES: u16 = 34736;
 const TEXTS: u16 = 34737;
 const TEXT: u16 = 2112;
 
@@ -14,6 +16,9 @@ const MODEL: u16 = 1024;
 const GEOGRAPHIC: u16 = 2048;
 const PROJECTED: u16 = 3072;
 const CITATIONS: [u16; 3] = [3073, 1026, 2049];
+
+/// The keys of which a coordinate system has at least one.
+const MODELS: [u16; 3] = [MODEL, GEOGRAPHIC, PROJECTED];
 
 /// The kind of model whose coordinates are degrees; others are projected or geocentric.
 const MODEL_OF_DEGREES: u16 = 2;
@@ -32,6 +37,7 @@ const EXTENDED_HEADER: u64 = 60;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Records {
     keys: Vec<u16>,
+    doubles: Vec<f64>,
     texts: Vec<u8>,
     pub text: Option<String>,
 }
@@ -47,6 +53,7 @@ impl Records {
         }
         match id {
             KEYS => self.keys = data.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect(),
+            DOUBLES => self.doubles = data.as_chunks().0.iter().map(|number| f64::from_le_bytes(*number)).collect(),
             TEXTS => self.texts = data.to_vec(),
             TEXT => {
                 let text = data.split(|byte| *byte == 0).next().unwrap_or_default();
@@ -55,6 +62,27 @@ impl Records {
             }
             _ => {}
         }
+    }
+
+    /// Returns the keys of the horizontal coordinate system: those of the file, or else the EPSG
+    /// code in the text. None if the records give neither.
+    pub fn geo_keys(&self) -> Option<GeoKeys> {
+        self.own_keys().or_else(|| {
+            let text = self.text.as_deref()?;
+            let (system, geographic) = horizontal(text)?;
+            Some(GeoKeys::of_code(code_of_whole(system)?.parse().ok()?, geographic))
+        })
+    }
+
+    /// Returns the keys of the file as they are, if there are any.
+    fn own_keys(&self) -> Option<GeoKeys> {
+        let &[_, _, _, count] = self.keys.first_chunk::<4>()?;
+        let entries: Vec<[u16; 4]> = self.keys.as_chunks::<4>().0.iter().skip(1).take(count.into()).copied().collect();
+        // Texts of keys are ASCII; each key refers to them by position.
+        let end = self.texts.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        let texts = self.texts[..end].iter().map(|byte| if (32..127).contains(byte) { char::from(*byte) } else { '?' });
+        let keys = GeoKeys { entries, doubles: self.doubles.clone(), texts: texts.collect() };
+        keys.entries.iter().any(|entry| MODELS.contains(&entry[0])).then_some(keys)
     }
 
     /// Looks for a text among extended records; ignores those that cannot be read.
@@ -87,6 +115,38 @@ fn code_of_whole(text: &str) -> Option<&str> {
     let start = start.trim_end_matches(['"', ' ']).to_ascii_uppercase();
     let is_code = start.ends_with("AUTHORITY[\"EPSG\",") || start.ends_with("ID[\"EPSG\",");
     (is_code && digits > 0).then_some(code)
+}
+
+/// Returns the part of a text that describes the horizontal system, and whether its coordinates are
+/// degrees. Texts may join it with a vertical system.
+fn horizontal(text: &str) -> Option<(&str, bool)> {
+    let upper = text.to_ascii_uppercase();
+    let words = [("PROJCS[", false), ("PROJCRS[", false), ("PROJECTEDCRS[", false)];
+    let degrees = [("GEOGCS[", true), ("GEOGCRS[", true), ("GEODCRS[", true), ("GEOGRAPHICCRS[", true)];
+    let found = |(word, geographic): &(&str, bool)| {
+        let start = upper.find(word)?;
+        Some((part(text.get(start..)?)?, *geographic))
+    };
+    words.iter().chain(&degrees).find_map(found)
+}
+
+/// Returns the start of a text up to the bracket that closes its first one.
+fn part(text: &str) -> Option<&str> {
+    let (mut depth, mut quoted) = (0u32, false);
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            b'"' => quoted = !quoted,
+            b'[' if !quoted => depth += 1,
+            b']' if !quoted => {
+                depth = depth.checked_sub(1)?;
+                if depth == 0 {
+                    return text.get(..=at);
+                }
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 /// A coordinate system.
@@ -143,6 +203,25 @@ impl System {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_are_copied_or_come_from_the_code_of_the_horizontal_system() {
+        let record = |text: &str| Records { text: Some(text.into()), ..Records::default() }.geo_keys();
+        let utm = r#"PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],UNIT["metre",1],AUTHORITY["EPSG","32632"]]"#;
+        let height = r#"VERT_CS["EGM96 [m]",AUTHORITY["EPSG","5773"]]"#;
+        let compound = format!(r#"COMPD_CS["both",{utm},{height},AUTHORITY["EPSG","1"]]"#);
+        assert_eq!(record(utm), Some(GeoKeys::of_code(32632, false)));
+        assert_eq!(record(&compound), Some(GeoKeys::of_code(32632, false)));
+        let degrees = r#"GEOGCRS["WGS 84 [x]",DATUM["World Geodetic System 1984"],ID["EPSG",4326]]"#;
+        assert_eq!(record(degrees), Some(GeoKeys::of_code(4326, true)));
+        // The code of a part of the system is not its own.
+        assert_eq!(record(r#"PROJCS["own",GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]],UNIT["metre",1]]"#), None);
+        assert_eq!(record("PROJCS[\"broken"), None);
+        let keys = vec![1, 1, 0, 2, MODEL, 0, 1, 1, 3072, 0, 1, 25832, 0, 0, 0, 0];
+        let records = Records { keys, doubles: vec![0.5], texts: b"ETRS|\0\0".to_vec(), ..Records::default() };
+        let entries = vec![[MODEL, 0, 1, 1], [3072, 0, 1, 25832]];
+        assert_eq!(records.geo_keys(), Some(GeoKeys { entries, doubles: vec![0.5], texts: "ETRS|".into() }));
+    }
 
     #[test]
     fn systems_are_named_and_degrees_known() {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::io::{About, Points, class_name};
+use epsplat::io::{About, Points, Span, class_name};
 use epsplat::low_level::scene::{Colors, Scene, gaussian};
 use epsplat::low_level::surfels::{self, ASLANT, Coverage, Preparation};
 use epsplat::options::InputOptions;
@@ -48,6 +48,8 @@ struct Info {
     #[serde(skip_serializing_if = "Option::is_none")]
     points_with_radii: Option<u64>,
     colors: &'static str,
+    /// Attributes for --color-by and --where, with their ranges.
+    attributes: Vec<Span>,
     /// Statistics of a file of Gaussians; None for other files.
     gaussians: Option<Gaussians>,
     /// Number of points of each class of a laser scan.
@@ -153,6 +155,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             )),
         };
     }
+    let attributes = std::mem::take(&mut points.spans);
     let bounds = surfels::bounds(&points);
     let is_mesh = points.faces.is_some();
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
@@ -184,6 +187,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: held.1,
         radii: held.2,
         colors: held.3,
+        attributes,
         gaussians,
         classes,
         levels_of_detail: LevelsOfDetail::of(&scene),
@@ -235,6 +239,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  points    {}", info.points);
     told(&mut text, &info.file);
     held(&mut text, info);
+    ranges(&mut text, &info.attributes);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
     if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
@@ -311,10 +316,35 @@ fn told(text: &mut String, about: &About) {
     }
 }
 
+/// The most attributes that are listed: Gaussians have 45 for the coefficients of harmonics alone.
+const MOST: usize = 24;
+
+/// Writes a line for each attribute with its range.
+fn ranges(text: &mut String, attributes: &[Span]) {
+    let width = attributes.iter().take(MOST).map(|span| shown(&span.name).chars().count()).max().unwrap_or(0);
+    let mut head = "ranges";
+    for span in attributes.iter().take(MOST) {
+        let range = match span.range {
+            Some([low, high]) if low == high => format!("{}", rounded(low)),
+            Some([low, high]) => format!("{} to {}", rounded(low), rounded(high)),
+            None => "no number".to_owned(),
+        };
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "  {head:<9} {:<width$}  {range}", shown(&span.name));
+        head = "";
+    }
+    if let Some(more) = attributes.len().checked_sub(MOST).filter(|more| *more > 0) {
+        let _ = writeln!(text, "            and {more} more");
+    }
+}
+
+/// A number without the noise of its last digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
 /// Joins names with commas, at most the first 24.
 fn listed(names: &[String]) -> String {
-    /// Gaussians have 45 attributes for the coefficients of harmonics alone.
-    const MOST: usize = 24;
     let more = names.len().saturating_sub(MOST);
     let first = names[..names.len() - more].join(", ");
     if more > 0 { format!("{first} and {more} more") } else { first }

@@ -6,6 +6,7 @@
 
 mod camera;
 mod check;
+mod colors;
 mod device;
 mod group;
 mod input;
@@ -23,6 +24,7 @@ mod triangles;
 pub mod values;
 
 pub use camera::CameraOptions;
+pub use colors::ColorOptions;
 pub use device::{Chosen, DeviceOptions};
 pub use input::{FormatOptions, InputOptions};
 pub use levels::LevelOptions;
@@ -61,6 +63,9 @@ pub struct SceneOptions {
     /// How files are read.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub input: InputOptions,
+    /// The attribute that points are coloured by.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub colors: ColorOptions,
     /// How points become surfels.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub surfels: SurfelOptions,

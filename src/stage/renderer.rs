@@ -12,7 +12,7 @@ use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
-use crate::scene::{self, Bounds, Camera, KernelFaults};
+use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -34,6 +34,8 @@ pub(super) enum Drawn {
     Whole {
         scene: Arc<scene::Scene>,
         guessed_up: bool,
+        /// The meaning of colours, if they show an attribute.
+        key: Option<ColorKey>,
         renderer: Box<render::Renderer<Arc<scene::Scene>, Arc<Backend>>>,
     },
     /// Files of which each view reads a part.
@@ -59,6 +61,8 @@ pub struct Picture {
     pub read: Option<ReadReport>,
     /// Why nothing is visible; None if something is.
     pub unseen: Option<Unseen>,
+    /// The meaning of the colours, if they show an attribute.
+    pub key: Option<ColorKey>,
 }
 
 impl Renderer {
@@ -219,14 +223,14 @@ impl Renderer {
             }
         };
         match drawn {
-            Drawn::Whole { scene, guessed_up, renderer } => {
+            Drawn::Whole { scene, guessed_up, key, renderer } => {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let rendered = renderer.frame(&camera, progress)?;
-                Ok(picture(scene, settings, rendered, (camera, view), None))
+                Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())))
             }
             Drawn::Parts { parts, noted } => {
-                let Part { made: (scene, preparation), settings, read } =
+                let Part { made: (scene, preparation), settings, read, key } =
                     parts.scene(&request, (&camera, *frames), settings, progress)?;
                 let first = !std::mem::replace(noted, true);
                 if first {
@@ -240,7 +244,7 @@ impl Renderer {
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), Some(read)))
+                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)))
             }
         }
     }
@@ -289,7 +293,8 @@ fn whole(
     let renderer = render::Renderer::new(whole.scene.clone(), &settings, backend.clone())?;
     renderer.kernel_faults().and_then(KernelFaults::sentence).iter().for_each(|line| progress.note(line));
     let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
-    Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
+    let key = whole.key.clone();
+    Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
 }
 
 /// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
@@ -298,8 +303,8 @@ fn picture(
     settings: &Settings,
     (frame, report): (Frame, Report),
     (camera, view): (Camera, ViewReport),
-    read: Option<ReadReport>,
+    (read, key): (Option<ReadReport>, Option<ColorKey>),
 ) -> Picture {
     let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
-    Picture { frame, report, camera, view, read, unseen }
+    Picture { frame, report, camera, view, read, unseen, key }
 }

@@ -9,6 +9,7 @@ mod complete;
 mod coverage;
 mod creases;
 mod curvature;
+mod density;
 mod eigen;
 mod ellipse;
 mod estimate;
@@ -47,6 +48,7 @@ use rayon::prelude::*;
 
 pub use self::build::{Coordinates, build, build_at_vertices, build_textured, build_within};
 pub use self::caps::curve;
+pub(crate) use self::density::densities;
 pub use self::coverage::{ASLANT, Coverage, coverage};
 pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};

@@ -1,7 +1,8 @@
 //! The meaning of a PCD file's fields, and their conversion to points.
 
 use super::header::{Field, Header, Scalar};
-use crate::io::Points;
+use crate::io::dimensions::Collector;
+use crate::io::{Points, ReadOptions, Wanted};
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
@@ -23,7 +24,37 @@ pub(super) struct Columns {
     normal: Option<[usize; 3]>,
     color: Option<Color>,
     intensity: Option<usize>,
+    /// The attributes that options ask for.
+    wants: Option<Wants>,
 }
+
+/// The attributes of a point that options ask for.
+#[derive(Clone, Debug)]
+struct Wants {
+    /// The names of all attributes, and their cells.
+    names: Vec<String>,
+    wanted: Wanted,
+    /// The cells of the attributes that a collector needs, in its order.
+    cells: Vec<usize>,
+}
+
+/// The attributes of a point that are one number: the names and cells of all of them. The numbers
+/// of a longer field have an index in brackets, but a packed colour is none.
+fn numbers(header: &Header) -> (Vec<String>, Vec<Cell>) {
+    let is_number = |field: &Field| field.name != "_" && !(field.size == 4 && ["rgb", "rgba"].contains(&field.name.as_str()));
+    let fields = header.fields.iter().enumerate().filter(|(_, field)| is_number(field));
+    fields
+        .flat_map(|(index, field)| {
+            (0..field.count.min(MOST_NUMBERS)).map(move |part| {
+                let name = if field.count > 1 { format!("{}[{part}]", field.name) } else { field.name.clone() };
+                (name, Cell { field: index, part })
+            })
+        })
+        .unzip()
+}
+
+/// The most numbers of a field that are attributes; descriptors of shapes have hundreds.
+const MOST_NUMBERS: u64 = 16;
 
 /// The cells of a colour.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +78,24 @@ impl Field {
 }
 
 impl Columns {
-    pub(super) fn of(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
+    /// Finds the numbers that the options need.
+    pub(super) fn of(header: &Header, options: &ReadOptions) -> Result<Self, Fault> {
+        let mut columns = Self::without_wants(header, options.ignore_alpha)?;
+        let (names, cells) = numbers(header);
+        let Some(collector) = Collector::of(&names, &options.wanted)? else { return Ok(columns) };
+        let places = collector.fields.iter().map(|field| {
+            let cell = cells[*field];
+            columns.cells.iter().position(|known| *known == cell).unwrap_or_else(|| {
+                columns.cells.push(cell);
+                columns.cells.len() - 1
+            })
+        });
+        let cells = places.collect();
+        columns.wants = Some(Wants { names, wanted: options.wanted.clone(), cells });
+        Ok(columns)
+    }
+
+    fn without_wants(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
         let fields = &header.fields;
         // A field with a count of 0 is ignored, whatever its name.
         let names = fields.iter().map(|field| if field.count > 0 { field.name.as_str() } else { "" });
@@ -88,7 +136,7 @@ impl Columns {
             })
         };
         let intensity = find(attributes::INTENSITY, names.clone()).map(|field| cell(field, 0));
-        Ok(Self { cells, position, normal, color, intensity })
+        Ok(Self { cells, position, normal, color, intensity, wants: None })
     }
 
     /// Whether a cell's four bytes are a packed colour, whatever its type.
@@ -129,6 +177,7 @@ pub(super) struct Reading {
     colored: bool,
     /// Whether the intensities are integers.
     integer: bool,
+    collector: Option<Collector>,
 }
 
 impl Reading {
@@ -146,7 +195,11 @@ impl Reading {
         reserve(&mut shades, of(columns.intensity.is_some() && columns.color.is_none()))?;
         let field = columns.intensity.map(|cell| &header.fields[columns.cells[cell].field]);
         let integer = field.is_some_and(|field| field.scalar != Scalar::Float);
-        Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer })
+        let collector = match &columns.wants {
+            Some(wants) => Collector::of(&wants.names, &wants.wanted)?,
+            None => None,
+        };
+        Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer, collector })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -158,6 +211,12 @@ impl Reading {
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let columns = &self.columns;
         self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
+        if let (Some(collector), Some(wants)) = (&mut self.collector, &columns.wants) {
+            for row in 0..rows {
+                let position = columns.position.map(|cell| value(cell, row));
+                collector.mark(&position, |field| value(wants.cells[field], row));
+            }
+        }
         if let Some(normal) = columns.normal {
             self.normals.extend((0..rows).map(|row| normal.map(|cell| value(cell, row) as f32)));
         }
@@ -189,7 +248,7 @@ impl Reading {
         }
     }
 
-    pub(super) fn into_points(mut self) -> Points {
+    pub(super) fn into_points(mut self) -> Result<Points, Fault> {
         let count = self.positions.len();
         let colors = match self.columns.color {
             Some(Color::Packed(_, scalar, has_alpha)) => {
@@ -220,12 +279,10 @@ impl Reading {
         let shades = self.columns.intensity.filter(|_| !self.colored);
         let shades = shades.map(|_| Shades::Floats { values: self.shades, integer: self.integer });
         let raw = (colors.is_some() || shades.is_some()).then(|| Box::new(RawColors::of_run(count, colors, shades)));
-        Points {
-            positions: self.positions,
-            normals: self.columns.normal.map(|_| self.normals),
-            raw,
-            ..Points::default()
-        }
+        let normals = self.columns.normal.map(|_| self.normals);
+        let mut points = Points { positions: self.positions, normals, raw, ..Points::default() };
+        self.collector.map_or(Ok(()), |collector| collector.finish(&mut points, false))?;
+        Ok(points)
     }
 }
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::io::dimensions::Group;
-use crate::io::{ColorBy, Column, Points, class_color, class_name};
+use crate::io::{ColorBy, Column, Points, class_color, class_name, settle_colors};
 use crate::options::ColorOptions;
 use crate::options::values::{End, ValueRange};
 use crate::scene::color::{DEFAULT_COLOR, decoded, srgb8};
@@ -45,8 +45,11 @@ impl<'a> Coloring<'a> {
             Some(ColorBy::Normal) => return Ok(Some(vectors())),
             Some(by) => by,
         };
+        // Points in memory may still have the colours of a reader, which would replace these.
+        settle_colors(inputs);
         let columns = columns(by, inputs)?;
-        let name = columns.iter().find(|column| !column.values.is_empty()).map_or_else(|| by.to_string(), |c| c.name.clone());
+        let name =
+            columns.iter().find(|column| !column.values.is_empty()).map_or_else(|| by.to_string(), |c| c.name.clone());
         let group = Group::of(&name);
         let plain = self.options.color_map.is_none() && self.options.range.is_none();
         let colors = match group {
@@ -161,7 +164,8 @@ fn code_of(group: Group, value: f64) -> [u8; 3] {
 /// The numbers that occur, with their names and colours.
 fn categories(group: Group, columns: &[Column]) -> Vec<(String, [u8; 3])> {
     let numbers = |column: &Column| {
-        let whole = |index: usize| Some(column.value(index)).filter(|value| value.is_finite()).map(|value| value as u32);
+        let whole =
+            |index: usize| Some(column.value(index)).filter(|value| value.is_finite()).map(|value| value as u32);
         (0..column.values.len()).filter_map(whole).collect::<BTreeSet<u32>>()
     };
     let all: BTreeSet<u32> = columns.iter().flat_map(numbers).collect();
@@ -216,9 +220,8 @@ fn tinted(colors: Option<Colors>, codes: &[[u8; 3]], encoded: bool) -> Colors {
 
 /// Colours surfels by their normals: red, green and blue are the sRGB codes of 0.5 + 0.5 n.
 pub(super) fn by_normals(mut scene: Scene) -> Scene {
-    let code = |surfel: &crate::scene::Surfel| {
-        surfel.normal().to_array().map(|n| (255.0 * (0.5 + 0.5 * n)).round() as u8)
-    };
+    let code =
+        |surfel: &crate::scene::Surfel| surfel.normal().to_array().map(|n| (255.0 * (0.5 + 0.5 * n)).round() as u8);
     let codes: Vec<[u8; 3]> = scene.surfels.par_iter().map(code).collect();
     scene.colors = tinted(Some(std::mem::take(&mut scene.colors)), &codes, scene.encoded);
     scene.hierarchy = None;

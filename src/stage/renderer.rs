@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::in_part::{Part, Parts};
 use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, levels, memory};
+use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
@@ -214,6 +215,8 @@ impl Renderer {
     pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
+        let marks = options.marks.marks();
+        marks.check(&camera)?;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
         // Many views would give a line each.
         let tell = |view: &ViewReport| {
@@ -227,7 +230,7 @@ impl Renderer {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let rendered = renderer.frame(&camera, progress)?;
-                Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())))
+                picture(scene, settings, rendered, (camera, view), (None, key.clone())).marked(marks)
             }
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read, key } =
@@ -244,9 +247,20 @@ impl Renderer {
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)))
+                picture(&scene, &settings, rendered, (camera, view), (Some(read), key)).marked(marks)
             }
         }
+    }
+}
+
+impl Picture {
+    /// Draws marks on the frame.
+    fn marked(self, marks: Marks) -> Result<Self> {
+        if marks == Marks::default() {
+            return Ok(self);
+        }
+        let frame = marks.draw(self.frame, &self.camera, self.key.as_ref())?;
+        Ok(Self { frame, ..self })
     }
 }
 

@@ -16,6 +16,10 @@ impl Request<'_> {
     /// [`Error::Usage`] for options that cannot be combined.
     pub fn settings(&self) -> Result<Settings> {
         let settings = self.settled(false)?;
+        if self.options.marks.legend && !self.scene.options.colors.is_given() {
+            let what = "--legend shows the values of --color-by: give an attribute there, or leave --legend out";
+            return Err(Error::Usage(what.into()));
+        }
         if self.options.points.facing.is_some() && self.scene.options.colors.color_by == Some(ColorBy::Normal) {
             return Err(Error::Usage("--facing leaves points no normals: leave it or --color-by normal out".into()));
         }

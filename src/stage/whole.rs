@@ -92,7 +92,8 @@ pub(super) fn scene_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dy
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
     let options = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
-    let meshes = paths.iter().map(|path| io::read_mesh_with(path, options.clone(), progress)).collect::<Result<Vec<_>>>()?;
+    let meshes =
+        paths.iter().map(|path| io::read_mesh_with(path, options.clone(), progress)).collect::<Result<Vec<_>>>()?;
     let meshes = painted(meshes, &paths, request.triangles().texture.as_deref(), progress)?;
     meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| progress.note(line));
     let (scene, preparation) = of_surfels.unzip();

@@ -5,12 +5,12 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::LARGEST_COORDINATE;
 use super::neighbours::NeighbourSearch;
 use super::positions::DistinctPositions;
-use super::LARGEST_COORDINATE;
+use crate::Result;
 use crate::io::Points;
 use crate::scene::Bounds;
-use crate::Result;
 
 /// The number of neighbours within the circle whose area is taken.
 const COUNT: usize = 8;
@@ -63,7 +63,9 @@ mod tests {
         // Squares of side 0.5: four points per square unit. The eighth neighbour of a point inside
         // is its diagonal one, at 0.5 * sqrt(2), so the estimate is 8 / (pi / 2).
         let grid = |from: i32, to: i32| Points {
-            positions: (from..to).flat_map(|x| (0..9).map(move |y| [7e6 + 0.5 * f64::from(x), 0.5 * f64::from(y), 3.0])).collect(),
+            positions: (from..to)
+                .flat_map(|x| (0..9).map(move |y| [7e6 + 0.5 * f64::from(x), 0.5 * f64::from(y), 3.0]))
+                .collect(),
             ..Points::default()
         };
         // Two inputs: the points at their seam have neighbours in both.

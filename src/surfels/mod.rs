@@ -48,8 +48,8 @@ use rayon::prelude::*;
 
 pub use self::build::{Coordinates, build, build_at_vertices, build_textured, build_within};
 pub use self::caps::curve;
-pub(crate) use self::density::densities;
 pub use self::coverage::{ASLANT, Coverage, coverage};
+pub(crate) use self::density::densities;
 pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;

@@ -46,7 +46,9 @@ fn classes(item: &str) -> Option<Vec<u8>> {
         return Some((0..=255).filter(|class| class_name(*class).is_none()).collect());
     }
     let also = ALSO.iter().find(|(known, _)| *known == name).map(|(_, classes)| classes.to_vec());
-    also.or_else(|| (0..=255).find(|class| class_name(*class).is_some_and(|known| plain(known) == name)).map(|class| vec![class]))
+    also.or_else(|| {
+        (0..=255).find(|class| class_name(*class).is_some_and(|known| plain(known) == name)).map(|class| vec![class])
+    })
 }
 
 impl FromStr for ClassList {
@@ -97,7 +99,9 @@ mod tests {
         let others = list("others");
         assert!(!others.contains(&2) && others.contains(&64) && others.contains(&255) && others.len() > 200);
         let ground: ClassList = "2".parse().unwrap();
-        assert!(ground.has(2.0) && !ground.has(2.5) && !ground.has(-2.0) && !ground.has(f64::NAN) && !ground.has(258.0));
+        assert!(
+            ground.has(2.0) && !ground.has(2.5) && !ground.has(-2.0) && !ground.has(f64::NAN) && !ground.has(258.0)
+        );
         for bad in ["", "grass", "256", "5-3", "2,"] {
             assert!(bad.parse::<ClassList>().unwrap_err().to_string().contains("is no class"), "{bad}");
         }

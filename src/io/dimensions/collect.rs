@@ -224,10 +224,13 @@ impl Collector {
     pub fn finish(self, points: &mut Points, is_mesh: bool) -> Result<(), Fault> {
         let Self { conditions, column, spans, keep, filtered, .. } = self;
         if is_mesh && !conditions.is_empty() {
-            return Err(Fault::Usage("it is a mesh, and filters are for points: leave --where and --classes out".into()));
+            return Err(Fault::Usage(
+                "it is a mesh, and filters are for points: leave --where and --classes out".into(),
+            ));
         }
         points.column = column.map(|(name, _, values)| Box::new(values.into_column(name)));
-        let span = |(name, _, range): (String, Source, [f64; 2])| Span { name, range: Some(range).filter(|r| r[0] <= r[1]) };
+        let span =
+            |(name, _, range): (String, Source, [f64; 2])| Span { name, range: Some(range).filter(|r| r[0] <= r[1]) };
         points.spans = spans.into_iter().map(span).collect();
         points.filtered = filtered;
         if filtered == 0 || keep.is_empty() {
@@ -255,7 +258,8 @@ pub(in crate::io) fn of_positions(points: &mut Points, wanted: &Wanted) -> Resul
 /// The error for an attribute that a file does not have.
 fn missing(name: &str, names: &[String]) -> Fault {
     let own = names.iter().filter(|name| !["x", "y", "z"].iter().any(|axis| axis.eq_ignore_ascii_case(name)));
-    let all: Vec<String> = ["X", "Y", "Z"].into_iter().chain(own.map(String::as_str)).map(|name| shown(name.as_bytes())).collect();
+    let all: Vec<String> =
+        ["X", "Y", "Z"].into_iter().chain(own.map(String::as_str)).map(|name| shown(name.as_bytes())).collect();
     let more = all.len().saturating_sub(MOST_NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let what = if Group::of(name) == Some(Group::Class) { "classes" } else { "attribute" };

@@ -91,7 +91,9 @@ fn term(text: &str) -> Result<(String, Range), Error> {
     };
     let end = |end: &str, none: f64| match end.trim() {
         "" => Ok(none),
-        end => end.parse().ok().filter(|end: &f64| !end.is_nan()).ok_or_else(|| bad(text, "has an end that is no number")),
+        end => {
+            end.parse().ok().filter(|end: &f64| !end.is_nan()).ok_or_else(|| bad(text, "has an end that is no number"))
+        }
     };
     let ends = [end(low, f64::NEG_INFINITY)?, end(high, f64::INFINITY)?];
     if ends[0] > ends[1] {

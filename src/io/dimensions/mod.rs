@@ -14,8 +14,8 @@ pub use class_list::ClassList;
 pub(super) use collect::{Collector, of_positions};
 pub use collect::{Column, Span};
 pub use filter::{Filter, Range};
-pub use names::Group;
 pub(super) use names::ANGLE_STEP;
+pub use names::Group;
 
 use std::fmt;
 use std::str::FromStr;

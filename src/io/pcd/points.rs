@@ -1,13 +1,13 @@
 //! The meaning of a PCD file's fields, and their conversion to points.
 
 use super::header::{Field, Header, Scalar};
-use crate::io::dimensions::Collector;
-use crate::io::{Points, ReadOptions, Wanted};
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
+use crate::io::dimensions::Collector;
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::finite;
+use crate::io::{Points, ReadOptions, Wanted};
 
 /// One number of a point: the index of its field, and its index within that field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,8 @@ struct Wants {
 /// The attributes of a point that are one number: the names and cells of all of them. The numbers
 /// of a longer field have an index in brackets, but a packed colour is none.
 fn numbers(header: &Header) -> (Vec<String>, Vec<Cell>) {
-    let is_number = |field: &Field| field.name != "_" && !(field.size == 4 && ["rgb", "rgba"].contains(&field.name.as_str()));
+    let is_number =
+        |field: &Field| field.name != "_" && !(field.size == 4 && ["rgb", "rgba"].contains(&field.name.as_str()));
     let fields = header.fields.iter().enumerate().filter(|(_, field)| is_number(field));
     fields
         .flat_map(|(index, field)| {

@@ -1,9 +1,9 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
 use super::vertex::is_tree;
-use crate::io::{Up, Wanted};
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
+use crate::io::{Up, Wanted};
 use std::io::{BufRead, Read};
 
 /// Longest line of a header, bytes. Comments can be long: some hold a processing history.

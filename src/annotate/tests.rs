@@ -37,7 +37,7 @@ fn ramp(map: &str, ends: [f64; 2]) -> ColorKey {
 fn ticks_are_round_numbers_within_the_range() {
     let labels = |ends: [f64; 2]| ticks::ticks(ends, 5).into_iter().map(|(_, label)| label).collect::<Vec<_>>();
     assert_eq!(labels([1.0, 223.0]), ["50", "100", "150", "200"]);
-    assert_eq!(labels([408.73, 485.04]), ["410", "420", "430", "440", "450", "460", "470", "480"]);
+    assert_eq!(labels([408.73, 485.04]), ["420", "440", "460", "480"]);
     assert_eq!(labels([0.0, 1.0]), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
     assert_eq!(labels([-0.03, 0.03]), ["−0.03", "−0.02", "−0.01", "0.00", "0.01", "0.02", "0.03"]);
     assert_eq!(labels([3e8 + 0.1, 3e8 + 4.3]), ["300000001", "300000002", "300000003", "300000004"]);

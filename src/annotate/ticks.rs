@@ -17,11 +17,10 @@ pub(super) fn ticks([low, high]: [f64; 2], count: usize) -> Vec<(f64, String)> {
     }
     let mut step = round_length(length / count.max(1) as f64);
     let number = |step: f64| (high / step + 1e-9).floor() - (low / step - 1e-9).ceil() + 1.0;
-    // The next lengths of 1, 2, 5, 10: a step that is rounded down may give twice as many.
-    for factor in [2.0, 2.5, 2.0] {
-        if number(step) > 1.5 * count as f64 {
-            step *= factor;
-        }
+    // A step that is rounded down may give twice as many: the next ones of 1, 2, 5, 10.
+    while number(step) > 1.5 * count as f64 {
+        let leading = step / 10f64.powi(step.log10().floor() as i32);
+        step *= if (1.5..3.0).contains(&leading) { 2.5 } else { 2.0 };
     }
     let first = (low / step - 1e-9).ceil();
     let decimals = (-step.log10().floor()).max(0.0) as usize;

@@ -1,5 +1,7 @@
 //! `epsplat info`: describes a file and the surfels that the renderer would make of it.
 
+mod ranges;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -239,7 +241,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  points    {}", info.points);
     told(&mut text, &info.file);
     held(&mut text, info);
-    ranges(&mut text, &info.attributes);
+    ranges::write(&mut text, &info.attributes);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
     if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
@@ -316,36 +318,9 @@ fn told(text: &mut String, about: &About) {
     }
 }
 
-/// The most attributes that are listed: Gaussians have 45 for the coefficients of harmonics alone.
-const MOST: usize = 24;
-
-/// Writes a line for each attribute with its range.
-fn ranges(text: &mut String, attributes: &[Span]) {
-    let width = attributes.iter().take(MOST).map(|span| shown(&span.name).chars().count()).max().unwrap_or(0);
-    let mut head = "ranges";
-    for span in attributes.iter().take(MOST) {
-        let range = match span.range {
-            Some([low, high]) if low == high => format!("{}", rounded(low)),
-            Some([low, high]) => format!("{} to {}", rounded(low), rounded(high)),
-            None => "no number".to_owned(),
-        };
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "  {head:<9} {:<width$}  {range}", shown(&span.name));
-        head = "";
-    }
-    if let Some(more) = attributes.len().checked_sub(MOST).filter(|more| *more > 0) {
-        let _ = writeln!(text, "            and {more} more");
-    }
-}
-
-/// A number without the noise of its last digits.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
-}
-
 /// Joins names with commas, at most the first 24.
 fn listed(names: &[String]) -> String {
-    let more = names.len().saturating_sub(MOST);
+    let more = names.len().saturating_sub(ranges::MOST);
     let first = names[..names.len() - more].join(", ");
     if more > 0 { format!("{first} and {more} more") } else { first }
 }

@@ -4,7 +4,9 @@ use crate::common;
 
 use common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
 use epsplat::io;
+use epsplat::low_level::scene::KeyColors;
 use epsplat::low_level::scene::color::srgb8;
+use epsplat::{CameraOptions, DeviceOptions, Picture, RenderOptions, Renderer, Scene, SceneOptions, View};
 use std::path::Path;
 
 /// Four wide disks in a row at x = 0, 10, 20, 30, each with a class, an intensity and a height.
@@ -135,39 +137,26 @@ fn a_legend_is_drawn_into_the_colour_alone() {
 
 #[test]
 fn parts_of_an_octree_share_the_range_of_the_overview() {
-    let folder = Folder::new();
-    let scan = format!("{DATA}/simple.copc.laz");
-    // One place in two cuts of the same view: its colour hardly depends on the cut.
-    let picture = |lod: &str| {
-        let image = folder.path("a.png");
-        succeeds(&[
-            "render",
-            &scan,
-            "-o",
-            text(&image),
-            "--lod",
-            lod,
-            "--color-by",
-            "z",
-            "--color-map",
-            "gray",
-            "--range",
-            "406,587",
-            "--from",
-            "above",
-            "--size",
-            "64x64",
-            "--backend",
-            "reference",
-        ]);
-        io::png::read(&image).unwrap()
+    let mut scene = SceneOptions::default();
+    scene.colors.color_by = Some("z".parse().unwrap());
+    let scene = Scene::open([format!("{DATA}/simple.copc.laz")], &scene).unwrap();
+    let mut options = RenderOptions::default();
+    let device = DeviceOptions { backend: "reference".parse().unwrap(), ..DeviceOptions::default() };
+    let ends = |picture: Picture| match picture.key.unwrap().colors {
+        KeyColors::Ramp { ends, .. } => (ends, picture.read.map(|read| read.points[0])),
+        other => panic!("{other:?}"),
     };
-    let (coarse, fine) = (picture("40px"), picture("1px"));
-    let mean = |frame: &epsplat::Frame| {
-        let shown: Vec<_> = frame.color.iter().filter(|color| color[3] > 0.5).map(|color| color[0]).collect();
-        shown.iter().sum::<f32>() / shown.len() as f32
-    };
-    assert!((mean(&coarse) - mean(&fine)).abs() < 0.05, "{} {}", mean(&coarse), mean(&fine));
+    let view = |side: u32| View::new(&CameraOptions { size: Some((side, side)), ..CameraOptions::default() }).unwrap();
+    let whole = ends(Renderer::new(&scene, &options, &device, &()).unwrap().frame(&view(32), &()).unwrap());
+    // 2 % and 98 % of all heights, as numpy sorts them.
+    assert!((whole.0[0] - 411.19).abs() < 1e-4 && (whole.0[1] - 520.6).abs() < 1e-4, "{whole:?}");
+    options.levels.lod = Some("8px".parse().unwrap());
+    let mut renderer = Renderer::new(&scene, &options, &device, &()).unwrap();
+    let [far, near] = [16, 256].map(|side| ends(renderer.frame(&view(side), &()).unwrap()));
+    assert_eq!(far.0, near.0);
+    assert!(far.1.unwrap() < near.1.unwrap(), "{far:?} {near:?}");
+    // Control: the range is not that of all points.
+    assert_ne!(far.0, whole.0);
 }
 
 #[test]

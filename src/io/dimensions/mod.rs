@@ -7,12 +7,14 @@
 
 mod class_list;
 mod collect;
+mod columns;
 mod filter;
 mod names;
 
 pub use class_list::ClassList;
 pub(super) use collect::{Collector, of_positions};
 pub use collect::{Column, Span};
+pub(super) use columns::Columns;
 pub use filter::{Filter, Range};
 pub(super) use names::ANGLE_STEP;
 pub use names::Group;

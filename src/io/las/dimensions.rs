@@ -1,9 +1,12 @@
 //! The numbers of a LAS record under the names that PDAL gives them.
 
+use las::PointData;
 use las::point::Format;
 
 use super::chunks::Scheme;
 use super::extra::Field;
+use super::{Kept, records, withheld};
+use crate::io::ReadOptions;
 use crate::io::dimensions::{ANGLE_STEP, Collector, Wanted};
 use crate::io::fault::Fault;
 
@@ -153,6 +156,21 @@ impl Wants {
             }
         }
         scheme.needed != before
+    }
+}
+
+impl Kept<'_> {
+    /// Collects the wanted attributes of a block's points, except deleted ones. Returns whether
+    /// each point passes the filter; nothing if no attribute is wanted.
+    pub(super) fn passing(&mut self, block: &PointData, options: &ReadOptions) -> Vec<bool> {
+        let Some(wants) = &mut self.wants else { return Vec::new() };
+        let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
+        let points = records(block).zip(withheld(block)).zip(coordinates);
+        let passes = |((record, withheld), position): ((&[u8], bool), [f64; 3])| {
+            // A deleted point is left out for that reason, and counts as such.
+            withheld && !options.keep_withheld || wants.take(&position, record)
+        };
+        points.map(passes).collect()
     }
 }
 

@@ -313,21 +313,6 @@ impl<'a> Kept<'a> {
     }
 }
 
-impl Kept<'_> {
-    /// Collects the wanted attributes of a block's points, except deleted ones. Returns whether
-    /// each point passes the filter; nothing if no attribute is wanted.
-    fn passing(&mut self, block: &PointData, options: &ReadOptions) -> Vec<bool> {
-        let Some(wants) = &mut self.wants else { return Vec::new() };
-        let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
-        let points = records(block).zip(withheld(block)).zip(coordinates);
-        let passes = |((record, withheld), position): ((&[u8], bool), [f64; 3])| {
-            // A deleted point is left out for that reason, and counts as such.
-            withheld && !options.keep_withheld || wants.take(&position, record)
-        };
-        points.map(passes).collect()
-    }
-}
-
 /// Marks the points whose class has the opacity 0 as left out. They are removed only later, because
 /// they count in the decision about the range of colours. `numbers` are the indices of all points
 /// that were read.

@@ -4,10 +4,10 @@ use super::header::{Field, Header, Scalar};
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
-use crate::io::dimensions::Collector;
+use crate::io::dimensions::{self, Collector};
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::finite;
-use crate::io::{Points, ReadOptions, Wanted};
+use crate::io::{Points, ReadOptions};
 
 /// One number of a point: the index of its field, and its index within that field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,17 +25,7 @@ pub(super) struct Columns {
     color: Option<Color>,
     intensity: Option<usize>,
     /// The attributes that options ask for.
-    wants: Option<Wants>,
-}
-
-/// The attributes of a point that options ask for.
-#[derive(Clone, Debug)]
-struct Wants {
-    /// The names of all attributes, and their cells.
-    names: Vec<String>,
-    wanted: Wanted,
-    /// The cells of the attributes that a collector needs, in its order.
-    cells: Vec<usize>,
+    wants: Option<dimensions::Columns>,
 }
 
 /// The attributes of a point that are one number: the names and cells of all of them. The numbers
@@ -83,16 +73,14 @@ impl Columns {
     pub(super) fn of(header: &Header, options: &ReadOptions) -> Result<Self, Fault> {
         let mut columns = Self::without_wants(header, options.ignore_alpha)?;
         let (names, cells) = numbers(header);
-        let Some(collector) = Collector::of(&names, &options.wanted)? else { return Ok(columns) };
-        let places = collector.fields.iter().map(|field| {
-            let cell = cells[*field];
+        let place = |field: usize| {
+            let cell = cells[field];
             columns.cells.iter().position(|known| *known == cell).unwrap_or_else(|| {
                 columns.cells.push(cell);
                 columns.cells.len() - 1
             })
-        });
-        let cells = places.collect();
-        columns.wants = Some(Wants { names, wanted: options.wanted.clone(), cells });
+        };
+        columns.wants = dimensions::Columns::of(names, &options.wanted, place)?;
         Ok(columns)
     }
 
@@ -196,10 +184,7 @@ impl Reading {
         reserve(&mut shades, of(columns.intensity.is_some() && columns.color.is_none()))?;
         let field = columns.intensity.map(|cell| &header.fields[columns.cells[cell].field]);
         let integer = field.is_some_and(|field| field.scalar != Scalar::Float);
-        let collector = match &columns.wants {
-            Some(wants) => Collector::of(&wants.names, &wants.wanted)?,
-            None => None,
-        };
+        let collector = columns.wants.as_ref().map_or(Ok(None), dimensions::Columns::collector)?;
         Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer, collector })
     }
 
@@ -213,10 +198,7 @@ impl Reading {
         let columns = &self.columns;
         self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
         if let (Some(collector), Some(wants)) = (&mut self.collector, &columns.wants) {
-            for row in 0..rows {
-                let position = columns.position.map(|cell| value(cell, row));
-                collector.mark(&position, |field| value(wants.cells[field], row));
-            }
+            wants.mark(collector, (rows, columns.position), &value);
         }
         if let Some(normal) = columns.normal {
             self.normals.extend((0..rows).map(|row| normal.map(|cell| value(cell, row) as f32)));

@@ -6,9 +6,9 @@ use super::tint::{Tint, code, number};
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
-use crate::io::dimensions::Collector;
+use crate::io::dimensions::{self, Collector};
 use crate::io::fault::{Fault, reserve};
-use crate::io::{Points, TreeRow, Wanted};
+use crate::io::{Points, TreeRow};
 use crate::scene::{Cap, Clip, Colors};
 
 /// A property that is used, and where it is in a row.
@@ -48,17 +48,7 @@ pub(super) struct Layout {
     /// The columns `cone`, `first`, `count` and `leaf` of a node.
     node: Option<[usize; 4]>,
     /// The attributes that options ask for.
-    wants: Option<Wants>,
-}
-
-/// The attributes of a row that options ask for.
-#[derive(Clone, Debug)]
-struct Wants {
-    /// The names of all scalar properties.
-    names: Vec<String>,
-    wanted: Wanted,
-    /// The columns of the attributes that a collector needs, in its order.
-    columns: Vec<usize>,
+    wants: Option<dimensions::Columns>,
 }
 
 /// Properties of a node beside its ellipse and its colour ([`TreeRow`]).
@@ -107,9 +97,8 @@ impl Layout {
         let mut layout = Self::without_wants(vertex)?;
         let places = scalars_of(vertex);
         let names: Vec<String> = places.iter().map(|(name, _)| (*name).to_owned()).collect();
-        let Some(collector) = Collector::of(&names, &vertex.wanted)? else { return Ok(layout) };
-        let columns = collector.fields.iter().map(|field| layout.column_of(places[*field].1)).collect();
-        layout.wants = Some(Wants { names, wanted: vertex.wanted.clone(), columns });
+        let column = |field: usize| layout.column_of(places[field].1);
+        layout.wants = dimensions::Columns::of(names, &vertex.wanted, column)?;
         Ok(layout)
     }
 
@@ -314,10 +303,7 @@ impl<'a> Vertices<'a> {
             colored: false,
             gaussians,
             rows: tree,
-            collector: match &layout.wants {
-                Some(wants) => Collector::of(&wants.names, &wants.wanted)?,
-                None => None,
-            },
+            collector: layout.wants.as_ref().map_or(Ok(None), dimensions::Columns::collector)?,
         })
     }
 
@@ -332,10 +318,7 @@ impl<'a> Vertices<'a> {
         let [x, y, z] = layout.position;
         self.positions.extend((0..rows).map(|row| [value(x, row), value(y, row), value(z, row)]));
         if let (Some(collector), Some(wants)) = (&mut self.collector, &layout.wants) {
-            for row in 0..rows {
-                let position = [x, y, z].map(|column| value(column, row));
-                collector.mark(&position, |field| value(wants.columns[field], row));
-            }
+            wants.mark(collector, (rows, layout.position), &value);
         }
         if let Some(gaussians) = &mut self.gaussians {
             let position = |row: usize| [x, y, z].map(|column| value(column, row));

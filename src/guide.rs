@@ -6,6 +6,10 @@
 #[cfg_attr(doc, doc = include_str!("guide/conventions.md"))]
 pub mod conventions {}
 
+/// Colours by attribute, filters and legends.
+#[cfg_attr(doc, doc = include_str!("guide/attributes.md"))]
+pub mod attributes {}
+
 /// Surfels from points.
 #[cfg_attr(doc, doc = include_str!("guide/points.md"))]
 pub mod points {}

@@ -71,6 +71,6 @@ pub use progress::Progress;
 pub use stage::{Files, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport};
 
 // Modules inside the library import these as `crate::...`, without `low_level`.
+use low_level::{annotate, frame, gpu, passes, plan, render, scene, surfels, truth};
 #[cfg(feature = "bench")]
 use low_level::{bench, hardcases, metrics, report};
-use low_level::{frame, gpu, passes, plan, render, scene, surfels, truth};

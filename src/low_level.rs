@@ -4,6 +4,8 @@
 //! replaced. They change from version to version without notice. Programs that want pictures use
 //! the crate root.
 
+#[path = "annotate/mod.rs"]
+pub mod annotate;
 #[cfg(feature = "bench")]
 #[path = "bench/mod.rs"]
 pub mod bench;

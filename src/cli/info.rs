@@ -1,11 +1,13 @@
 //! `epsplat info`: describes a file and the surfels that the renderer would make of it.
 
+mod ranges;
+
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::io::{About, Points, class_name};
+use epsplat::io::{About, Points, Span, class_name};
 use epsplat::low_level::scene::{Colors, Scene, gaussian};
 use epsplat::low_level::surfels::{self, ASLANT, Coverage, Preparation};
 use epsplat::options::InputOptions;
@@ -48,6 +50,8 @@ struct Info {
     #[serde(skip_serializing_if = "Option::is_none")]
     points_with_radii: Option<u64>,
     colors: &'static str,
+    /// Attributes for --color-by and --where, with their ranges.
+    attributes: Vec<Span>,
     /// Statistics of a file of Gaussians; None for other files.
     gaussians: Option<Gaussians>,
     /// Number of points of each class of a laser scan.
@@ -153,6 +157,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             )),
         };
     }
+    let attributes = std::mem::take(&mut points.spans);
     let bounds = surfels::bounds(&points);
     let is_mesh = points.faces.is_some();
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
@@ -184,6 +189,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: held.1,
         radii: held.2,
         colors: held.3,
+        attributes,
         gaussians,
         classes,
         levels_of_detail: LevelsOfDetail::of(&scene),
@@ -235,6 +241,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  points    {}", info.points);
     told(&mut text, &info.file);
     held(&mut text, info);
+    ranges::write(&mut text, &info.attributes);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
     if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
@@ -313,9 +320,7 @@ fn told(text: &mut String, about: &About) {
 
 /// Joins names with commas, at most the first 24.
 fn listed(names: &[String]) -> String {
-    /// Gaussians have 45 attributes for the coefficients of harmonics alone.
-    const MOST: usize = 24;
-    let more = names.len().saturating_sub(MOST);
+    let more = names.len().saturating_sub(ranges::MOST);
     let first = names[..names.len() - more].join(", ");
     if more > 0 { format!("{first} and {more} more") } else { first }
 }

@@ -48,7 +48,7 @@ pub struct Arguments {
     ///
     /// Inputs must be binary PLY files with normals and radii, or half-axes. The temporary files
     /// are beside the output and up to twice its size. The output is the same as without the option
-    #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
+    #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity", "filter", "classes"])]
     memory: Option<u64>,
     /// Write the tree's counts and times as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]

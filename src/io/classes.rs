@@ -66,24 +66,41 @@ impl ClassOpacities {
     }
 }
 
-/// The name of a class in the LAS specification; None for most classes, such as cables and pylons.
+/// The classes of the LAS specification (1.4 R15, table 17): number, name, and the sRGB codes that
+/// class is drawn in, which follow the habits of maps.
+const CLASSES: [(u8, &str, [u8; 3]); 22] = [
+    (0, "never classified", [150, 150, 150]),
+    (1, "unclassified", [180, 180, 180]),
+    (2, "ground", [166, 118, 68]),
+    (3, "low vegetation", [178, 214, 110]),
+    (4, "medium vegetation", [96, 176, 72]),
+    (5, "high vegetation", [26, 122, 48]),
+    (6, "building", [226, 92, 44]),
+    (7, "noise", [214, 32, 140]),
+    (8, "model key point", [246, 200, 160]),
+    (9, "water", [54, 128, 220]),
+    (10, "rail", [96, 72, 120]),
+    (11, "road", [86, 90, 98]),
+    (12, "overlap", [222, 222, 190]),
+    (13, "wire guard", [250, 220, 60]),
+    (14, "wire conductor", [240, 180, 20]),
+    (15, "transmission tower", [120, 40, 160]),
+    (16, "wire connector", [190, 130, 220]),
+    (17, "bridge", [196, 164, 150]),
+    (18, "high noise", [255, 90, 190]),
+    (19, "overhead structure", [150, 80, 60]),
+    (20, "ignored ground", [206, 178, 140]),
+    (21, "snow", [236, 244, 255]),
+];
+
+/// The name of a class in the LAS specification; None for reserved classes and those of users.
 pub fn class_name(class: u8) -> Option<&'static str> {
-    Some(match class {
-        0 => "never classified",
-        1 => "unclassified",
-        2 => "ground",
-        3 => "low vegetation",
-        4 => "medium vegetation",
-        5 => "high vegetation",
-        6 => "building",
-        7 => "noise",
-        9 => "water",
-        10 => "rail",
-        11 => "road",
-        17 => "bridge",
-        18 => "high noise",
-        _ => return None,
-    })
+    CLASSES.iter().find(|(number, ..)| *number == class).map(|(_, name, _)| *name)
+}
+
+/// The sRGB codes that a class is drawn in; None for classes without a name.
+pub fn class_color(class: u8) -> Option<[u8; 3]> {
+    CLASSES.iter().find(|(number, ..)| *number == class).map(|(.., color)| *color)
 }
 
 impl fmt::Display for ClassOpacities {

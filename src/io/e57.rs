@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 
 use crate::io::about::{About, Attribute, Role};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Run, Shades, Values};
+use crate::io::dimensions::Collector;
 use crate::io::fault::{self, Fault, Unread, reserve, surviving};
 use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, ReadOptions, Up};
@@ -45,7 +46,9 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     progress.begin(&format!("reading {}", fault::name(&path)), promised);
     let points = surviving(|| {
         let any_normals = scans.iter().any(|(_, scan)| normal(scan).is_some());
-        let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
+        let names = names(&scans);
+        let collector = Collector::of(&names, &options.wanted)?;
+        let mut reading = Reading { normals: any_normals.then(Vec::new), names, collector, ..Reading::default() };
         let mut read = false;
         for (name, scan) in &scans {
             let before = reading.state();
@@ -58,7 +61,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
             }
         }
         let unread = unread.told(&path, ("scans", all), read)?;
-        Ok(Points { unread, ..reading.into_points() })
+        Ok(Points { unread, ..reading.into_points()? })
     });
     progress.end();
     let mut points = points.map_err(|fault| fault.of(&path))?;
@@ -97,6 +100,17 @@ fn about(reader: &E57Reader<BufReader<File>>, scans: &[PointCloud]) -> About {
         }
     }
     about
+}
+
+/// The names of the attributes that any of the scans has.
+fn names(scans: &[(String, PointCloud)]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in scans.iter().flat_map(|(_, scan)| &scan.prototype).map(|record| name_of(&record.name)) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 /// The name of an attribute as files write it.
@@ -240,6 +254,10 @@ struct Reading {
     runs: Vec<Run>,
     /// Indices of the points that are marked as invalid or that could not be read, over all scans.
     left_out: Vec<u64>,
+    /// The names of the attributes of all scans.
+    names: Vec<String>,
+    /// Collects the attributes that options ask for.
+    collector: Option<Collector>,
 }
 
 impl Reading {
@@ -254,6 +272,7 @@ impl Reading {
         self.positions.truncate(positions);
         self.normals.iter_mut().for_each(|normals| normals.truncate(positions));
         self.left_out.truncate(left_out);
+        self.collector.iter_mut().for_each(|collector| collector.truncate(positions));
         // Points keep the indices that they have in the file.
         let first = (positions + left_out) as u64;
         self.left_out.extend(first..first.saturating_add(records));
@@ -279,6 +298,9 @@ impl Reading {
         reserve(&mut looks.intensities, if color.is_none() && intensity.is_some() { scan.records } else { 0 })?;
         let before = self.positions.len();
         let mut unreported = 0;
+        let wanted = self.collector.as_ref().map(|collector| collector.fields.iter().map(|field| &self.names[*field]));
+        let place_of = |name: &String| scan.prototype.iter().position(|record| name_of(&record.name) == *name);
+        let wanted: Vec<Option<usize>> = wanted.into_iter().flatten().map(place_of).collect();
         for values in reader.pointcloud_raw(scan).map_err(of_e57)? {
             let values = values.map_err(of_e57)?;
             let number = |at: usize| number(&values, &scan.prototype, at);
@@ -298,7 +320,16 @@ impl Reading {
             } else {
                 DVec3::new(a, b, c)
             };
-            self.positions.push((rotation * local + translation).to_array());
+            let position = (rotation * local + translation).to_array();
+            if let Some(collector) = &mut self.collector {
+                // A scan without the attribute gives none.
+                let given = |field: usize| wanted[field].and_then(|at| number(at).ok()).unwrap_or(f64::NAN);
+                if !collector.take(&position, given) {
+                    self.left_out.push((self.positions.len() + self.left_out.len()) as u64);
+                    continue;
+                }
+            }
+            self.positions.push(position);
             if let Some(normals) = &mut self.normals {
                 let local = match normal {
                     Some([x, y, z]) => DVec3::new(number(x)?, number(y)?, number(z)?),
@@ -320,15 +351,17 @@ impl Reading {
         Ok(())
     }
 
-    fn into_points(self) -> Points {
-        Points {
+    fn into_points(self) -> Result<Points, Fault> {
+        let mut points = Points {
             positions: self.positions,
             normals: self.normals,
             raw: Some(Box::new(RawColors { runs: self.runs, ..RawColors::default() })),
             up: Some(Up::Z),
             left_out: self.left_out,
             ..Points::default()
-        }
+        };
+        self.collector.map_or(Ok(()), |collector| collector.finish(&mut points, false))?;
+        Ok(points)
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) enum Fault {
     Io(io::Error),
     /// The file violates its format; the text is one clause.
     Malformed(String),
+    /// An option cannot be followed with this file; the text is one clause.
+    Usage(String),
 }
 
 impl Fault {
@@ -22,6 +24,7 @@ impl Fault {
         match self {
             Self::Io(source) => Error::read(path, source),
             Self::Malformed(what) => Error::malformed(path, what),
+            Self::Usage(what) => Error::Usage(format!("{}: {what}", path.display())),
         }
     }
 }

@@ -12,6 +12,7 @@ pub(crate) mod closed;
 mod color_range;
 mod companions;
 mod degrees;
+pub mod dimensions;
 #[cfg(feature = "e57")]
 pub mod e57;
 #[cfg(feature = "exr")]
@@ -40,9 +41,10 @@ mod values;
 pub mod write_behind;
 
 pub use about::About;
-pub use classes::{ClassOpacities, class_name};
+pub use classes::{ClassOpacities, class_color, class_name};
 pub use color_range::{ColorRules, RawColors, settle_colors};
 pub use companions::companions;
+pub use dimensions::{ColorBy, Column, Filter, Span, Wanted};
 pub use format::Format;
 pub use input::{Input, MOST_COPIED};
 pub use mesh::{Material, Mesh};
@@ -55,7 +57,7 @@ use crate::{Error, Progress, Result};
 use std::path::Path;
 
 /// Options for reading files.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The format. If None, it is detected from the file's extension, or else its first bytes.
     pub format: Option<Format>,
@@ -74,6 +76,8 @@ pub struct ReadOptions {
     /// Fail if a part of a file cannot be read: a scan of an E57 file, a chunk of a LAZ file, or a
     /// node of a COPC file. If false, that part is left out and named in [`Points::unread`].
     pub strict: bool,
+    /// Attributes to read beside those that every picture needs, and the points to keep.
+    pub wanted: Wanted,
 }
 
 /// Reads a file of any supported format; see [`Input::open`].
@@ -117,6 +121,9 @@ pub fn read_raw(path: &Path, options: ReadOptions, progress: &dyn Progress) -> R
         Format::E57 => read_e57(input, &options, progress),
         Format::Pcd => read_pcd(input, &options, progress),
     }?;
+    if format == Format::Obj {
+        dimensions::of_positions(&mut points, &options.wanted).map_err(|fault| fault.of(path))?;
+    }
     if format != Format::Las && points.faces.is_none() {
         points.notes.extend(degrees::hint_of(&name, &points.positions, None));
     }

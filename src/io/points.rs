@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::about::About;
 use super::color_range::RawColors;
-use super::{Paint, Tree};
+use super::{Column, Paint, Span, Tree};
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors, Whole};
@@ -71,6 +71,13 @@ pub struct Points {
     pub withheld: u64,
     /// The number of points that were left out because their class has the opacity 0.
     pub unseen: u64,
+    /// The number of points that were left out because they do not pass the filter of
+    /// [`ReadOptions::wanted`](super::ReadOptions::wanted).
+    pub filtered: u64,
+    /// The attribute to colour the points by, until they have their colours.
+    pub column: Option<Box<Column>>,
+    /// The ranges of all attributes, if the reader was asked for them.
+    pub spans: Vec<Span>,
     /// The number of mesh vertices that were left out because no triangle uses them.
     pub loose: u64,
     /// The number of triangles that were left out because a coordinate is not finite or too large.
@@ -182,6 +189,7 @@ impl Points {
         self.texture_numbers.iter_mut().for_each(|all| retain(all, keep));
         self.texture_slopes.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+        self.column.iter_mut().for_each(|column| retain(&mut column.values, keep));
     }
 }
 

@@ -1,6 +1,7 @@
 //! How input files are read.
 
-use crate::io::{self, ClassOpacities, Format};
+use crate::io::dimensions::ClassList;
+use crate::io::{self, ClassOpacities, Filter, Format, Wanted};
 
 /// The format of input files, and attributes to ignore.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,7 +21,7 @@ pub struct FormatOptions {
 }
 
 /// How point clouds are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Input"))]
 pub struct InputOptions {
@@ -36,6 +37,20 @@ pub struct InputOptions {
     /// opacity 0 are left out and counted. Other opacities show with render --composite
     #[cfg_attr(feature = "cli", arg(long, value_name = "RULES", hide_short_help = true))]
     pub class_opacity: Option<ClassOpacities>,
+    /// Take only the points of these LAS classes: names or numbers, such as ground,building or 3-5
+    ///
+    /// Names are those of the LAS specification (--color-by class --legend shows them), vegetation
+    /// for 3 to 5, and others for classes without a name
+    #[cfg_attr(feature = "cli", arg(long, value_name = "CLASSES"))]
+    pub classes: Option<ClassList>,
+    /// Take only points whose attributes lie in ranges, such as Classification[2:2],Z[:120]
+    ///
+    /// The notation is that of PDAL's filters.range: [ and ] include an end, ( and ) exclude it, an
+    /// end may be missing, and ! before the brackets takes the points outside. Points have to pass
+    /// one of the ranges of each attribute. `epsplat info` lists the attributes and their ranges;
+    /// the names of --color-by are understood too
+    #[cfg_attr(feature = "cli", arg(long = "where", value_name = "RANGES", allow_hyphen_values = true))]
+    pub filter: Option<Filter>,
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis
     #[cfg_attr(feature = "cli", arg(long, hide_short_help = true))]
     pub flatten: bool,
@@ -66,7 +81,19 @@ impl InputOptions {
             ignore_alpha: self.file.ignore_alpha,
             describe: false,
             strict: self.strict,
+            wanted: Wanted { filter: self.filter(), ..Wanted::default() },
         }
+    }
+
+    /// Returns the options for reading a single file with the attribute `column`.
+    pub(crate) fn with_column(&self, column: Option<String>) -> io::ReadOptions {
+        let options = self.of_file();
+        io::ReadOptions { wanted: Wanted { column, ..options.wanted }, ..options }
+    }
+
+    /// Returns the conditions of `--where` and `--classes` together.
+    pub(crate) fn filter(&self) -> Filter {
+        self.filter.clone().unwrap_or_default().with_classes(self.classes)
     }
 
     /// Formats these options as arguments of a command that reads the same file, each preceded by a
@@ -79,6 +106,9 @@ impl InputOptions {
         let classes = self.class_opacity.filter(|opacities| !opacities.are_plain());
         let classes = classes.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
         let alpha = if self.file.ignore_alpha { " --ignore-alpha" } else { "" };
+        let kept = self.classes.map_or(String::new(), |classes| format!(" --classes {classes}"));
+        let filter = self.filter.as_ref().map_or(String::new(), |filter| format!(" --where '{filter}'"));
+        let classes = classes + &kept + &filter;
         let strict = if self.strict { " --strict" } else { "" };
         format + withheld + if self.flatten { " --flatten" } else { "" } + alpha + &classes + strict
     }

@@ -6,12 +6,14 @@
 
 mod camera;
 mod check;
+mod colors;
 mod device;
 mod group;
 mod input;
 mod levels;
 mod look;
 mod maps;
+mod marks;
 pub mod parse;
 mod points;
 mod research;
@@ -23,11 +25,13 @@ mod triangles;
 pub mod values;
 
 pub use camera::CameraOptions;
+pub use colors::ColorOptions;
 pub use device::{Chosen, DeviceOptions};
 pub use input::{FormatOptions, InputOptions};
 pub use levels::LevelOptions;
 pub use look::LookOptions;
 pub use maps::MapOptions;
+pub use marks::MarkOptions;
 pub use points::PointOptions;
 pub use research::ResearchOptions;
 pub use settle::Suggested;
@@ -61,6 +65,9 @@ pub struct SceneOptions {
     /// How files are read.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub input: InputOptions,
+    /// The attribute that points are coloured by.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub colors: ColorOptions,
     /// How points become surfels.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub surfels: SurfelOptions,
@@ -91,6 +98,9 @@ pub struct RenderOptions {
     /// Maps beside the colour.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub maps: MapOptions,
+    /// Marks on the finished picture.
+    #[cfg_attr(feature = "cli", command(flatten))]
+    pub marks: MarkOptions,
     /// Choices that change speed or error.
     #[cfg_attr(feature = "cli", command(flatten))]
     pub research: ResearchOptions,
@@ -103,13 +113,14 @@ impl RenderOptions {
     /// # Errors
     /// [`Error::Usage`] if there is no such option, or if the texts are not a valid value.
     pub fn set(&mut self, name: &str, texts: &[String]) -> Result<()> {
-        let groups: [&mut dyn Group; 7] = [
+        let groups: [&mut dyn Group; 8] = [
             &mut self.look,
             &mut self.surface,
             &mut self.transparency,
             &mut self.points,
             &mut self.levels,
             &mut self.maps,
+            &mut self.marks,
             &mut self.research,
         ];
         for group in groups {

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::{LimitOptions, RenderOptions, SceneOptions};
 use crate::error::Error;
+use crate::io::ColorBy;
 
 /// How the meshes of the inputs are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +87,7 @@ impl SceneOptions {
         let RenderOptions { surface, transparency, points, levels, maps, research, .. } = options;
         let given = [
             ("--outliers, --max-radius and --flat", self.surfels.limits != LimitOptions::default()),
+            ("--color-by normal", self.colors.color_by == Some(ColorBy::Normal)),
             ("--texture with several images", self.surfels.textures.len() > 1),
             ("--surfel-size", self.surfels.size.is_some()),
             ("--facing", points.facing.is_some()),

@@ -122,6 +122,46 @@ impl FromStr for Ortho {
     }
 }
 
+/// An end of a range: a number or a percentile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// A value.
+    Value(f64),
+    /// The value below which this share of all values lies, percent.
+    Percent(f64),
+}
+
+/// The values at the ends of a range: `LOW,HIGH`, as numbers or percentiles such as `2%`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValueRange(pub [End; 2]);
+
+impl Default for ValueRange {
+    fn default() -> Self {
+        Self([End::Percent(2.0), End::Percent(98.0)])
+    }
+}
+
+impl FromStr for ValueRange {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let end = |part: &str| match part.trim().strip_suffix('%') {
+            Some(share) => share.trim().parse().ok().filter(|share| (0.0..=100.0).contains(share)).map(End::Percent),
+            None => part.trim().parse().ok().filter(|value: &f64| value.is_finite()).map(End::Value),
+        };
+        let ends = text.split_once(',').and_then(|(low, high)| Some([end(low)?, end(high)?]));
+        let ordered = |ends: &[End; 2]| match ends {
+            [End::Value(low), End::Value(high)] | [End::Percent(low), End::Percent(high)] => low <= high,
+            _ => true,
+        };
+        ends.filter(ordered).map(Self).ok_or_else(|| {
+            Error::Usage(format!(
+                "it is two numbers or percentages, the lesser first, such as 0,255 or 2%,98%, not {text:?}"
+            ))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

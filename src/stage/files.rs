@@ -36,7 +36,7 @@ impl Files {
     ///
     /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file.
     pub fn new(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &InputOptions) -> Result<Self> {
-        let mut files = Self { options: *options, ..Self::default() };
+        let mut files = Self { options: options.clone(), ..Self::default() };
         for path in paths {
             let path = path.into();
             if !path.is_dir() {
@@ -170,10 +170,10 @@ impl Files {
     pub(super) fn nodes<'a>(
         &self,
         octrees: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
-        rules: &mut ColorRules,
+        (rules, column): (&mut ColorRules, Option<String>),
         progress: &dyn Progress,
     ) -> Result<Vec<Points>> {
-        let options = self.options.of_file();
+        let options = self.options.with_column(column);
         let read = |(file, nodes): (&mut Copc, &Vec<usize>)| file.read_raw(nodes, &options, progress);
         let mut points = octrees.map(read).collect::<Result<Vec<_>>>()?;
         rules.settle(&mut points);
@@ -187,10 +187,15 @@ impl Files {
     /// The errors of [`io::read`], and [`Error::Usage`] if standard input is named twice, or if
     /// opacities are given for classes that no file has.
     pub fn read(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
+        self.read_with(None, progress)
+    }
+
+    /// Reads the points of each file with the attribute `column`.
+    pub(super) fn read_with(&self, column: Option<String>, progress: &dyn Progress) -> Result<Vec<Points>> {
         if self.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read only once: give - once".into()));
         }
-        let read = |path: &Path| io::read_raw(path, self.options.of_file(), progress);
+        let read = |path: &Path| io::read_raw(path, self.options.with_column(column.clone()), progress);
         let (mut inputs, left_out) = self.each(read, || Some(Points::default()))?;
         // An unreadable file has an entry without points, so that indices of inputs stay those of
         // `paths`.
@@ -207,7 +212,9 @@ impl Files {
     ///
     /// The errors of [`Files::read`].
     pub fn described(path: &Path, options: &InputOptions, progress: &dyn Progress) -> Result<Points> {
-        let points = io::read_with(path, ReadOptions { describe: true, ..options.of_file() }, progress)?;
+        let mut reading = ReadOptions { describe: true, ..options.of_file() };
+        reading.wanted.spans = true;
+        let points = io::read_with(path, reading, progress)?;
         check_classes(options, std::slice::from_ref(&points))?;
         Ok(points)
     }

@@ -10,7 +10,7 @@ use super::whole::Made;
 use crate::error::{Error, Result};
 use crate::plan::Settings;
 use crate::progress::Progress;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, ColorKey, Scene};
 
 /// Inputs that are read in part for each picture. The part does not depend on earlier pictures.
 pub(super) enum Parts {
@@ -26,6 +26,8 @@ pub(super) struct Part {
     /// Settings to draw the scene with: without levels of detail if all of it is to be drawn.
     pub settings: Settings,
     pub read: ReadReport,
+    /// The meaning of colours, if they show an attribute.
+    pub key: Option<ColorKey>,
 }
 
 /// Counts of what a picture read, and totals: `[read, total]`, summed over all files.

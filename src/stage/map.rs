@@ -31,11 +31,25 @@ impl Renderer {
     /// for too many pixels.
     pub fn grid(&self, options: &CameraOptions) -> Result<Grid> {
         let usage = |what: &str| Err(Error::Usage(what.into()));
-        let CameraOptions { size, eye, from, target, up, fov, ortho, intrinsics, file, pixel_size, bounds, near } =
-            options;
+        let CameraOptions {
+            size,
+            eye,
+            from,
+            target,
+            up,
+            fov,
+            ortho,
+            intrinsics,
+            file,
+            pixel_size,
+            bounds,
+            near,
+            azimuth,
+            elevation,
+        } = options;
         let Some(pixel) = *pixel_size else { return usage("a map needs the size of its pixels: give --pixel-size") };
-        let lens = fov.or(*ortho).or(*near).is_some() || intrinsics.is_some() || size.is_some();
-        if lens || eye.or(*target).is_some() || from.is_some() || file.is_some() {
+        let lens = fov.or(*near).is_some() || ortho.is_some() || intrinsics.is_some() || size.is_some();
+        if lens || eye.or(*target).is_some() || from.is_some() || azimuth.or(*elevation).is_some() || file.is_some() {
             return usage("--pixel-size looks from straight above: leave other options of the camera out");
         }
         match (up, self.scene().up) {

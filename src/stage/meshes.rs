@@ -89,7 +89,7 @@ impl Meshes {
         paths.retain(|path| known.insert(resolved(path)));
         let read = ReadOptions { ignore_alpha: request.files().options().file.ignore_alpha, ..ReadOptions::default() };
         let mut named =
-            paths.iter().map(|path| io::read_mesh_with(path, read, progress)).collect::<Result<Vec<_>>>()?;
+            paths.iter().map(|path| io::read_mesh_with(path, read.clone(), progress)).collect::<Result<Vec<_>>>()?;
         if let Some(angle) = options.smooth {
             named.iter_mut().for_each(|mesh| {
                 mesh.normals = Some(smooth_normals(&mesh.positions, &mesh.triangles, angle.0));

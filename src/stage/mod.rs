@@ -7,6 +7,7 @@
 //! ```
 
 mod ahead;
+mod coloring;
 mod encode;
 mod files;
 mod heights;
@@ -33,12 +34,14 @@ pub use self::map::Survey;
 pub use self::renderer::{Picture, Renderer};
 pub use self::view::{View, ViewReport};
 
+use self::coloring::Coloring;
 use self::whole::{Making, Whole};
 use crate::error::{Error, Result};
 use crate::io::Points;
 use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
 use crate::plan::BackendName;
 use crate::progress::Progress;
+use crate::scene::ColorKey;
 
 /// Files, or points in memory, that [`Renderer`]s draw.
 ///
@@ -157,8 +160,14 @@ impl Request<'_> {
         self.backend() == Some(BackendName::Reference)
     }
 
-    /// Reads the points of all inputs.
-    fn points(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
+    /// Reads the points of all inputs, and colours them by the attribute of the options.
+    fn points(&self, progress: &dyn Progress) -> Result<(Vec<Points>, Option<ColorKey>)> {
+        let mut points = self.uncolored(progress)?;
+        let key = Coloring::of(&self.scene.options.colors, None).settle(&mut points)?;
+        Ok((points, key))
+    }
+
+    fn uncolored(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
         if self.files().paths().is_empty() {
             return Ok(self.scene.given.clone());
         }
@@ -166,7 +175,7 @@ impl Request<'_> {
         if pipe && self.scene.pipe_read.swap(true, Ordering::Relaxed) {
             return Err(Error::Usage("standard input was read before and cannot be read again: open a file".into()));
         }
-        self.files().read(progress)
+        self.files().read_with(self.scene.options.colors.column(), progress)
     }
 
     /// Fails for options of triangles if the scene has none.
@@ -193,9 +202,9 @@ impl Request<'_> {
         // Frees the previous surfels first, as making new ones needs the memory.
         *made = None;
         let noted = Noted { progress, notes: Mutex::default() };
-        let (scene, preparation) = whole::scene(self, &noted)?;
+        let ((scene, preparation), key) = whole::scene(self, &noted)?;
         let notes = noted.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes });
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes, key });
         *made = Some((making, whole.clone()));
         Ok(whole)
     }
@@ -213,9 +222,9 @@ impl Request<'_> {
         }
         // Without this reference, surfels that no other renderer uses are moved instead of copied.
         *made = None;
-        let Whole { scene, preparation, notes } = Arc::unwrap_or_clone(whole);
+        let Whole { scene, preparation, notes, key } = Arc::unwrap_or_clone(whole);
         let scene = levels::made(Arc::unwrap_or_clone(scene), progress)?;
-        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes });
+        let whole = Arc::new(Whole { scene: Arc::new(scene), preparation, notes, key });
         *made = Some((making, whole.clone()));
         Ok(whole)
     }

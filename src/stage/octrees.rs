@@ -1,11 +1,12 @@
 //! COPC files: only the octree nodes that a picture needs are read.
 
 use super::Request;
+use super::coloring::Coloring;
 use super::in_part::{Part, ReadReport};
 use super::whole::scene_of;
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
-use crate::io::{ColorRules, Points};
+use crate::io::{ColorBy, ColorRules, Points};
 use crate::options::values::Switch;
 use crate::plan::Settings;
 use crate::progress::Progress;
@@ -19,6 +20,8 @@ pub(super) struct Octrees {
     octrees: Vec<PointOctree>,
     /// How colour values are interpreted, as decided by the coarsest nodes.
     rules: ColorRules,
+    /// The values at the ends of the colour map, as decided by the coarsest nodes.
+    ends: Option<[f64; 2]>,
     /// Surfels of the coarsest nodes, from which the camera is framed.
     pub overview: Scene,
 }
@@ -26,7 +29,8 @@ pub(super) struct Octrees {
 impl Octrees {
     /// Opens the inputs if they can be read in part, that is, if all of them are COPC files.
     ///
-    /// Returns None if an option needs all points: `--outliers`, `--surfel-size` or `--triangles`.
+    /// Returns None if an option needs all points: `--outliers`, `--surfel-size`, `--triangles` or
+    /// `--color-by density`.
     ///
     /// # Errors
     ///
@@ -34,7 +38,8 @@ impl Octrees {
     pub fn of(request: &Request<'_>, progress: &dyn Progress) -> Result<Option<Self>> {
         let all = request.surfels().limits.outliers.is_some()
             || request.surfels().size.is_some()
-            || !request.triangles().meshes.is_empty();
+            || !request.triangles().meshes.is_empty()
+            || request.scene.options.colors.color_by == Some(ColorBy::Density);
         if request.files().paths().is_empty() || all {
             return Ok(None);
         }
@@ -47,10 +52,13 @@ impl Octrees {
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
         let mut rules = ColorRules::default();
-        let points = read(request, (&mut files, &mut rules), &nodes, progress)?;
+        let mut points = read(request, (&mut files, &mut rules), &nodes, progress)?;
+        let mut coloring = Coloring::of(&request.scene.options.colors, None);
+        coloring.settle(&mut points)?;
+        let ends = coloring.ends();
         let built = surfels::build_within(points, Vec::new(), &request.surfels().limits.limits(), progress);
         let (overview, _) = built.map_err(|error| request.files().named(error))?;
-        Ok(Some(Self { files, octrees, rules, overview }))
+        Ok(Some(Self { files, octrees, rules, ends, overview }))
     }
 
     /// Reads the nodes that the picture of `camera` needs, or the overview's if they have no point.
@@ -65,12 +73,13 @@ impl Octrees {
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        let mut points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        let key = Coloring::of(&request.scene.options.colors, self.ends).settle(&mut points)?;
         let mut made = scene_of(request, points, progress)?;
         self.end(&mut made.0, &nodes);
         // All read points are drawn.
         let settings = Settings { detail: Detail::FINEST, ..settings.clone() };
-        Ok(Part { made, settings, read: read_of(&self.files, &nodes) })
+        Ok(Part { made, settings, read: read_of(&self.files, &nodes), key })
     }
 
     /// Makes surfels of these nodes end at the bounding box of all points.
@@ -112,5 +121,6 @@ fn read(
     nodes: &[Vec<usize>],
     progress: &dyn Progress,
 ) -> Result<Vec<Points>> {
-    request.files().nodes(files.iter_mut().zip(nodes), rules, progress)
+    let column = request.scene.options.colors.column();
+    request.files().nodes(files.iter_mut().zip(nodes), (rules, column), progress)
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::in_part::{Part, Parts};
 use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, levels, memory};
+use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
@@ -12,7 +13,7 @@ use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report, render};
-use crate::scene::{self, Bounds, Camera, KernelFaults, Maps};
+use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -34,6 +35,8 @@ pub(super) enum Drawn {
     Whole {
         scene: Arc<scene::Scene>,
         guessed_up: bool,
+        /// The meaning of colours, if they show an attribute.
+        key: Option<ColorKey>,
         renderer: Box<render::Renderer<Arc<scene::Scene>, Arc<Backend>>>,
     },
     /// Files of which each view reads a part.
@@ -59,6 +62,8 @@ pub struct Picture {
     pub read: Option<ReadReport>,
     /// Why nothing is visible; None if something is.
     pub unseen: Option<Unseen>,
+    /// The meaning of the colours, if they show an attribute.
+    pub key: Option<ColorKey>,
 }
 
 impl Renderer {
@@ -216,6 +221,8 @@ impl Renderer {
     pub(super) fn rendered(&mut self, view: &View, is_told: bool, progress: &dyn Progress) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
+        let marks = options.marks.marks();
+        marks.check(&camera)?;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
@@ -225,14 +232,14 @@ impl Renderer {
             }
         };
         match drawn {
-            Drawn::Whole { scene, guessed_up, renderer } => {
+            Drawn::Whole { scene, guessed_up, key, renderer } => {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let rendered = renderer.frame(&camera, progress)?;
-                Ok(picture(scene, settings, rendered, (camera, view), (None, maps)))
+                picture(scene, settings, rendered, (camera, view), (None, maps, key.clone())).marked(marks)
             }
             Drawn::Parts { parts, noted } => {
-                let Part { made: (scene, preparation), settings, read } =
+                let Part { made: (scene, preparation), settings, read, key } =
                     parts.scene(&request, (&camera, *frames), settings, progress)?;
                 let first = !std::mem::replace(noted, true);
                 if first {
@@ -246,9 +253,20 @@ impl Renderer {
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), maps)))
+                picture(&scene, &settings, rendered, (camera, view), (Some(read), maps, key)).marked(marks)
             }
         }
+    }
+}
+
+impl Picture {
+    /// Draws marks on the frame.
+    fn marked(self, marks: Marks) -> Result<Self> {
+        if marks == Marks::default() {
+            return Ok(self);
+        }
+        let frame = marks.draw(self.frame, &self.camera, self.key.as_ref())?;
+        Ok(Self { frame, ..self })
     }
 }
 
@@ -295,7 +313,8 @@ fn whole(
     let renderer = render::Renderer::new(whole.scene.clone(), &settings, backend.clone())?;
     renderer.kernel_faults().and_then(KernelFaults::sentence).iter().for_each(|line| progress.note(line));
     let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
-    Ok((settings, Drawn::Whole { scene, guessed_up, renderer: Box::new(renderer) }))
+    let key = whole.key.clone();
+    Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
 }
 
 /// Combines a rendered frame with its view and counts, with `maps` that are made from others, and
@@ -305,9 +324,9 @@ fn picture(
     settings: &Settings,
     (frame, report): (Frame, Report),
     (camera, view): (Camera, ViewReport),
-    (read, maps): (Option<ReadReport>, Maps),
+    (read, maps, key): (Option<ReadReport>, Maps, Option<ColorKey>),
 ) -> Picture {
     let frame = heights::made(frame, &camera, scene.up.axis(), maps);
     let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
-    Picture { frame, report, camera, view, read, unseen }
+    Picture { frame, report, camera, view, read, unseen, key }
 }

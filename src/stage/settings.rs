@@ -2,11 +2,12 @@
 
 use super::Request;
 use crate::error::{Error, Result};
+use crate::io::ColorBy;
 use crate::options::Suggested;
 use crate::plan::{Facts, Settings, check};
 use crate::progress::Progress;
 use crate::scene::composite::ALL_LAYERS;
-use crate::scene::{Blend, Colors, Composite, Scene};
+use crate::scene::{Blend, Colors, Composite, Scene, Shading};
 
 impl Request<'_> {
     /// Returns the settings before any input is read, as if the scene had no Gaussians.
@@ -15,6 +16,13 @@ impl Request<'_> {
     /// [`Error::Usage`] for options that cannot be combined.
     pub fn settings(&self) -> Result<Settings> {
         let settings = self.settled(false)?;
+        if self.options.marks.legend && !self.scene.options.colors.is_given() {
+            let what = "--legend shows the values of --color-by: give an attribute there, or leave --legend out";
+            return Err(Error::Usage(what.into()));
+        }
+        if self.options.points.facing.is_some() && self.scene.options.colors.color_by == Some(ColorBy::Normal) {
+            return Err(Error::Usage("--facing leaves points no normals: leave it or --color-by normal out".into()));
+        }
         if self.surfels().textures.is_empty() {
             return Ok(settings);
         }
@@ -73,7 +81,9 @@ impl Request<'_> {
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {
         let one_input = self.files().paths().len() < 2 && self.scene.given.len() < 2;
-        let suggested = Suggested { gaussians, shading: None, views: self.views, one_input };
+        // Unlit, the colours of an attribute are those of its legend.
+        let shading = self.scene.options.colors.is_given().then_some(Shading::Unlit);
+        let suggested = Suggested { gaussians, shading, views: self.views, one_input };
         let settings = self.options.settle(self.backend(), suggested);
         self.options.check(self.backend(), &settings)?;
         Ok(settings)

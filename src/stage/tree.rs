@@ -87,7 +87,7 @@ impl Tree {
             points: [read.surfels, surfels],
             bytes: [read.bytes, self.levels.bytes(surfels, nodes)],
         };
-        Ok(Part { made: (scene, preparation), settings: settings.clone(), read })
+        Ok(Part { made: (scene, preparation), settings: settings.clone(), read, key: None })
     }
 }
 
@@ -99,6 +99,8 @@ fn asks_for_all(request: &Request<'_>) -> Option<&'static str> {
         (limits.largest_ratio != Limits::default().largest_ratio, "--max-radius"),
         (request.surfels().size.is_some(), "--surfel-size"),
         (read.class_opacity.is_some(), "--class-opacity"),
+        (!read.filter().is_empty(), "--where or --classes"),
+        (request.scene.options.colors.is_given(), "--color-by"),
         (read.file.ignore_alpha, "--ignore-alpha"),
         (!request.triangles().meshes.is_empty(), "--triangles"),
         (request.triangles().texture.is_some(), "--triangle-texture"),

@@ -4,14 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Request;
+use super::coloring::by_normals;
 use super::meshes::Meshes;
 use crate::error::{Error, Result};
-use crate::io::{Points, Texture};
+use crate::io::{ColorBy, Points, Texture};
 use crate::options::{MeshAs, RenderOptions, Suggested};
 use crate::plan::check::textured;
 use crate::plan::{Facts, composited};
 use crate::progress::Progress;
-use crate::scene::{Blend, Colors, Composite, Map, PointSize, Scene};
+use crate::scene::{Blend, ColorKey, Colors, Composite, Map, PointSize, Scene};
 use crate::surfels::{self, FromPoints, Preparation, Surfels, from_points};
 
 /// A scene, and counts of how its points became surfels.
@@ -25,6 +26,8 @@ pub(super) struct Whole {
     pub preparation: Preparation,
     /// Notes of reading and building.
     pub notes: Vec<String>,
+    /// The meaning of colours, if they show an attribute.
+    pub key: Option<ColorKey>,
 }
 
 /// The choices of a picture on which its surfels depend.
@@ -59,12 +62,12 @@ impl Making {
 }
 
 /// Reads all inputs and meshes into one scene.
-pub(super) fn scene(request: &Request<'_>, progress: &dyn Progress) -> Result<Made> {
-    let points = request.points(progress)?;
+pub(super) fn scene(request: &Request<'_>, progress: &dyn Progress) -> Result<(Made, Option<ColorKey>)> {
+    let (points, key) = request.points(progress)?;
     if let Some(read) = request.read {
         read(&points);
     }
-    scene_of(request, points, progress)
+    Ok((scene_of(request, points, progress)?, key))
 }
 
 /// Builds one scene from the points of the inputs, reading the triangle meshes to draw with them.
@@ -103,8 +106,16 @@ fn paints(request: &Request<'_>) -> bool {
     finest && settings.is_ok_and(|settings| textured(&settings, reference).is_ok() && settings.blend != Blend::Nearest)
 }
 
-/// Builds the surfels of all inputs.
+/// Builds the surfels of all inputs, and colours them if the options ask for colours by normals.
 pub(super) fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
+    let (scene, preparation) = uncolored(request, inputs, progress)?;
+    match request.scene.options.colors.color_by {
+        Some(ColorBy::Normal) => Ok((by_normals(scene), preparation)),
+        _ => Ok((scene, preparation)),
+    }
+}
+
+fn uncolored(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
     if !textures.is_empty() && inputs.iter().any(bare) {

@@ -40,6 +40,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         preparation.points += keep.len() as u64;
         preparation.withheld += input.withheld;
         preparation.unseen += input.unseen;
+        preparation.filtered += input.filtered;
         preparation.loose += input.loose;
         preparation.told.append(&mut input.notes);
         preparation.unread.append(&mut input.unread);
@@ -105,6 +106,10 @@ fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
         (_, 0) if preparation.unseen > 0 => format!(
             "{} points are left out as their classes have the opacity 0, and {} as they are marked as withheld, so there is nothing to draw",
             preparation.unseen, preparation.withheld
+        ),
+        (_, 0) if preparation.filtered > 0 => format!(
+            "none of the {} points read passes --where and --classes, so there is nothing to draw: epsplat info lists the ranges of attributes",
+            preparation.filtered
         ),
         (_, 0) if preparation.withheld > 0 => format!(
             "all of the {} points read are marked as withheld, which is deleted, so there is nothing to draw: \

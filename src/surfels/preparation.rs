@@ -16,6 +16,9 @@ pub struct Preparation {
     pub withheld: u64,
     /// The number of points whose class has the opacity 0, which `points` does not include.
     pub unseen: u64,
+    /// The number of points that do not pass the filter, which `points` does not include.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub filtered: u64,
     /// Parts of files that could not be read and were left out: a sentence for each, with names and
     /// counts.
     pub unread: Vec<String>,
@@ -96,6 +99,11 @@ pub struct Preparation {
     pub told: Vec<String>,
 }
 
+/// Whether a count is 0, so that a report leaves it out.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 impl Preparation {
     /// Whether the signs of given normals are arbitrary, as those of fitted planes are.
     pub(crate) fn has_random_sides(&self) -> bool {
@@ -111,6 +119,7 @@ impl Preparation {
                 "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
             ),
             counted(self.unseen, "were left out: their class has the opacity 0"),
+            counted(self.filtered, "were left out by --where or --classes"),
             (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
             (self.broken > 0)
                 .then(|| format!("{} triangles were left out: a coordinate is not finite or too large", self.broken)),

@@ -1,6 +1,7 @@
 //! The commands, the studies and the README.
 //! All in one test program, so that shared code and kernels are compiled once.
 
+mod attributes;
 mod bench;
 mod card;
 mod cases;

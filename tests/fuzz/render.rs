@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::session::sentence;
-use epsplat::io::{Points, ReadOptions};
+use epsplat::io::{Points, ReadOptions, Wanted};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
@@ -33,6 +33,7 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     if count > MOST_POINTS {
         return Ok(Outcome::Read);
     }
+    attributes(path, &points)?;
     let usable = |p: &[f64; 3]| p.iter().all(|c| c.abs() <= LARGEST_COORDINATE);
     // Gaussians may lack attributes that cannot be estimated.
     let drawable = points.positions.iter().any(usable) && !points.encoded;
@@ -61,6 +62,25 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     }
     draw(&scene, &camera, &shaded(Shading::Lambert))?;
     draw(&scene, &camera, &shaded(Shading::Unlit))
+}
+
+/// Reads all attributes of a file whose `points` were read without them, and one of them for each
+/// point: neither changes the points.
+fn attributes(path: &Path, points: &Points) -> Result<(), String> {
+    let read = |wanted: Wanted| {
+        let read = io::read_with(path, ReadOptions { flatten: true, wanted, ..ReadOptions::default() }, &());
+        read.map_err(|error| format!("the file is refused where its attributes are read: {error}"))
+    };
+    let all = read(Wanted { spans: true, ..Wanted::default() })?;
+    if all.positions.len() != points.positions.len() || all.spans.len() < 3 {
+        return Err(format!("{} points and {} ranges with attributes", all.positions.len(), all.spans.len()));
+    }
+    let last = all.spans.last().map(|span| span.name.clone()).unwrap_or_default();
+    let one = read(Wanted { column: Some(last.clone()), ..Wanted::default() })?;
+    match one.column.map(|column| column.values.len()) {
+        Some(count) if count == points.positions.len() => Ok(()),
+        other => Err(format!("{other:?} values of {last}")),
+    }
 }
 
 /// The largest absolute coordinate or radius of a scene, world units.

@@ -43,7 +43,7 @@ fn all_nodes_are_the_file() {
     for rules in ["", "2:0", "5:0.5"] {
         let classes = if rules.is_empty() { Default::default() } else { rules.parse().unwrap() };
         let options = ReadOptions { classes, ..ReadOptions::default() };
-        let whole = io::read_with(&data("simple.copc.laz"), options, &()).unwrap();
+        let whole = io::read_with(&data("simple.copc.laz"), options.clone(), &()).unwrap();
         let mut read = copc.read(&all, &options, &()).unwrap();
         // Point numbers replace the list of points that were left out.
         let left_out: BTreeSet<u64> = whole.left_out.iter().copied().collect();

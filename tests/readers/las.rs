@@ -160,7 +160,7 @@ fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
         if let Some(Colors::Srgb8(codes)) = points.colors {
             assert_eq!((codes.len(), codes[49]), (50, [98, 0, 255, 255]));
         }
-        let all = io::read_with(&folder.path("a.las"), keep_withheld, &()).unwrap();
+        let all = io::read_with(&folder.path("a.las"), keep_withheld.clone(), &()).unwrap();
         assert_eq!(all.withheld, 0);
         assert_positions(&all.positions, 0..100);
         if let Some(Colors::Srgb8(codes)) = all.colors {
@@ -187,7 +187,7 @@ fn classes_have_opacities() {
             ..point(i, Some([i as u16, 0, 255]))
         });
         folder.read("a.las", &file(minor, format, compressed, points)).unwrap();
-        let points = io::read_with(&folder.path("a.las"), rules, &()).unwrap();
+        let points = io::read_with(&folder.path("a.las"), rules.clone(), &()).unwrap();
         // Ten of twenty points of class 5 are withheld.
         assert_eq!((points.positions.len(), points.withheld, points.unseen), (80, 10, 10), "{format}");
         let counts = [(1, 20), (2, 20), (3, 20), (5, 10), (30, 20)];
@@ -202,9 +202,11 @@ fn classes_have_opacities() {
         };
         assert!(alphas.iter().zip([1.0, 0.4, 0.4, 1.0].iter().cycle()).all(|(a, b)| (a - b).abs() < 1e-6), "{format}");
     }
-    let (_, preparation) =
-        epsplat::low_level::surfels::build(vec![io::read_with(&folder.path("a.las"), rules, &()).unwrap()], &())
-            .unwrap();
+    let (_, preparation) = epsplat::low_level::surfels::build(
+        vec![io::read_with(&folder.path("a.las"), rules.clone(), &()).unwrap()],
+        &(),
+    )
+    .unwrap();
     assert!(preparation.notes().iter().any(|note| note == "10 points were left out: their class has the opacity 0"));
     let none = ReadOptions { classes: "0-255:0".parse().unwrap(), ..ReadOptions::default() };
     let nothing =

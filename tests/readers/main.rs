@@ -1,6 +1,7 @@
 //! The readers on valid files of every supported kind, and on damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod attributes;
 mod copc;
 mod e57;
 #[cfg(feature = "e57")]
@@ -136,7 +137,7 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
         assert_eq!(said, expected);
     }
     let obj = ReadOptions { format: Some(Format::Obj), ..ReadOptions::default() };
-    assert_eq!(io::read_with(&folder.path("a.xyz"), obj, &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
+    assert_eq!(io::read_with(&folder.path("a.xyz"), obj.clone(), &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
     // An explicit format takes precedence over the file name.
     folder.read("a.laz", &laz).unwrap();
     assert!(io::read_with(&folder.path("a.laz"), ReadOptions { format: Some(Format::Ply), ..obj }, &()).is_err());

@@ -212,7 +212,8 @@ fn what_cannot_be_divided_is_told() {
         1,
         &["no texture coordinates"],
     );
-    let joined = ["render", bunny, "--mesh", "surfels", "-o", text(&folder.path("o.png")), "--join", "nearest"];
+    let image = folder.path("o.png");
+    let joined = ["render", bunny, "--mesh", "surfels", "-o", text(&image), "--join", "nearest"];
     fails(&joined, 2, &["--join", "none"]);
     assert_eq!(folder.names(), ["c.ply"]);
 }

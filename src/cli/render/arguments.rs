@@ -24,7 +24,8 @@ use super::super::outputs::Source;
     after_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
     epsplat render scan.laz -o maps.exr --aov depth,normal --size 1920x1080\n  \
-    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n\n\
+    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
+    epsplat render scan.laz -o height.png --color-by z --legend\n\n\
     --help lists all options.",
     after_long_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
@@ -35,6 +36,7 @@ use super::super::outputs::Source;
     epsplat render statue.ply -o hall.png --triangles hall.obj\n  \
     epsplat render skin.ply shirt.ply -o dressed.png --separate\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
+    epsplat render scan.laz -o ground.png --color-by intensity --classes ground --legend\n  \
     epsplat render scan.laz -o ortho.tif --pixel-size 0.5\n  \
     epsplat render scan.laz -o height.tif --pixel-size 0.5 --aov height\n  \
     epsplat render scan.laz -o views --cameras transforms.json\n  \

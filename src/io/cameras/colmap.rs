@@ -234,7 +234,7 @@ mod tests {
 
     fn read(cameras: &str, poses: &str) -> Result<Vec<NamedCamera>, String> {
         let said = |fault| match fault {
-            Fault::Malformed(what) => what,
+            Fault::Malformed(what) | Fault::Usage(what) => what,
             Fault::Io(error) => error.to_string(),
         };
         let lenses = lenses(&mut Lines::of(cameras.as_bytes())).map_err(said)?;

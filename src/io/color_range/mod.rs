@@ -149,6 +149,11 @@ impl RawColors {
         Self { runs: vec![Run { count, colors, shades }], ..Self::default() }
     }
 
+    /// Leaves out the points whose flag is not set, once the range of colours is decided.
+    pub(super) fn leave_out(&mut self, flags: Vec<bool>) {
+        self.keep = Some(flags);
+    }
+
     /// Whether there is at most one run, all its colours are equal, and no intensities are stored.
     pub(super) fn is_one_color(&self) -> bool {
         let is_one =

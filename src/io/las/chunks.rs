@@ -6,6 +6,7 @@
 //! first.
 
 use super::arithmetic::Integers;
+use super::dimensions::Layer;
 use super::extra::Field;
 use super::shown::Shown;
 use crate::io::fault::Fault;
@@ -22,6 +23,9 @@ pub(super) const MOST_A_BYTE: u64 = 1 << 12;
 
 /// Index of the layer of intensities among those of a point.
 const INTENSITIES: usize = 4;
+
+/// The number of layers of a point without its colour and its extra bytes.
+const POINT_LAYERS: usize = 9;
 
 /// Offset of the points per chunk in a LASzip record, bytes.
 const CHUNK_SIZE: usize = 12;
@@ -141,6 +145,8 @@ pub(super) struct Scheme {
     pub(super) extra: Option<usize>,
     /// Index of the layer of intensities, if there are colours and layers are in the usual order.
     pub(super) intensities: Option<usize>,
+    /// Whether intensities are needed for themselves, whatever the colours.
+    pub(super) wants_intensities: bool,
 }
 
 impl Scheme {
@@ -193,15 +199,28 @@ impl Scheme {
         let extra = layers.iter().position(|layer| *layer == (14, 0)).filter(|_| usual);
         let needed = layers.into_iter().map(|layer| !usual || needed(layer)).collect();
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
-        Some(Self { compressor, chunk, record, has_color, needed, extra, intensities })
+        Some(Self { compressor, chunk, record, has_color, needed, extra, intensities, wants_intensities: false })
     }
 
     /// Sets whether intensities are needed although there are colours: these may turn out to be all
     /// zero.
     pub(super) fn need_intensities(&mut self, taken: bool) {
         if let Some(needed) = self.intensities.and_then(|layer| self.needed.get_mut(layer)) {
-            *needed = taken;
+            *needed = taken || self.wants_intensities;
         }
+    }
+
+    /// Marks a layer as needed. If layers are in an unusual order, all are needed anyway.
+    pub(super) fn need_layer(&mut self, layer: Layer) {
+        let place = match layer {
+            Layer::Point(place) => place,
+            Layer::Color => POINT_LAYERS,
+            Layer::Infrared => POINT_LAYERS + 1,
+        };
+        if let Some(needed) = self.needed.get_mut(place) {
+            *needed = true;
+        }
+        self.wants_intensities |= layer == Layer::Point(INTENSITIES);
     }
 
     /// Marks an attribute of the extra bytes as needed; each of its bytes is a layer.

@@ -1,6 +1,7 @@
 //! COPC 1.0: LAZ files whose chunks are the nodes of an octree. A picture needs only a few nodes.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
+use super::dimensions::Dimensions;
 use super::extra::Normals;
 use super::layers::Layers;
 use super::shown::Shown;
@@ -52,6 +53,8 @@ pub struct Copc {
     pub(super) rules: ColorRules,
     /// The normals among the extra bytes of points.
     pub(super) normals: Option<Normals>,
+    /// The numbers of records.
+    pub(super) dimensions: Dimensions,
     /// Sentences about odd fields of the header.
     pub(super) notes: Vec<String>,
 }
@@ -184,6 +187,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         looks: None,
         rules: ColorRules::default(),
         normals: found.normals,
+        dimensions: found.dimensions,
         notes,
     })
 }

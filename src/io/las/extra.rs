@@ -57,14 +57,20 @@ pub(super) fn fields(record: &Vlr) -> Option<Vec<Field>> {
 }
 
 impl Field {
+    /// Whether the attribute is one number or several.
+    pub fn is_number(&self) -> bool {
+        (1..=30).contains(&self.kind)
+    }
+
     /// The attribute's first number in a point's extra bytes; None if they are too short.
-    fn number(&self, bytes: &[u8]) -> Option<f64> {
+    pub fn number(&self, bytes: &[u8]) -> Option<f64> {
         macro_rules! number {
             ($type:ty) => {
                 bytes.get(self.start..)?.first_chunk().map(|bytes| <$type>::from_le_bytes(*bytes) as f64)
             };
         }
-        let value = match self.kind {
+        let value = match (self.kind.wrapping_sub(1) % 10) + 1 {
+            _ if !self.is_number() => None,
             1 => number!(u8),
             2 => number!(i8),
             3 => number!(u16),

@@ -1,6 +1,7 @@
 //! Facts in the header of a LAS file, and notes about fields that contradict each other.
 
 use super::chunks::promised;
+use super::dimensions::Dimensions;
 use super::extra::{self, Field, Normals};
 use super::system::{self, System};
 use crate::io::about::{About, Attribute, Role};
@@ -39,6 +40,8 @@ pub(super) struct Found {
     pub keys: Option<GeoKeys>,
     /// The normals among the extra bytes of points.
     pub normals: Option<Normals>,
+    /// The numbers of records.
+    pub dimensions: Dimensions,
     /// Sentences about odd fields.
     pub notes: Vec<String>,
     /// The bounding box in the header, and the step of coordinates.
@@ -75,11 +78,12 @@ pub(super) fn look(
     };
     let notes = notes.into_iter().map(named).collect();
     let geographic = system.as_ref().and_then(|system| system.geographic);
-    let own = Format::new(header.point_data_record_format & 0x3f).map_or(0, |format| format.len());
-    let normals = Normals::of(&extra, own);
+    let own = Format::new(header.point_data_record_format & 0x3f);
+    let dimensions = own.as_ref().map_or_else(|_| Dimensions::default(), |format| Dimensions::of(format, &extra));
+    let normals = Normals::of(&extra, own.map_or(0, |format| format.len()));
     let about = about(header, system, &extra);
     let keys = systems.geo_keys();
-    Ok(Found { about, geographic, keys, normals, notes, bounds, step: scales.map(f64::abs) })
+    Ok(Found { about, geographic, keys, normals, dimensions, notes, bounds, step: scales.map(f64::abs) })
 }
 
 impl Found {

@@ -71,6 +71,7 @@ mod tests {
             needed: needed.to_vec(),
             extra: None,
             intensities: None,
+            wants_intensities: false,
         };
         let lengths = [3u32, 2, 4, 0, 1, 5, 2];
         let mut chunk = vec![7, 8, 9, 0, 0, 0];

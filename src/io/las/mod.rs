@@ -3,6 +3,7 @@
 mod arithmetic;
 mod chunks;
 mod copc;
+mod dimensions;
 mod extra;
 mod header;
 mod layers;
@@ -17,6 +18,7 @@ use crate::io::place::GeoKeys;
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up, degrees};
 use crate::{Error, Progress, Result};
+use dimensions::Wants;
 use extra::Normals;
 use header::Found;
 use las::reader::{LazParallelism, ReaderOptions};
@@ -168,6 +170,7 @@ fn decode(
     let mut block = PointDataBuilder::new().for_header(header).build();
     let block_points = (BLOCK / u64::from(format.len()).max(1)).max(1);
     let mut kept = Kept::of(None, found.normals.as_ref());
+    kept.wants = found.dimensions.collector(&read_options.wanted)?;
     reserve(&mut kept.positions, capacity)?;
     let mut read = 0;
     while read < promised {
@@ -184,7 +187,7 @@ fn decode(
         read += count;
         progress.advance(count);
     }
-    Ok(kept.points(0..read, read_options))
+    kept.points(0..read, read_options)
 }
 
 /// Adds the file's description of itself, and notes about odd fields and coordinates. `name` is the
@@ -241,6 +244,8 @@ struct Kept<'a> {
     /// The number of points of each class, without deleted ones.
     counts: BTreeMap<u8, u64>,
     left_out: Vec<u64>,
+    /// Collects the wanted attributes, if there are any.
+    wants: Option<Wants>,
 }
 
 impl<'a> Kept<'a> {
@@ -251,9 +256,9 @@ impl<'a> Kept<'a> {
 
     /// The collected points, with colours as they are in the file. `numbers` are the indices of all
     /// points that were read, in order.
-    fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
-        let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, left_out } =
-            self;
+    fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Result<Points, Fault> {
+        let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, .. } = self;
+        let (left_out, wants) = (self.left_out, self.wants);
         let normals = has_normals.map(|_| normals);
         let kind = Kind { zero_is_none: !decided, ..Kind::of(Number::WORD) };
         let colors = Numbers { values: Values::Words(codes), kind, alpha: None };
@@ -263,34 +268,37 @@ impl<'a> Kept<'a> {
         };
         let raw = RawColors::of_run(positions.len(), colors, shades);
         let raw = Some(Box::new(RawColors { opacities: options.classes, classes, ..raw }));
-        let withheld = left_out.len() as u64;
         let up = Some(Up::Z);
-        let mut points =
-            Points { positions, normals, raw, up, classes: counts, withheld, left_out, ..Points::default() };
+        let mut points = Points { positions, normals, raw, up, classes: counts, ..Points::default() };
+        wants.map_or(Ok(()), |wants| wants.collector.finish(&mut points, false))?;
+        points.withheld = left_out.len() as u64 - points.filtered;
+        points.left_out = left_out;
         leave_out_unseen(&mut points, numbers);
-        points
+        Ok(points)
     }
 
     /// The collected points, with their indices in the file. `runs` are the ranges of indices that
     /// were read, and `all` is the number of points in the file. From 2^32 points on, indices do
     /// not fit in u32, and points are numbered in the order in which they are kept.
-    fn numbered(self, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Points {
+    fn numbered(self, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Result<Points, Fault> {
         let numbers = || runs.iter().cloned().flatten();
-        let mut points = self.points(numbers(), options);
+        let mut points = self.points(numbers(), options)?;
         let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
         if u32::try_from(all).is_ok() {
             let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
             points.numbers = Some(kept.map(|number| number as u32).collect());
         }
-        points
+        Ok(points)
     }
 
     /// Adds the points of a block, except deleted ones. `first` is the index of the block's first
     /// point.
     fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
         let mut keeps = Vec::with_capacity(block.len());
+        let passes = self.passing(block, options);
         for ((withheld, class), number) in withheld(block).zip(classes(block)).zip(first..) {
-            let keep = !withheld || options.keep_withheld;
+            let passes = passes.get(keeps.len()).is_none_or(|passes| *passes);
+            let keep = passes && (!withheld || options.keep_withheld);
             if keep {
                 *self.counts.entry(class).or_default() += 1;
                 self.classes.extend((!options.classes.are_plain()).then_some(class));

@@ -47,6 +47,7 @@ impl Copc {
     ///
     /// As [`read`](Self::read).
     pub fn read_raw(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+        self.need(options).map_err(|fault| self.fault(fault))?;
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
         progress.begin(&format!("looking at {} nodes of {}", nodes.len(), fault::name(&self.path)), nodes.len() as u64);
@@ -64,6 +65,15 @@ impl Copc {
         Ok(points)
     }
 
+    /// Adds the layers of the wanted attributes to those that are read.
+    fn need(&mut self, options: &ReadOptions) -> Result<(), Fault> {
+        let wants = self.dimensions.collector(&options.wanted)?;
+        if wants.is_some_and(|wants| wants.need(&mut self.scheme)) {
+            self.layers.fill(None);
+        }
+        Ok(())
+    }
+
     fn decoded(
         &mut self,
         nodes: &[usize],
@@ -76,6 +86,7 @@ impl Copc {
         let normals = self.normals.clone();
         let (mut kept, mut read) = (Kept::of(self.looks, normals.as_ref()), Vec::new());
         // The promised number may be wrong, so the number of bytes caps the reservation.
+        kept.wants = self.dimensions.collector(&options.wanted)?;
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
             let compressed = |&node: &usize| {
@@ -102,7 +113,7 @@ impl Copc {
         }
         let unread = unread.told(&self.path, ("nodes", all), !read.is_empty())?;
         self.decide(&kept);
-        let mut points = kept.numbered(&read, self.count, options);
+        let mut points = kept.numbered(&read, self.count, options)?;
         points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&self.path));
         Ok(Points { unread, ..points })
     }

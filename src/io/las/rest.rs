@@ -52,6 +52,7 @@ pub(super) fn read(
     let (mut file, mut unread, mut read) = (shown.into_inner().into_file(), Unread::default(), Vec::new());
     let normals = found.normals.clone();
     let mut kept = Kept::of(None, normals.as_ref());
+    kept.wants = found.dimensions.collector(&options.wanted)?;
     progress.begin(&format!("reading {name}, chunk by chunk"), promised(&header));
     for together in places.chunks(rayon::current_num_threads()) {
         let bytes: Vec<Result<Vec<u8>, Fault>> = together.iter().map(|place| bytes_of(&mut file, place)).collect();
@@ -78,7 +79,7 @@ pub(super) fn read(
         return malformed("all chunks can be decoded");
     }
     let unread = unread.told(path, ("chunks", places.len() as u64), !read.is_empty())?;
-    let points = kept.numbered(&read, promised(&header), options);
+    let points = kept.numbered(&read, promised(&header), options)?;
     Ok(Points { unread, ..described(points, found, &name, options) })
 }
 

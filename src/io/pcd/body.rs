@@ -70,7 +70,7 @@ pub(super) fn ascii(
         }
     }
     progress.advance(unreported);
-    Ok(reading.into_points())
+    reading.into_points()
 }
 
 fn too_few(line: u64) -> Fault {
@@ -124,7 +124,7 @@ pub(super) fn binary(
         cells.extend(&mut reading, &block, rows as usize);
         progress.advance(rows);
     }
-    Ok(reading.into_points())
+    reading.into_points()
 }
 
 /// Reads `binary_compressed` data.
@@ -138,7 +138,7 @@ pub(super) fn compressed(
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
     if header.points == 0 {
-        return Ok(Reading::with_capacity(columns, header, 0)?.into_points());
+        return Reading::with_capacity(columns, header, 0)?.into_points();
     }
     let mut lengths = [[0; 4]; 2];
     for length in &mut lengths {
@@ -177,7 +177,7 @@ pub(super) fn compressed(
     let mut reading = Reading::with_capacity(columns, header, header.points)?;
     cells.extend(&mut reading, &bytes, header.points as usize);
     progress.advance(header.points);
-    Ok(reading.into_points())
+    reading.into_points()
 }
 
 /// For each [`Cell`] its field, the place of its numbers in the data, and whether the cell is a

@@ -43,7 +43,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     let header = header::read(&mut reader).map_err(in_file)?;
     let left = length.saturating_sub(header.bytes);
     progress.begin(&format!("reading {}", fault::name(&path)), header.points);
-    let columns = Columns::of(&header, options.ignore_alpha).map_err(in_file)?;
+    let columns = Columns::of(&header, options).map_err(in_file)?;
     let about = options.describe.then(|| Box::new(about(&header, &columns)));
     let points = match header.data {
         Data::Ascii => body::ascii(reader, (&header, columns), left, progress),

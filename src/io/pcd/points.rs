@@ -1,12 +1,13 @@
 //! The meaning of a PCD file's fields, and their conversion to points.
 
 use super::header::{Field, Header, Scalar};
-use crate::io::Points;
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
+use crate::io::dimensions::{self, Collector};
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::finite;
+use crate::io::{Points, ReadOptions};
 
 /// One number of a point: the index of its field, and its index within that field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +24,28 @@ pub(super) struct Columns {
     normal: Option<[usize; 3]>,
     color: Option<Color>,
     intensity: Option<usize>,
+    /// The attributes that options ask for.
+    wants: Option<dimensions::Columns>,
 }
+
+/// The attributes of a point that are one number: the names and cells of all of them. The numbers
+/// of a longer field have an index in brackets, but a packed colour is none.
+fn numbers(header: &Header) -> (Vec<String>, Vec<Cell>) {
+    let is_number =
+        |field: &Field| field.name != "_" && !(field.size == 4 && ["rgb", "rgba"].contains(&field.name.as_str()));
+    let fields = header.fields.iter().enumerate().filter(|(_, field)| is_number(field));
+    fields
+        .flat_map(|(index, field)| {
+            (0..field.count.min(MOST_NUMBERS)).map(move |part| {
+                let name = if field.count > 1 { format!("{}[{part}]", field.name) } else { field.name.clone() };
+                (name, Cell { field: index, part })
+            })
+        })
+        .unzip()
+}
+
+/// The most numbers of a field that are attributes; descriptors of shapes have hundreds.
+const MOST_NUMBERS: u64 = 16;
 
 /// The cells of a colour.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +69,22 @@ impl Field {
 }
 
 impl Columns {
-    pub(super) fn of(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
+    /// Finds the numbers that the options need.
+    pub(super) fn of(header: &Header, options: &ReadOptions) -> Result<Self, Fault> {
+        let mut columns = Self::without_wants(header, options.ignore_alpha)?;
+        let (names, cells) = numbers(header);
+        let place = |field: usize| {
+            let cell = cells[field];
+            columns.cells.iter().position(|known| *known == cell).unwrap_or_else(|| {
+                columns.cells.push(cell);
+                columns.cells.len() - 1
+            })
+        };
+        columns.wants = dimensions::Columns::of(names, &options.wanted, place)?;
+        Ok(columns)
+    }
+
+    fn without_wants(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
         let fields = &header.fields;
         // A field with a count of 0 is ignored, whatever its name.
         let names = fields.iter().map(|field| if field.count > 0 { field.name.as_str() } else { "" });
@@ -88,7 +125,7 @@ impl Columns {
             })
         };
         let intensity = find(attributes::INTENSITY, names.clone()).map(|field| cell(field, 0));
-        Ok(Self { cells, position, normal, color, intensity })
+        Ok(Self { cells, position, normal, color, intensity, wants: None })
     }
 
     /// Whether a cell's four bytes are a packed colour, whatever its type.
@@ -129,6 +166,7 @@ pub(super) struct Reading {
     colored: bool,
     /// Whether the intensities are integers.
     integer: bool,
+    collector: Option<Collector>,
 }
 
 impl Reading {
@@ -146,7 +184,8 @@ impl Reading {
         reserve(&mut shades, of(columns.intensity.is_some() && columns.color.is_none()))?;
         let field = columns.intensity.map(|cell| &header.fields[columns.cells[cell].field]);
         let integer = field.is_some_and(|field| field.scalar != Scalar::Float);
-        Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer })
+        let collector = columns.wants.as_ref().map_or(Ok(None), dimensions::Columns::collector)?;
+        Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer, collector })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -158,6 +197,9 @@ impl Reading {
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let columns = &self.columns;
         self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
+        if let (Some(collector), Some(wants)) = (&mut self.collector, &columns.wants) {
+            wants.mark(collector, (rows, columns.position), &value);
+        }
         if let Some(normal) = columns.normal {
             self.normals.extend((0..rows).map(|row| normal.map(|cell| value(cell, row) as f32)));
         }
@@ -189,7 +231,7 @@ impl Reading {
         }
     }
 
-    pub(super) fn into_points(mut self) -> Points {
+    pub(super) fn into_points(mut self) -> Result<Points, Fault> {
         let count = self.positions.len();
         let colors = match self.columns.color {
             Some(Color::Packed(_, scalar, has_alpha)) => {
@@ -220,12 +262,10 @@ impl Reading {
         let shades = self.columns.intensity.filter(|_| !self.colored);
         let shades = shades.map(|_| Shades::Floats { values: self.shades, integer: self.integer });
         let raw = (colors.is_some() || shades.is_some()).then(|| Box::new(RawColors::of_run(count, colors, shades)));
-        Points {
-            positions: self.positions,
-            normals: self.columns.normal.map(|_| self.normals),
-            raw,
-            ..Points::default()
-        }
+        let normals = self.columns.normal.map(|_| self.normals);
+        let mut points = Points { positions: self.positions, normals, raw, ..Points::default() };
+        self.collector.map_or(Ok(()), |collector| collector.finish(&mut points, false))?;
+        Ok(points)
     }
 }
 

@@ -5,6 +5,7 @@ use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind};
 use super::vertex::{Layout, Vertices, is_tree};
 use crate::Progress;
+use crate::io::dimensions::Collector;
 use crate::io::fault::Fault;
 use crate::io::values::{parse_number, shown};
 use crate::io::{Points, Tree, TreeRow};
@@ -22,12 +23,12 @@ pub(super) fn read(
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
     let mut tokens = Tokens { reader, line: header.lines + 1, line_end: header.line_end, token: Vec::new() };
-    let mut contents = Contents { faces, points: Points::default(), tree: None, whole: None };
+    let mut contents = Contents { faces, ..Contents::default() };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
-            (contents.points, _) = vertices(&mut tokens, element, length, progress)?;
+            (contents.points, _, contents.collector) = vertices(&mut tokens, element, length, progress)?;
         } else if is_tree(element) {
-            let (nodes, rows) = vertices(&mut tokens, element, length, &())?;
+            let (nodes, rows, _) = vertices(&mut tokens, element, length, &())?;
             contents.tree = Some(Tree { nodes: Box::new(nodes), rows });
         } else {
             others(&mut tokens, element, &mut contents.faces)?;
@@ -64,7 +65,7 @@ fn vertices(
     vertex: &Element,
     length: u64,
     progress: &dyn Progress,
-) -> Result<(Points, Vec<TreeRow>), Fault> {
+) -> Result<(Points, Vec<TreeRow>, Option<Collector>), Fault> {
     let layout = Layout::of(vertex)?;
     // In text each number takes at least one digit and one separator.
     let possible = length / (2 * layout.scalars.len().max(1)) as u64;

@@ -6,6 +6,7 @@ use super::header::{Element, Header, Kind, Scalar};
 use super::vertex::{Layout, Vertices, is_tree};
 use super::whole::{self, is_whole};
 use crate::Progress;
+use crate::io::dimensions::Collector;
 use crate::io::fault::Fault;
 use crate::io::{Points, Tree, TreeRow};
 use std::io::{self, BufRead, Read};
@@ -21,12 +22,12 @@ pub(super) fn read<const BIG: bool>(
     faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
-    let mut contents = Contents { faces, points: Points::default(), tree: None, whole: None };
+    let mut contents = Contents { faces, ..Contents::default() };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
-            (contents.points, _) = vertices::<BIG>(&mut reader, element, length, progress)?;
+            (contents.points, _, contents.collector) = vertices::<BIG>(&mut reader, element, length, progress)?;
         } else if is_tree(element) {
-            let (nodes, rows) = vertices::<BIG>(&mut reader, element, length, &())?;
+            let (nodes, rows, _) = vertices::<BIG>(&mut reader, element, length, &())?;
             contents.tree = Some(Tree { nodes: Box::new(nodes), rows });
         } else if is_whole(element) && !BIG {
             let mut row = [0; whole::BYTES];
@@ -50,7 +51,7 @@ pub(super) fn vertices<const BIG: bool>(
     vertex: &Element,
     length: u64,
     progress: &dyn Progress,
-) -> Result<(Points, Vec<TreeRow>), Fault> {
+) -> Result<(Points, Vec<TreeRow>, Option<Collector>), Fault> {
     let layout = &Layout::of(vertex)?;
     let possible = length / layout.row_size.max(1) as u64;
     let mut decoder = Decoder::new(layout, vertex.count.min(possible))?;
@@ -75,9 +76,11 @@ pub(super) fn vertices<const BIG: bool>(
 
 /// Decodes `rows` that are in memory and have no lists, as [`vertices`] does.
 pub(super) fn vertices_in<const BIG: bool>(rows: &[u8], layout: &Layout) -> Result<(Points, Vec<TreeRow>), Fault> {
+    // Rows that are read in part have no wanted attributes.
     let mut decoder = Decoder::new(layout, (rows.len() / layout.row_size) as u64)?;
     rows.chunks(layout.block_rows() * layout.row_size).for_each(|block| decoder.take::<BIG>(block));
-    Ok(decoder.vertices.into_points())
+    let (points, rows, _) = decoder.vertices.into_points();
+    Ok((points, rows))
 }
 
 impl Layout {

@@ -2,17 +2,21 @@
 
 use super::faces::Faces;
 use super::header::Element;
+use crate::io::dimensions::Collector;
 use crate::io::fault::Fault;
 use crate::io::values::shown;
 use crate::io::{Points, Tree};
 use crate::scene::Whole;
 
 /// Everything that is read after the header.
+#[derive(Default)]
 pub(super) struct Contents {
     pub(super) points: Points,
     pub(super) faces: Faces,
     pub(super) tree: Option<Tree>,
     pub(super) whole: Option<Whole>,
+    /// The attributes of vertices that options ask for.
+    pub(super) collector: Option<Collector>,
 }
 
 /// The error of a file that ends inside `element`, after `rows` whole rows.

@@ -1,9 +1,9 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
 use super::vertex::is_tree;
-use crate::io::Up;
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
+use crate::io::{Up, Wanted};
 use std::io::{BufRead, Read};
 
 /// Longest line of a header, bytes. Comments can be long: some hold a processing history.
@@ -82,6 +82,8 @@ pub(super) struct Element {
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
     pub(super) tints: Tints,
+    /// Attributes that options ask for.
+    pub(super) wanted: Wanted,
 }
 
 /// How the colours of rows are interpreted.
@@ -188,6 +190,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                     count,
                     properties: Vec::new(),
                     tints: Tints::default(),
+                    wanted: Wanted::default(),
                 });
             }
             Some("property") => {

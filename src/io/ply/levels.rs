@@ -134,7 +134,7 @@ impl Levels {
     /// Empty colours, of the kind that the file's points have.
     pub fn no_colors(&self) -> Colors {
         let none = binary::vertices::<false>(&[][..], &Element { count: 0, ..self.vertex.element.clone() }, 0, &());
-        none.ok().and_then(|(points, _)| points.colors).unwrap_or_default()
+        none.ok().and_then(|(points, ..)| points.colors).unwrap_or_default()
     }
 
     /// Reads the rows with these indices.

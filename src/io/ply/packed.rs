@@ -40,7 +40,12 @@ const RANGES: [[[&str; 3]; 2]; 3] = [
 
 /// Whether a file holds compressed Gaussians.
 pub(super) fn is_packed(header: &Header) -> bool {
-    header.elements.iter().any(|element| element.name == "vertex" && offset_of(element, WORDS[0], None).is_some())
+    header.elements.iter().any(is_packed_element)
+}
+
+/// Whether the rows of an element are compressed Gaussians.
+pub(super) fn is_packed_element(element: &Element) -> bool {
+    element.name == "vertex" && offset_of(element, WORDS[0], None).is_some()
 }
 
 /// Reads the Gaussians; `reader` must stand just after the header.

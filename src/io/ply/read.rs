@@ -7,6 +7,7 @@ use super::vertex::Layout;
 use super::{ascii, binary, gaussian, packed};
 use crate::io::about::{About, Attribute, Role};
 use crate::io::beside::Beside;
+use crate::io::dimensions::of_positions;
 use crate::io::fault::{self, Fault};
 use crate::io::input::check_regular;
 use crate::io::textures::Images;
@@ -113,7 +114,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 /// [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
-    let options = ReadOptions { flatten: true, ..*options };
+    let options = ReadOptions { flatten: true, ..options.clone() };
     let (mut points, mut faces, textures) = contents(input, &options, progress)?;
     choose_colors(&mut points, &mut faces);
     settle_colors(std::slice::from_mut(&mut points));
@@ -249,7 +250,12 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut header = header::read(&mut reader).map_err(in_file)?;
-    header.elements.iter_mut().for_each(|element| element.tints.ignore_alpha = options.ignore_alpha);
+    for element in &mut header.elements {
+        element.tints.ignore_alpha = options.ignore_alpha;
+        if element.name == "vertex" && !packed::is_packed_element(element) {
+            element.wanted = options.wanted.clone();
+        }
+    }
     let Some(vertex) = header.elements.iter().find(|element| element.name == "vertex") else {
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
@@ -258,7 +264,7 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
     let mut packed = || {
         let points = packed::read(&mut reader, &header, length, progress)?;
-        Ok(Contents { points, faces: Faces::default(), tree: None, whole: None })
+        Ok(Contents { points, ..Contents::default() })
     };
     let contents = match header.encoding {
         _ if packed::is_packed(&header) => packed(),
@@ -267,7 +273,7 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::default(), progress),
     };
     progress.end();
-    let Contents { mut points, faces, tree, whole } = contents.map_err(in_file)?;
+    let Contents { mut points, faces, tree, whole, collector } = contents.map_err(in_file)?;
     gaussian::check(&points, options.flatten).map_err(in_file)?;
     points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
     if options.describe {
@@ -287,5 +293,10 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     }
     points.beside = mesh;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
+    match collector {
+        Some(collector) => collector.finish(&mut points, !triangles.triangles.is_empty()),
+        None => of_positions(&mut points, &options.wanted),
+    }
+    .map_err(in_file)?;
     Ok((points, triangles, header.comments.textures))
 }

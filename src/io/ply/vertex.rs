@@ -6,6 +6,7 @@ use super::tint::{Tint, code, number};
 use crate::io::about::{Attribute, Role};
 use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
+use crate::io::dimensions::{self, Collector};
 use crate::io::fault::{Fault, reserve};
 use crate::io::{Points, TreeRow};
 use crate::scene::{Cap, Clip, Colors};
@@ -46,6 +47,8 @@ pub(super) struct Layout {
     gaussian: Option<GaussianLayout>,
     /// The columns `cone`, `first`, `count` and `leaf` of a node.
     node: Option<[usize; 4]>,
+    /// The attributes that options ask for.
+    wants: Option<dimensions::Columns>,
 }
 
 /// Properties of a node beside its ellipse and its colour ([`TreeRow`]).
@@ -89,7 +92,25 @@ fn scalars_of(element: &Element) -> Vec<(&str, Column)> {
 }
 
 impl Layout {
+    /// Finds the attributes in a row.
     pub(super) fn of(vertex: &Element) -> Result<Self, Fault> {
+        let mut layout = Self::without_wants(vertex)?;
+        let places = scalars_of(vertex);
+        let names: Vec<String> = places.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let column = |field: usize| layout.column_of(places[field].1);
+        layout.wants = dimensions::Columns::of(names, &vertex.wanted, column)?;
+        Ok(layout)
+    }
+
+    /// The index of a property among the columns, to which it is added if necessary.
+    fn column_of(&mut self, property: Column) -> usize {
+        self.columns.iter().position(|column| column.slot == property.slot).unwrap_or_else(|| {
+            self.columns.push(property);
+            self.columns.len() - 1
+        })
+    }
+
+    fn without_wants(vertex: &Element) -> Result<Self, Fault> {
         let places = scalars_of(vertex);
         let scalars = places.iter().map(|(_, column)| column.scalar).collect();
         let row_size = places.iter().map(|(_, column)| column.scalar.size()).sum();
@@ -149,6 +170,7 @@ impl Layout {
             texture_slopes: texture_slopes.filter(|_| texture.is_some()),
             gaussian: None,
             node,
+            wants: None,
         })
     }
 
@@ -234,6 +256,7 @@ pub(super) struct Vertices<'a> {
     colored: bool,
     gaussians: Option<Gaussians<'a>>,
     rows: Vec<TreeRow>,
+    collector: Option<Collector>,
 }
 
 impl<'a> Vertices<'a> {
@@ -280,6 +303,7 @@ impl<'a> Vertices<'a> {
             colored: false,
             gaussians,
             rows: tree,
+            collector: layout.wants.as_ref().map_or(Ok(None), dimensions::Columns::collector)?,
         })
     }
 
@@ -293,6 +317,9 @@ impl<'a> Vertices<'a> {
         let layout = self.layout;
         let [x, y, z] = layout.position;
         self.positions.extend((0..rows).map(|row| [value(x, row), value(y, row), value(z, row)]));
+        if let (Some(collector), Some(wants)) = (&mut self.collector, &layout.wants) {
+            wants.mark(collector, (rows, layout.position), &value);
+        }
         if let Some(gaussians) = &mut self.gaussians {
             let position = |row: usize| [x, y, z].map(|column| value(column, row));
             (0..rows).for_each(|row| gaussians.push(position(row), |column| value(column, row)));
@@ -365,8 +392,8 @@ impl<'a> Vertices<'a> {
         }
     }
 
-    /// The points, and the [`TreeRow`]s if they are nodes.
-    pub(super) fn into_points(self) -> (Points, Vec<TreeRow>) {
+    /// The points, the [`TreeRow`]s if they are nodes, and the collected attributes.
+    pub(super) fn into_points(self) -> (Points, Vec<TreeRow>, Option<Collector>) {
         let layout = self.layout;
         let count = self.positions.len();
         let (mut colors, mut raw) = (None, None);
@@ -406,6 +433,6 @@ impl<'a> Vertices<'a> {
         if let Some(gaussians) = self.gaussians {
             gaussians.finish(&mut points);
         }
-        (points, self.rows)
+        (points, self.rows, self.collector)
     }
 }

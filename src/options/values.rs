@@ -113,11 +113,10 @@ impl FromStr for Ortho {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let height = text.parse().ok().filter(|height: &f64| *height > 0.0 && height.is_finite());
-        match (text, height) {
+        match (text, text.parse()) {
             ("fit", _) => Ok(Self::Fit),
-            (_, Some(height)) => Ok(Self::Height(height)),
-            _ => Err(Error::Usage(format!("it is fit or a positive height in world units, not {text:?}"))),
+            (_, Ok(height)) => Ok(Self::Height(height)),
+            _ => Err(Error::Usage(format!("it is fit or a height in world units, not {text:?}"))),
         }
     }
 }

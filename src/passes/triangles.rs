@@ -244,11 +244,34 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
         let (normals, colors) = (scene.triangles.normals_of(triangle), scene.triangles.colors_of(triangle));
         let normal = DVec3::from_array(std::array::from_fn(|axis| mean(normals.map(|normal| normal[axis]))));
         shown.normal = normal.normalize_or_zero();
+        let lit = within_horizon(shown.normal, facet(scene, triangle), -ray(camera, at));
         let texture = scene.triangles.texture_at(triangle, shown.parts, shown.spread);
         let color = std::array::from_fn(|channel| texture[channel] * mean(colors.map(|color| color[channel])));
-        shown.color = shaded(color, shown.normal, camera, options, at);
+        shown.color = shaded(color, lit, camera, options, at);
     }
     shown
+}
+
+/// The unit direction of the view ray through a pixel's centre.
+fn ray(camera: &Camera, (x, y): (u32, u32)) -> DVec3 {
+    camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize()
+}
+
+/// The unit normal of a triangle's plane.
+fn facet(scene: &Scene, triangle: usize) -> DVec3 {
+    let [a, b, c] = scene.triangles.corners()[triangle].map(|vertex| scene.triangles.place(vertex as usize));
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// The normal by which a triangle is lit. An interpolated normal may point away from the viewer
+/// although its facet, seen aslant, shows the viewer the same side; then it is turned to the
+/// horizon, where a headlight is dark.
+fn within_horizon(normal: DVec3, facet: DVec3, toward_eye: DVec3) -> DVec3 {
+    let facing = normal.dot(toward_eye);
+    match facing * facet.dot(toward_eye) * facet.dot(normal) >= 0.0 {
+        true => normal,
+        false => (normal - facing * toward_eye).normalize_or_zero(),
+    }
 }
 
 /// The first and the last pixel that a triangle may reach in the given rows. If the near depth cuts

@@ -591,7 +591,8 @@ fn views_have_names_and_angles() {
     refuses(&["--elevation", "91"], &["-90 and 90"]);
     refuses(&["--view", "frnt"], &["front, back", "frnt"]);
     refuses(&["--eye", "1,2,3", "--ortho"], &["--ortho", "HEIGHT"]);
-    refuses(&["--ortho", "-3"], &["fit or a positive height"]);
+    refuses(&["--ortho", "-3"], &["--ortho", "must be positive"]);
+    refuses(&["--ortho", "fut"], &["fit or a height"]);
     refuses(&["--background", "whit"], &["#RRGGBB"]);
     refuses(&["--size", "0"], &["0x0"]);
     refuses(&["--edl", "0"], &["above 0"]);

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 /// The arguments of a small picture of the bunny, by the reference.
 fn picture<'a>(bunny: &'a str, output: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    [&["render", bunny, "-o", output, "--backend", "reference", "--size", "40x30"], more].concat()
+    [&["render", bunny, "--mesh", "surfels", "-o", output, "--backend", "reference", "--size", "40x30"], more].concat()
 }
 
 fn bunny() -> String {

@@ -1,6 +1,7 @@
 // The attribute pass of triangles: shades the nearest triangle of each pixel. One workgroup per
 // tile in which a triangle shows. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xccb9f67a456abcdd
+// All loops end, by 1 of src/gpu/loops.rs: 0xa4de1c68dd8fbf16
+// #import camera_*::{ray}
 // #import layout::{WORKGROUP, held, held_band, hold}
 // #import resolve::{shaded}
 // #import triangles::{Triangle, cross_precisely, triangle_at}
@@ -41,6 +42,24 @@ fn normal_of_triangle(number: u32, triangle: Triangle, parts: vec3<f32>) -> vec3
     return mean + parts.z * triangle_vector(first + 6u);
 }
 
+// A vector with length 1, or shorter if it is next to nothing. A facet's normal is as long as a
+// product of two edges, which may be short, so it is scaled before it is squared.
+fn unit_or_less(long: vec3<f32>) -> vec3<f32> {
+    let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
+    return scaled * inverseSqrt(max(dot3(scaled, scaled), 1e-12));
+}
+
+// The normal by which a triangle is lit. An interpolated normal may point away from the viewer
+// although its facet, seen aslant, shows the viewer the same side; then it is turned to the horizon,
+// where a headlight is dark. Otherwise it would be lit as if the other side were seen.
+fn within_horizon(normal: vec3<f32>, facet: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {
+    let facing = dot3(normal, toward_eye);
+    if (facing * dot3(facet, toward_eye) * dot3(facet, normal) >= 0.0) {
+        return normal;
+    }
+    return unit_or_less(normal - facing * toward_eye);
+}
+
 fn color_of_triangle(number: u32, parts: vec3<f32>) -> vec4<f32> {
     let first = select(0u, number * TRIANGLE_WORDS + TRIANGLE_COLORS, TRIANGLE_COLORED);
     var mean = vec4<f32>(0.0);
@@ -74,13 +93,13 @@ fn shade_triangles(
     let number = named.x;
     let triangle = triangle_at(number);
     let crossed = cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5);
-    // A facet's normal is as long as a product of two edges, which may be short, so it is scaled
-    // before it is squared.
-    let long = normal_of_triangle(number, triangle, crossed.parts);
-    let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
-    let normal = scaled * inverseSqrt(max(dot3(scaled, scaled), 1e-12));
+    let normal = unit_or_less(normal_of_triangle(number, triangle, crossed.parts));
     let record = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
     let painted = color_of_triangle(number, crossed.parts) * triangle_texture(record, crossed.parts, crossed.spread);
-    triangle_pixels[2u * pixel] = shaded(painted, normal, x, y);
+    var lit_normal = normal;
+    if (TRIANGLE_NORMALS) {
+        lit_normal = within_horizon(normal, unit_or_less(facet_of(triangle.numbers)), -ray(x, y));
+    }
+    triangle_pixels[2u * pixel] = shaded(painted, lit_normal, x, y);
     triangle_pixels[2u * pixel + 1u] = vec4<f32>(normal, crossed.depth);
 }

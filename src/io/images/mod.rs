@@ -146,6 +146,7 @@ static FORMATS: &[Row] = &[
 /// The fault of a depth scale that nothing uses.
 const UNUSED_SCALE: &str = "--depth-scale is for a .png of depth: give it with --aov depth and a .png output";
 
+#[cfg(any(feature = "arrays", feature = "exr"))]
 fn whole(scale: Option<f64>) -> Result<Content, &'static str> {
     if scale.is_some() { Err(UNUSED_SCALE) } else { Ok(Content::All) }
 }

@@ -7,7 +7,7 @@
 //! | `normal.X` `normal.Y` `normal.Z` | world space |
 //! | `weight.Y`, `count.Y`, `decision.Y` | |
 //!
-//! The channels follow from [`MAPS`](crate::scene::MAPS). Files of versions before 0.2.0 have a
+//! The channels follow from [`MAPS`]. Files of versions before 0.2.0 have a
 //! part for each map; they are read too.
 
 use std::path::Path;

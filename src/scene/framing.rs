@@ -9,10 +9,10 @@ use super::{Bounds, Camera, Clip, Lens, Projection, Scene, Side, Surfel};
 use crate::error::Result;
 
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
-const FILL: f64 = 0.95;
+pub(super) const FILL: f64 = 0.95;
 
 /// The same fraction for disks, which is used if the image's border would cut a disk otherwise.
-const FILL_OF_DISKS: f64 = 0.98;
+pub(super) const FILL_OF_DISKS: f64 = 0.98;
 
 /// Rounds of centring. Each multiplies the remaining offset by about the square of the scene's
 /// depth over its distance.
@@ -127,7 +127,7 @@ pub(super) fn directions(side: Option<Side>, up: Option<DVec3>, scene: &Scene) -
 
 /// The part of a surfel that has to be inside the image.
 #[derive(Clone, Copy, PartialEq)]
-enum Of {
+pub(super) enum Of {
     Centers,
     Disks,
 }
@@ -135,24 +135,24 @@ enum Of {
 /// The scene in the axes of the camera.
 pub(super) struct Framing<'a> {
     scene: &'a Scene,
-    pinhole: bool,
+    pub(super) pinhole: bool,
     /// For the image's width and height each: the middle, half the size, and half the size less a
     /// border pixel, as X/Z (pinhole) or X (orthographic).
-    image: [[f64; 3]; 2],
+    pub(super) image: [[f64; 3]; 2],
     /// The world directions right, down and forward.
     axes: [DVec3; 3],
     /// The box of the centres that are framed, relative to the scene's origin.
     body: Bounds,
     pub(super) center: DVec3,
     /// The radius of the scene, world units.
-    radius: f64,
+    pub(super) radius: f64,
     /// The smallest depth that a centre may have, world units.
-    clearance: f64,
+    pub(super) clearance: f64,
 }
 
 /// A clipped disk in the camera's axes, relative to the centre of the body.
 #[derive(Clone, Copy)]
-struct Disk {
+pub(super) struct Disk {
     p: DVec3,
     s: DVec3,
     t: DVec3,
@@ -161,7 +161,7 @@ struct Disk {
 
 impl Disk {
     /// The disk's farthest point in the direction `along`.
-    fn farthest(self, along: DVec3) -> DVec3 {
+    pub(super) fn farthest(self, along: DVec3) -> DVec3 {
         let (s, t) = (self.s.dot(along), self.t.dot(along));
         if !self.clip.is_none() {
             let [u, v] = self.clip.farthest(s, t);
@@ -205,7 +205,7 @@ impl<'a> Framing<'a> {
     /// The maximum of each component of `f` over all framed disks, in any order.
     ///
     /// A disk much larger than the scene, for example that of a stray point, counts by its centre.
-    fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
+    pub(super) fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
         let local = |v: DVec3| DVec3::from_array(self.axes.map(|axis| v.dot(axis)));
         let value = |index: usize| {
             let axes = self.scene.surfels.get(index).map_or([[0.0; 3]; 2], |surfel| [surfel.s, surfel.t]);
@@ -265,24 +265,6 @@ impl<'a> Framing<'a> {
             eye.y += (0.5 * (reach[2] - reach[3]) - mid_y) * depth;
         }
         eye
-    }
-
-    /// The least distance from the centre of the body at which a camera that looks at it has the
-    /// whole body in view, world units. The principal point is the image's centre.
-    pub(super) fn distance(&self) -> f64 {
-        if !self.pinhole {
-            return 2.0 * self.radius;
-        }
-        let least = |of: Of, halves: [f64; 2]| {
-            let [x, y] = halves;
-            let planes = [DVec3::new(1.0, 0.0, -x), DVec3::new(-1.0, 0.0, -x), DVec3::new(0.0, 1.0, -y)];
-            let planes = [planes[0], planes[1], planes[2], DVec3::new(0.0, -1.0, -y), DVec3::NEG_Z];
-            let [left, right, above, below, front] =
-                self.largest(of, |disk| planes.map(|plane| disk.farthest(plane).dot(plane)));
-            (left.max(right) / x).max(above.max(below) / y).max(front + self.clearance)
-        };
-        let centers = least(Of::Centers, self.image.map(|[_, half, _]| FILL * half));
-        centers.max(least(Of::Disks, self.image.map(|[_, half, free]| free.min(FILL_OF_DISKS * half))))
     }
 
     /// Whether the image's border cuts a disk, seen from `eye`.

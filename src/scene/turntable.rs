@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 
 use glam::{DQuat, DVec3};
 
-use super::framing::{Framing, directions, image};
+use super::framing::{FILL, FILL_OF_DISKS, Framing, Of, directions, image};
 use super::side::unit;
 use super::{Camera, Lens, Scene, Side};
 use crate::error::Result;
@@ -49,6 +49,26 @@ impl Camera {
             Self::look_at(size, lens, center - forward * distance, center, Some(top), scene.up, near)
         };
         (0..count.get()).map(camera).collect()
+    }
+}
+
+impl Framing<'_> {
+    /// The least distance from the centre of the body at which a camera that looks at it has the
+    /// whole body in view, world units. The principal point is the image's centre.
+    fn distance(&self) -> f64 {
+        if !self.pinhole {
+            return 2.0 * self.radius;
+        }
+        let least = |of: Of, halves: [f64; 2]| {
+            let [x, y] = halves;
+            let planes = [DVec3::new(1.0, 0.0, -x), DVec3::new(-1.0, 0.0, -x), DVec3::new(0.0, 1.0, -y)];
+            let planes = [planes[0], planes[1], planes[2], DVec3::new(0.0, -1.0, -y), DVec3::NEG_Z];
+            let [left, right, above, below, front] =
+                self.largest(of, |disk| planes.map(|plane| disk.farthest(plane).dot(plane)));
+            (left.max(right) / x).max(above.max(below) / y).max(front + self.clearance)
+        };
+        let centers = least(Of::Centers, self.image.map(|[_, half, _]| FILL * half));
+        centers.max(least(Of::Disks, self.image.map(|[_, half, free]| free.min(FILL_OF_DISKS * half))))
     }
 }
 

@@ -4,7 +4,7 @@ use super::Renderer;
 use super::renderer::Drawn;
 use crate::error::{Error, Result};
 use crate::render::{self, Backend, FrameLayout, Target, Ticket};
-use crate::scene::{self, Camera};
+use crate::scene::{self, Camera, Map};
 use std::sync::Arc;
 
 /// The renderer of a scene that all views share.
@@ -57,9 +57,9 @@ impl Renderer {
     /// # Errors
     ///
     /// [`Error::Usage`] if `target` does not suit the frame; for the f64 reference, which has no
-    /// device; for files that are read in part; for maps that the host finishes (`index`); and
-    /// where counts must be read in the middle of each frame. Errors of [`frame`](Self::frame).
-    /// After an error the encoder may hold a part of the frame: drop it.
+    /// device; for files that are read in part; for maps that the host finishes (`index` and
+    /// `height`); and where counts must be read in the middle of each frame. Errors of
+    /// [`frame`](Self::frame). After an error the encoder may hold a part of the frame: drop it.
     pub fn encode(
         &mut self,
         camera: &Camera,
@@ -70,6 +70,10 @@ impl Renderer {
     }
 
     fn of_whole(&mut self) -> Result<&mut OfWhole> {
+        if let Some(row) = self.maps().iter().map(Map::row).find(|row| row.from.is_some()) {
+            let what = format!("the host finishes the map {}: leave it out of frames on the device", row.name);
+            return Err(Error::Usage(what));
+        }
         match &mut self.drawn {
             Drawn::Whole { renderer, .. } => Ok(renderer),
             Drawn::Parts { .. } => Err(in_parts()),

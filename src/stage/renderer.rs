@@ -176,6 +176,11 @@ impl Renderer {
         &self.settings
     }
 
+    /// The maps that the options ask for.
+    pub(super) fn maps(&self) -> Maps {
+        Maps::of(&self.options.maps.aov)
+    }
+
     /// The backend that renders.
     pub fn backend(&self) -> &Backend {
         &self.backend

@@ -78,6 +78,9 @@ impl View {
         if let Some(path) = &options.file {
             return Self::of_file(options, camera::read(path)?, path, None);
         }
+        if options.pixel_size.is_some() {
+            return Err(Error::Usage("a view has no pixel size: render a map by it (Renderer::grid and map)".into()));
+        }
         let (lens, option) = options.lens();
         let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;

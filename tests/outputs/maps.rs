@@ -137,7 +137,7 @@ fn colours_are_those_of_a_png_and_world_files_have_the_grid() {
     assert_eq!((width, height), (30, 35));
     let image = image::open(&png).unwrap().into_rgba8();
     assert!(image.as_raw() == &bytes);
-    // The picture has its four corners: nothing in the west and south, the square in the north-east.
+    // Nothing lies in the west and the south, and the square in the north-east.
     let alpha = |column: u32, row: u32| image.get_pixel(column, row).0[3];
     assert_eq!((alpha(1, 1), alpha(1, 33), alpha(28, 33), alpha(28, 2)), (0, 0, 0, 255));
     for world in ["a.pgw", "b.jgw"] {

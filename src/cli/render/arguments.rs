@@ -13,7 +13,7 @@ use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions
 use super::super::inputs::help_of_all;
 use super::super::outputs::Source;
 
-/// Render point clouds and meshes to images: PNG, EXR, JPEG or NumPy arrays.
+/// Render point clouds and meshes to images: PNG, EXR, JPEG, GeoTIFF or NumPy arrays.
 ///
 /// Without a camera the scene is framed from its bounds. Several inputs make one scene. With
 /// --cameras there is a picture for each camera of a file, and with --turntable one for each step
@@ -47,14 +47,15 @@ use super::super::outputs::Source;
 pub struct Arguments {
     #[arg(required_unless_present = "triangles", help = help_of_all("Point clouds or meshes, which become surfels"))]
     pub(super) inputs: Vec<PathBuf>,
-    /// The image, .png, .exr (linear, with maps), .jpg, .npy or .npz; - for standard output; with
-    /// --cameras or --turntable a folder of images
+    /// The image: .png, .exr (linear, with maps), .jpg, .tif, .npy or .npz; - is standard output;
+    /// with --cameras or --turntable a folder of images
     ///
     /// .png: 8-bit sRGB, straight alpha; with --depth-scale 16-bit depths. .exr: linear f32, with
     /// the maps of --aov as channels. .jpg: 8-bit sRGB over white, or over an opaque --background.
-    /// .npy: linear f32 (H, W, 4), or the only map of --aov. .npz: an array for the colour and for
-    /// each map. Standard output has to be a pipe or a file; all notes go to stderr
-    #[arg(short, long, allow_hyphen_values = true)]
+    /// .tif: 8-bit sRGB, or the only map of --aov; GeoTIFF with --pixel-size. .npy: linear f32 (H,
+    /// W, 4), or the only map of --aov. .npz: an array for the colour and for each map. Standard
+    /// output has to be a pipe or a file; all notes go to stderr
+    #[arg(short, long)]
     pub(super) output: PathBuf,
     #[command(flatten)]
     pub(super) camera: CameraOptions,
@@ -74,7 +75,8 @@ pub struct Arguments {
 #[derive(Args)]
 #[command(next_help_heading = "Output")]
 pub(super) struct FileArguments {
-    /// Format of images in a folder or on standard output [default: png; exr in a folder with --aov]
+    /// Format of images in a folder or on standard output [default: png; exr in a folder with
+    /// --aov]
     ///
     /// The format of a single file follows from its extension. raw: four bytes a pixel (red, green,
     /// blue, alpha as in a PNG) without a header, for pipes to video encoders

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
 use super::Arguments;
-use super::output::{note_overflows, summary};
+use super::output::{named, note_overflows, summary};
 use super::target::Target;
 
 /// The JSON report of a map.
@@ -79,7 +79,7 @@ fn tell(
         None => {
             note(&match tiles {
                 1 => summary(report, &arguments.output),
-                _ => format!("{}: {tiles} images joined, {:.1} ms", arguments.output.display(), report.total_ms),
+                _ => format!("{}: {tiles} images joined, {:.1} ms", named(&arguments.output), report.total_ms),
             });
             Ok(())
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 use epsplat::low_level::render::Report;
 
 use super::super::note;
+use super::target::STANDARD;
 
 /// Prints a note if sums overflowed, so that the frame was rendered twice.
 pub(super) fn note_overflows(report: &Report) {
@@ -26,6 +27,11 @@ pub(super) fn note_cut<'a>(reports: impl IntoIterator<Item = &'a Report>, most: 
              always divided (with --cull none those at the outline are not)"
         ));
     }
+}
+
+/// Returns the name of an output for people.
+pub(super) fn named(output: &Path) -> String {
+    if output == Path::new(STANDARD) { "standard output".into() } else { output.display().to_string() }
 }
 
 /// Returns one line: counts of what was drawn, and the time of each pass.
@@ -56,7 +62,7 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     let drawn: Vec<_> = Some(surfels).filter(|text| !text.is_empty()).into_iter().chain(triangles).collect();
     format!(
         "{}: {} drawn, {:.1} ms ({}{clock}){tail}",
-        output.display(),
+        named(output),
         drawn.join(" and "),
         report.total_ms,
         passes.collect::<Vec<_>>().join(", "),

@@ -17,7 +17,7 @@ use super::super::outputs::Source;
 use super::super::progress::{Bars, Notes};
 use super::super::{note, outputs, write_json};
 use super::Arguments;
-use super::output::{note_cut, note_overflows};
+use super::output::{named, note_cut, note_overflows};
 use super::target::Target;
 
 /// Limit of host memory for frames that wait for a writer or are being written, bytes.
@@ -259,7 +259,7 @@ fn summary(reports: &Reports, output: &Path) -> String {
     let each = |ms: f64| ms / count.max(1) as f64;
     format!(
         "{}: {count} pictures of {} surfels, {:.1} ms each (rendering {:.1}, at the same time encoding and writing {:.1})",
-        output.display(),
+        named(output),
         reports.views.first().map_or(0, |view| view.report.surfels),
         each(reports.total_ms),
         each(reports.render_ms),

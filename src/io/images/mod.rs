@@ -1,4 +1,4 @@
-//! Formats of rendered images: one row of [`FORMATS`] and one file each.
+//! Formats of rendered images: one row of a table and one file each.
 
 mod array;
 mod depth;
@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::scene::{Map, Maps};
 
-/// A format of images: a row of [`FORMATS`].
+/// A format of images: a row of the table.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageFormat(&'static Row);
 
@@ -146,6 +146,7 @@ static FORMATS: &[Row] = &[
 /// The fault of a depth scale that nothing uses.
 const UNUSED_SCALE: &str = "--depth-scale is for a .png of depth: give it with --aov depth and a .png output";
 
+#[cfg(any(feature = "arrays", feature = "exr"))]
 fn whole(scale: Option<f64>) -> Result<Content, &'static str> {
     if scale.is_some() { Err(UNUSED_SCALE) } else { Ok(Content::All) }
 }

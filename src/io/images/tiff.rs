@@ -1,5 +1,5 @@
-//! TIFF, with a place on the earth if there is one: the colour as 8-bit sRGB with straight alpha, or
-//! a map as f32. Strips of rows are written as they come, so an image need not fit in memory.
+//! TIFF, with a place on the earth if there is one: the colour as 8-bit sRGB with straight alpha,
+//! or a map as f32. Strips of rows are written as they come, so an image need not fit in memory.
 
 use std::io;
 

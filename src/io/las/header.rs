@@ -3,13 +3,18 @@
 use super::chunks::promised;
 use super::dimensions::Dimensions;
 use super::extra::{self, Field, Normals};
+use super::shown::Shown;
 use super::system::{self, System};
+use super::{early, of_las};
+use crate::Result as Outcome;
 use crate::io::about::{About, Attribute, Role};
-use crate::io::fault::Fault;
+use crate::io::fault::{Fault, surviving};
 use crate::io::place::GeoKeys;
 use las::point::Format;
 use las::raw::{Header, Vlr};
-use std::io::{Read, Seek, SeekFrom};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::Path;
 
 /// Size of the header, bytes: of versions 1.0 to 1.2, of 1.3 and of 1.4.
 const SIZES: [u16; 3] = [227, 235, 375];
@@ -84,6 +89,21 @@ pub(super) fn look(
     let about = about(header, system, &extra);
     let keys = systems.geo_keys();
     Ok(Found { about, geographic, keys, normals, dimensions, notes, bounds, step: scales.map(f64::abs) })
+}
+
+/// Reads the keys of the coordinate system from the header of a file. None if it names none.
+///
+/// # Errors
+///
+/// As [`read`](super::read).
+pub(in crate::io) fn geo_keys(file: File, length: u64, path: &Path) -> Outcome<Option<GeoKeys>> {
+    let found = surviving(|| {
+        let mut file = BufReader::new(Shown::new(file)?);
+        let legacy = file.get_ref().legacy;
+        let header = Header::read_from(&mut file).map_err(of_las)?;
+        look(&mut file, (&header, legacy), (length, "")).map_err(early)
+    });
+    found.map(|found| found.keys).map_err(|fault| fault.of(path))
 }
 
 impl Found {

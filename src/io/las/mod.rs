@@ -14,7 +14,6 @@ mod system;
 
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{self, Fault, reserve, surviving};
-use crate::io::place::GeoKeys;
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up, degrees};
 use crate::{Error, Progress, Result};
@@ -31,6 +30,7 @@ use std::ops::Range;
 use std::path::Path;
 
 pub use copc::Copc;
+pub(super) use header::geo_keys;
 
 /// Size of the records that are decoded together, bytes.
 const BLOCK: u64 = 1 << 25;
@@ -68,21 +68,6 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         points => points,
     }
     .map_err(|fault| fault.of(&path))
-}
-
-/// Reads the keys of the coordinate system from the header of a file. None if it names none.
-///
-/// # Errors
-///
-/// As [`read`].
-pub(super) fn geo_keys(file: File, length: u64, path: &Path) -> Result<Option<GeoKeys>> {
-    let found = surviving(|| {
-        let mut file = BufReader::new(Shown::new(file)?);
-        let legacy = file.get_ref().legacy;
-        let header = raw::Header::read_from(&mut file).map_err(of_las)?;
-        header::look(&mut file, (&header, legacy), (length, "")).map_err(early)
-    });
-    found.map(|found| found.keys).map_err(|fault| fault.of(path))
 }
 
 /// Reads all points of an intact file.

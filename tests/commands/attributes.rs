@@ -1,5 +1,7 @@
 //! Colours by attribute, filters, legends, and what `info` lists, as users meet them.
 
+#![allow(clippy::unwrap_used, clippy::panic)]
+
 use crate::common;
 
 use common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};

@@ -49,7 +49,7 @@ enum Source {
 #[derive(Debug)]
 enum Condition {
     Ranges(Vec<Range>),
-    Classes(ClassList),
+    Classes(Box<ClassList>),
 }
 
 impl Condition {
@@ -161,7 +161,7 @@ impl Collector {
             conditions.push((found(name)?.1, Condition::Ranges(ranges.clone())));
         }
         if let Some(classes) = classes {
-            conditions.push((found("class")?.1, Condition::Classes(*classes)));
+            conditions.push((found("class")?.1, Condition::Classes(Box::new(*classes))));
         }
         let column = column.as_deref().map(&mut found).transpose()?;
         let column = column.map(|(name, source)| (name, source, Values::Narrow(Vec::new())));

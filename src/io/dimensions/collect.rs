@@ -81,6 +81,7 @@ impl Values {
         }
     }
 
+    #[cfg(feature = "e57")]
     fn truncate(&mut self, count: usize) {
         match self {
             Self::Narrow(values) => values.truncate(count),
@@ -210,6 +211,7 @@ impl Collector {
     }
 
     /// Forgets the values of all points from the index `count` on.
+    #[cfg(feature = "e57")]
     pub fn truncate(&mut self, count: usize) {
         if let Some((_, _, values)) = &mut self.column {
             values.truncate(count);

@@ -49,7 +49,7 @@ enum Source {
 #[derive(Debug)]
 enum Condition {
     Ranges(Vec<Range>),
-    Classes(ClassList),
+    Classes(Box<ClassList>),
 }
 
 impl Condition {
@@ -81,6 +81,7 @@ impl Values {
         }
     }
 
+    #[cfg(feature = "e57")]
     fn truncate(&mut self, count: usize) {
         match self {
             Self::Narrow(values) => values.truncate(count),
@@ -161,7 +162,7 @@ impl Collector {
             conditions.push((found(name)?.1, Condition::Ranges(ranges.clone())));
         }
         if let Some(classes) = classes {
-            conditions.push((found("class")?.1, Condition::Classes(*classes)));
+            conditions.push((found("class")?.1, Condition::Classes(Box::new(*classes))));
         }
         let column = column.as_deref().map(&mut found).transpose()?;
         let column = column.map(|(name, source)| (name, source, Values::Narrow(Vec::new())));
@@ -210,6 +211,7 @@ impl Collector {
     }
 
     /// Forgets the values of all points from the index `count` on.
+    #[cfg(feature = "e57")]
     pub fn truncate(&mut self, count: usize) {
         if let Some((_, _, values)) = &mut self.column {
             values.truncate(count);

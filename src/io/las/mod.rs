@@ -90,7 +90,10 @@ fn whole(
     if promised == 0 {
         // The decoder is not called: it would trust the length of the chunk table, which was not
         // checked.
-        return Ok(described(Points { up: Some(Up::Z), ..Points::default() }, found, &name, options));
+        let mut points = Points { up: Some(Up::Z), ..Points::default() };
+        let wants = found.dimensions.collector(&options.wanted)?;
+        wants.map_or(Ok(()), |wants| wants.collector.finish(&mut points, false))?;
+        return Ok(described(points, found, &name, options));
     }
     progress.begin(&format!("reading {name}"), promised);
     let points = deep(|| decode(file, decoding, promised.min(length), (options, &found), progress));

@@ -35,6 +35,7 @@ pub(super) fn ascii(
     wanted.sort_unstable();
     // A point takes at least two bytes, a digit and a separator, which limits the memory to
     // reserve.
+    let plain = columns.plain;
     let mut values = vec![0.0; columns.cells.len()];
     let mut reading = Reading::with_capacity(columns, header, header.points.min(left / 2))?;
     let (mut line, mut number, mut unreported) = (Vec::new(), header.lines, 0);
@@ -58,6 +59,8 @@ pub(super) fn ascii(
                 let word = words.next().ok_or_else(|| too_few(number))?;
                 while let Some((_, _, cell, packed)) = wanted.next_if(|(f, p, ..)| (*f, *p) == (index, part)) {
                     let value = if *packed { packed_color(word, field.scalar) } else { parse_number(word) };
+                    // Words that only options ask for are no fault of the file.
+                    let value = value.or((*cell >= plain).then_some(f64::NAN));
                     values[*cell] = value
                         .ok_or_else(|| Fault::Malformed(format!("line {number}: '{}' is not a number", shown(word))))?;
                 }

@@ -26,6 +26,8 @@ pub(super) struct Columns {
     intensity: Option<usize>,
     /// The attributes that options ask for.
     wants: Option<dimensions::Columns>,
+    /// The number of cells that are used without these attributes.
+    pub(super) plain: usize,
 }
 
 /// The attributes of a point that are one number: the names and cells of all of them. The numbers
@@ -72,6 +74,7 @@ impl Columns {
     /// Finds the numbers that the options need.
     pub(super) fn of(header: &Header, options: &ReadOptions) -> Result<Self, Fault> {
         let mut columns = Self::without_wants(header, options.ignore_alpha)?;
+        columns.plain = columns.cells.len();
         let (names, cells) = numbers(header);
         let place = |field: usize| {
             let cell = cells[field];
@@ -125,7 +128,7 @@ impl Columns {
             })
         };
         let intensity = find(attributes::INTENSITY, names.clone()).map(|field| cell(field, 0));
-        Ok(Self { cells, position, normal, color, intensity, wants: None })
+        Ok(Self { cells, position, normal, color, intensity, wants: None, plain: 0 })
     }
 
     /// Whether a cell's four bytes are a packed colour, whatever its type.
@@ -141,7 +144,7 @@ impl Columns {
             None => Vec::new(),
         };
         let of_field = |(field, own): (usize, &Field)| {
-            let cell = self.cells.iter().position(|cell| cell.field == field);
+            let cell = self.cells[..self.plain].iter().position(|cell| cell.field == field);
             let role = match cell {
                 Some(cell) if colors.contains(&cell) => Role::Color,
                 Some(cell) if self.intensity == Some(cell) => Role::Intensity,

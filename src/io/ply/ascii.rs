@@ -84,6 +84,8 @@ fn vertices(
                 Kind::List { .. } => None,
             };
             let whole = match column {
+                // Words that only options ask for are no fault of the file.
+                Some(column) if column >= layout.plain => tokens.word()?.map(|word| values[column] = word).is_some(),
                 Some(column) => tokens.number()?.map(|number| values[column] = number).is_some(),
                 None => tokens.skip(vertex, row, property.kind)?,
             };
@@ -149,6 +151,12 @@ impl<R: BufRead> Tokens<R> {
             Some(number) => Ok(Some(number)),
             None => Err(Fault::Malformed(format!("line {}: '{}' is not a number", self.line, shown(&self.token)))),
         }
+    }
+
+    /// Reads the next word as a number, or NaN if it is none; returns `None` at the end of the
+    /// file.
+    fn word(&mut self) -> Result<Option<f64>, Fault> {
+        Ok(self.advance()?.then(|| parse_number(&self.token).unwrap_or(f64::NAN)))
     }
 
     /// Skips one property; returns `false` if the file ends inside it.

@@ -49,6 +49,8 @@ pub(super) struct Layout {
     node: Option<[usize; 4]>,
     /// The attributes that options ask for.
     wants: Option<dimensions::Columns>,
+    /// The number of columns that are used without these attributes.
+    pub(super) plain: usize,
 }
 
 /// Properties of a node beside its ellipse and its colour ([`TreeRow`]).
@@ -95,6 +97,7 @@ impl Layout {
     /// Finds the attributes in a row.
     pub(super) fn of(vertex: &Element) -> Result<Self, Fault> {
         let mut layout = Self::without_wants(vertex)?;
+        layout.plain = layout.columns.len();
         let places = scalars_of(vertex);
         let names: Vec<String> = places.iter().map(|(name, _)| (*name).to_owned()).collect();
         let column = |field: usize| layout.column_of(places[field].1);
@@ -171,6 +174,7 @@ impl Layout {
             gaussian: None,
             node,
             wants: None,
+            plain: 0,
         })
     }
 
@@ -204,7 +208,7 @@ impl Layout {
         let mut slots = 0..;
         let attribute = |property: &header::Property| {
             let slot = if let header::Kind::Scalar(_) = property.kind { slots.next() } else { None };
-            let column = slot.and_then(|slot| self.columns.iter().position(|column| column.slot == slot));
+            let column = slot.and_then(|slot| self.columns[..self.plain].iter().position(|column| column.slot == slot));
             let is_color = |column: &usize| self.color.iter().flatten().chain(&self.alpha).any(|own| own == column);
             let role = match column {
                 Some(column) if is_color(&column) => Role::Color,

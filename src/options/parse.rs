@@ -8,7 +8,10 @@ use crate::surfels::Orientation;
 
 /// Parses a size in pixels: `WIDTHxHEIGHT`, or one number for a square.
 pub fn size(text: &str) -> Result<(u32, u32), String> {
-    let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
+    let side = |part: &str| {
+        part.parse::<u32>()
+            .map_err(|_| format!("a size is WIDTHxHEIGHT or a number, and {part:?} is not a number of pixels"))
+    };
     let (width, height) = text.split_once('x').unwrap_or((text, text));
     let (width, height) = (side(width)?, side(height)?);
     check_size(width, height).map_err(|e| e.to_string())?;

@@ -32,8 +32,8 @@ impl FromStr for Diameters {
     }
 }
 
-/// A linear colour with straight alpha: `R,G,B` or `R,G,B,A`, where alpha is 1 unless given; a name;
-/// or an sRGB code `#RRGGBB`.
+/// A linear colour with straight alpha: `R,G,B` or `R,G,B,A` (alpha is 1 unless given), a name, or
+/// an sRGB code `#RRGGBB`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rgba(pub [f32; 4]);
 
@@ -61,7 +61,7 @@ impl FromStr for Rgba {
     }
 }
 
-/// What a colour may be.
+/// The forms of a colour.
 const EXPECTED: &str = "a colour is R,G,B[,A], #RRGGBB, white, black, gray or transparent";
 
 /// Returns the linear colour with this name.

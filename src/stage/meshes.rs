@@ -95,8 +95,13 @@ impl Meshes {
                 mesh.normals = Some(smooth_normals(&mesh.positions, &mesh.triangles, angle.0));
             });
         }
-        if let Some(image) = options.texture.as_deref().filter(|_| !named.is_empty()) {
-            paint_bare(&mut named, &paths, image, progress)?;
+        match options.texture.as_deref() {
+            Some(image) if !named.is_empty() => paint_bare(&mut named, &paths, image, progress)?,
+            Some(_) if !self.is_empty() => {
+                let what = "--triangle-texture paints the meshes of --triangles, and there are none: take --texture";
+                return Err(Error::Usage(what.into()));
+            }
+            _ => {}
         }
         self.meshes.append(&mut named);
         self.paths.append(&mut paths);

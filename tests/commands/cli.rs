@@ -558,7 +558,9 @@ fn triangles_are_drawn_alone_and_beside_surfels() {
     by(&bunny, &["--triangle-texture", &painted], 1, &["bunny.obj", "texture coordinates"]);
     by(&cube, &["--composite", "layers"], 2, &["--composite"]);
     by(&cube, &["--join", "glued"], 2, &["corrected, nearest or blended"]);
-    fails(&[&with(&[])[..], &[image, "--join", "nearest", &bunny]].concat(), 2, &["--triangles"]);
+    fails(&[&with(&[])[..], &[image, "--join", "nearest", "--mesh", "surfels", &bunny]].concat(), 2, &["--triangles"]);
+    let painted = [image, "--triangle-texture", &painted, &cube];
+    fails(&[&with(&[])[..], &painted].concat(), 2, &["--triangle-texture", "take --texture"]);
     fails(&with(&["t.png"]), 2, &["INPUTS"]);
 }
 

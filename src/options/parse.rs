@@ -1,5 +1,7 @@
 //! Parsers of argument values. Errors are sentences that say what is expected.
 
+use std::num::NonZeroU32;
+
 use glam::DVec3;
 
 use super::values::numbers;
@@ -24,6 +26,15 @@ pub fn scale(text: &str) -> Result<f64, String> {
         Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(factor),
         _ => Err("a factor is a positive number".into()),
     }
+}
+
+/// The most pictures of a turntable.
+const MOST_TURNS: u32 = 100_000;
+
+/// Parses the number of pictures of a turntable.
+pub fn turns(text: &str) -> Result<NonZeroU32, String> {
+    let count = text.parse().ok().filter(|count: &NonZeroU32| count.get() <= MOST_TURNS);
+    count.ok_or_else(|| format!("a turntable has 1 to {MOST_TURNS} pictures"))
 }
 
 /// Parses a vector: `X,Y,Z`.

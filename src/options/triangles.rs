@@ -56,7 +56,7 @@ pub struct TriangleOptions {
     /// --facing, --kernel, --lod or --surfel-size
     #[cfg_attr(feature = "cli", arg(long, value_name = "AS"))]
     pub mesh: Option<MeshAs>,
-    /// Give meshes smooth normals: those of triangles that meet at less than ANGLE degrees are
+    /// Give meshes smooth normals: those of triangles that meet at no more than ANGLE degrees are
     /// blended
     ///
     /// 30 keeps the edges of machine parts, 180 makes everything smooth. The option replaces the
@@ -72,14 +72,12 @@ pub struct TriangleOptions {
 }
 
 impl SceneOptions {
-    /// Returns how the meshes of the inputs are drawn, and the option that needs surfels if one
-    /// does and nothing else is said.
+    /// Returns how the meshes of the inputs are drawn, and an option that needs surfels if one is
+    /// given.
     pub fn mesh(&self, options: &RenderOptions) -> (MeshAs, Option<&'static str>) {
-        match (self.triangles.mesh, self.option_of_surfels(options)) {
-            (Some(chosen), _) => (chosen, None),
-            (None, None) => (MeshAs::Triangles, None),
-            (None, needed) => (MeshAs::Surfels, needed),
-        }
+        let needed = self.option_of_surfels(options);
+        let own = if needed.is_some() { MeshAs::Surfels } else { MeshAs::Triangles };
+        (self.triangles.mesh.unwrap_or(own), needed)
     }
 
     /// Returns the name of a given option that has no meaning without surfels.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::{DMat3, DVec3};
 use serde::Serialize;
 
-use super::{Camera, Lens, Scene};
+use super::{Bounds, Camera, Lens, Scene};
 use crate::error::{Error, Result};
 
 /// The most columns and the most rows of a map.
@@ -53,14 +53,16 @@ pub struct Grid {
 
 impl Grid {
     /// Returns the grid of pixels of the size `pixel` over `bounds` (xmin, ymin, xmax, ymax; by
-    /// default those of the scene's body), extended to whole pixels.
+    /// default those of `data`, or else of the scene's body), extended to whole pixels. `data` is the
+    /// box of all points if `scene` is an overview of them, world units.
     ///
     /// # Errors
     ///
     /// [`Error::Usage`] for bounds without an area and for too many pixels.
-    pub fn new(pixel: f64, bounds: Option<[f64; 4]>, scene: &Scene) -> Result<Self> {
+    pub fn new(pixel: f64, bounds: Option<[f64; 4]>, (scene, data): (&Scene, Option<Bounds>)) -> Result<Self> {
         let body = scene.body().0;
-        let (low, high) = (body.min + scene.origin, body.max + scene.origin);
+        let body = data.unwrap_or(Bounds { min: body.min + scene.origin, max: body.max + scene.origin });
+        let (low, high) = (body.min, body.max);
         let [left, bottom, right, top] = bounds.unwrap_or([low.x, low.y, high.x, high.y]);
         let (first, columns) = lines(left, right, pixel);
         let (last, rows) = lines(-top, -bottom, pixel);
@@ -140,23 +142,23 @@ mod tests {
 
     #[test]
     fn grids_are_aligned_and_cover_their_bounds() {
-        let grid = Grid::new(0.5, None, &scene()).unwrap();
+        let grid = Grid::new(0.5, None, (&scene(), None)).unwrap();
         // x from 636000.3 to 636009.2, y from 849000.2 to 849004.9.
         assert_eq!((grid.left, grid.top, grid.columns, grid.rows), (636_000.0, 849_005.0, 19, 10));
         let given = Some([636_001.0, 849_001.0, 636_003.0, 849_002.5]);
-        let grid = Grid::new(0.5, given, &scene()).unwrap();
+        let grid = Grid::new(0.5, given, (&scene(), None)).unwrap();
         assert_eq!((grid.left, grid.top, grid.columns, grid.rows), (636_001.0, 849_002.5, 4, 3));
         // A tenth has no exact binary form, and 636000.3 is on a line of it.
-        let grid = Grid::new(0.1, Some([636_000.3, 849_000.7, 636_000.9, 849_001.1]), &scene()).unwrap();
+        let grid = Grid::new(0.1, Some([636_000.3, 849_000.7, 636_000.9, 849_001.1]), (&scene(), None)).unwrap();
         assert!((grid.left - 636_000.3).abs() < 1e-9 && (grid.top - 849_001.1).abs() < 1e-9);
         assert_eq!((grid.columns, grid.rows), (6, 4));
-        assert!(Grid::new(1e-9, None, &scene()).unwrap_err().to_string().contains("--bounds"));
+        assert!(Grid::new(1e-9, None, (&scene(), None)).unwrap_err().to_string().contains("--bounds"));
     }
 
     /// A point at the centre of a pixel is seen there, in every tile.
     #[test]
     fn cameras_map_the_world_to_pixels() {
-        let grid = Grid::new(0.25, Some([636_000.0, 849_000.0, 636_100.0, 849_050.0]), &scene()).unwrap();
+        let grid = Grid::new(0.25, Some([636_000.0, 849_000.0, 636_100.0, 849_050.0]), (&scene(), None)).unwrap();
         assert_eq!((grid.columns, grid.rows), (400, 200));
         for (columns, rows) in [(0..400, 0..200), (17..52, 40..81), (399..400, 199..200)] {
             let camera = grid.camera(columns.clone(), rows.clone()).unwrap();

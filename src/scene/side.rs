@@ -51,7 +51,8 @@ const NAMED: [(&[&str], f64, f64); 13] = [
 ];
 
 impl Side {
-    /// A compass direction, or straight from above or below for an elevation of 90 or -90 degrees.
+    /// A compass direction, or straight from above or below for an elevation of 90 or -90 degrees,
+    /// where north is at the top and the azimuth is left out.
     ///
     /// # Errors
     /// [`Error::Usage`] for an azimuth that is not finite, or an elevation beyond 90 degrees.
@@ -62,6 +63,15 @@ impl Side {
             -90.0 => Ok(Self::Below),
             _ if elevation.abs() < 90.0 => Ok(Self::Compass { azimuth, elevation }),
             _ => Err(Error::Usage(format!("an elevation lies between -90 and 90 degrees, {elevation} does not"))),
+        }
+    }
+
+    /// Whether the view is within a degree of the vertical, so that up barely fixes its roll.
+    pub fn is_steep(self) -> bool {
+        match self {
+            Self::Compass { elevation, .. } => elevation.abs() > 89.0,
+            Self::Above | Self::Below => true,
+            Self::Toward(_) => false,
         }
     }
 

@@ -51,7 +51,7 @@ impl<'a> Coloring<'a> {
         let name =
             columns.iter().find(|column| !column.values.is_empty()).map_or_else(|| by.to_string(), |c| c.name.clone());
         let group = Group::of(&name);
-        let plain = self.options.color_map.is_none() && self.options.range.is_none();
+        let plain = self.options.color_map.is_none() && self.options.range.is_none() && columns.iter().all(are_codes);
         let colors = match group {
             Some(group @ (Group::Class | Group::Return)) if plain => {
                 for (points, column) in inputs.iter_mut().zip(&columns) {
@@ -127,12 +127,10 @@ fn share(value: f64, [low, high]: [f64; 2]) -> f64 {
 
 /// The values that the ends of a range stand for. Percentiles are those of all finite values.
 fn ends(ValueRange(range): ValueRange, columns: &[Column], name: &str) -> Result<[f64; 2]> {
-    let base = columns.iter().find(|column| !column.values.is_empty()).map_or(0.0, |column| column.base);
-    let mut values: Vec<f32> = Vec::new();
+    let mut values: Vec<f64> = Vec::new();
     if range.iter().any(|end| matches!(end, End::Percent(_))) {
         for column in columns {
-            let shift = (column.base - base) as f32;
-            values.extend(column.values.iter().filter(|value| value.is_finite()).map(|value| value + shift));
+            values.extend((0..column.values.len()).map(|index| column.value(index)).filter(|value| value.is_finite()));
         }
         if values.is_empty() {
             return Err(Error::Usage(format!("no point has a finite value of {name}: choose another --color-by")));
@@ -142,8 +140,8 @@ fn ends(ValueRange(range): ValueRange, columns: &[Column], name: &str) -> Result
         End::Value(value) => value,
         End::Percent(percent) => {
             let place = (percent / 100.0 * (values.len() - 1) as f64).round() as usize;
-            let (_, value, _) = values.select_nth_unstable_by(place, f32::total_cmp);
-            base + f64::from(*value)
+            let (_, value, _) = values.select_nth_unstable_by(place, f64::total_cmp);
+            *value
         }
     };
     let ends = [value(range[0]), value(range[1])];
@@ -152,6 +150,12 @@ fn ends(ValueRange(range): ValueRange, columns: &[Column], name: &str) -> Result
         return Err(Error::Usage(what));
     }
     Ok(ends)
+}
+
+/// Whether all finite values are whole numbers that are not negative.
+fn are_codes(column: &Column) -> bool {
+    let values = (0..column.values.len()).map(|index| column.value(index)).filter(|value| value.is_finite());
+    values.into_iter().all(|value| (0.0..=f64::from(u16::MAX)).contains(&value) && value.fract() == 0.0)
 }
 
 /// The colour of a number of classes or returns.

@@ -10,7 +10,7 @@ use super::whole::Made;
 use crate::error::{Error, Result};
 use crate::plan::Settings;
 use crate::progress::Progress;
-use crate::scene::{Camera, ColorKey, Scene};
+use crate::scene::{Bounds, Camera, ColorKey, Scene};
 
 /// Inputs that are read in part for each picture. The part does not depend on earlier pictures.
 pub(super) enum Parts {
@@ -66,6 +66,14 @@ impl Parts {
         match self {
             Self::Octrees(octrees) => &octrees.overview,
             Self::Tree(tree) => &tree.overview,
+        }
+    }
+
+    /// The box of all points, if the files are COPC files that state it; world coordinates.
+    pub fn bounds(&self) -> Option<Bounds> {
+        match self {
+            Self::Octrees(octrees) => octrees.bounds(),
+            Self::Tree(_) => None,
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::{Picture, Renderer, View};
+use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::options::CameraOptions;
@@ -53,7 +54,7 @@ impl Renderer {
             return usage("--pixel-size looks from straight above: leave other options of the camera out");
         }
         match (up, self.scene().up) {
-            (Some(DVec3::Z), _) | (None, Up::Z) => Grid::new(pixel, *bounds, self.scene()),
+            (Some(DVec3::Z), _) | (None, Up::Z) => Grid::new(pixel, *bounds, (self.scene(), self.data())),
             (None, Up::Y) => usage(
                 "--pixel-size makes a map of x and y, and in these files y is up: give --up z if z is up in truth",
             ),
@@ -74,6 +75,7 @@ impl Renderer {
         progress: &dyn Progress,
         mut give: impl FnMut(Frame) -> Result<()>,
     ) -> Result<Survey> {
+        let marks = self.check_tiles(grid)?;
         let (mut first, mut tiles, mut visible): (Option<Picture>, u64, bool) = (None, 0, false);
         let planned = grid.bands().count() as u64 * grid.tiles().count() as u64;
         let counts = planned > 1;
@@ -87,7 +89,7 @@ impl Renderer {
             let mut across = Vec::new();
             for columns in grid.tiles() {
                 let view = View::from(grid.camera(columns, rows.clone())?);
-                let mut picture = self.rendered(&view, false, of_tile)?;
+                let mut picture = self.rendered(&view, (false, DVec3::Z), of_tile)?;
                 tiles += 1;
                 if counts {
                     progress.advance(1);
@@ -99,7 +101,12 @@ impl Renderer {
                     None => first = Some(picture),
                 }
             }
-            Frame::joined(across).map_or(Ok(()), &mut give)?;
+            let Some(mut band) = Frame::joined(across) else { continue };
+            if marks != Marks::default() {
+                let key = first.as_ref().and_then(|first| first.key.as_ref());
+                band = marks.draw(band, &grid.camera(0..grid.columns, 0..grid.rows)?, key)?;
+            }
+            give(band)?;
         }
         if counts {
             progress.end();
@@ -108,6 +115,31 @@ impl Renderer {
             return Err(Error::Usage("a map needs at least one pixel".into()));
         };
         Ok(Survey { report, tiles, unseen: unseen.filter(|_| !visible) })
+    }
+}
+
+impl Renderer {
+    /// Rejects what cannot be drawn in tiles or bands, and returns the marks of the map.
+    fn check_tiles(&self, grid: &Grid) -> Result<Marks> {
+        let (bands, across) = (grid.bands().count(), grid.tiles().count());
+        let refused = |what: &str, most: &str| {
+            let size = format!("{}x{}", grid.columns, grid.rows);
+            Err(Error::Usage(format!(
+                "{what} needs a map of one {most}, and {size} pixels are more: give a larger --pixel-size, or less by --bounds"
+            )))
+        };
+        let marks = self.options.marks.marks();
+        if self.options.look.edl.is_some() && bands * across > 1 {
+            return refused("--edl, which looks at neighbouring pixels,", "tile (4096 columns and 8 million pixels)");
+        }
+        if marks == Marks::default() {
+            return Ok(marks);
+        }
+        if bands > 1 {
+            return refused("a mark (--legend, --scale-bar, --north)", "band (8 million pixels)");
+        }
+        marks.check(&grid.camera(0..grid.columns, 0..grid.rows)?)?;
+        Ok(marks)
     }
 }
 
@@ -124,7 +156,7 @@ impl Progress for Notes<'_> {
     }
 }
 
-/// Adds the times and the drawn splats of another tile.
+/// Adds the times of another tile.
 fn add(report: &mut Report, other: &Report) {
     for (pass, ms) in &other.passes {
         *report.passes.entry(pass.clone()).or_default() += ms;

@@ -21,13 +21,23 @@ pub(super) struct Meshes {
 }
 
 /// Returns how the meshes among `inputs` are drawn, and why if nobody said so and they are surfels.
-fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> (MeshAs, Option<String>) {
+///
+/// # Errors
+///
+/// [`Error::Usage`] if all inputs are drawn as triangles and an option needs surfels.
+fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> Result<(MeshAs, Option<String>)> {
     let (drawn_as, needed) = request.scene.options.mesh(request.options);
-    let chosen = request.triangles().mesh.is_some();
-    if !chosen && needed.is_none() && inputs.iter().any(|points| points.encoded) {
-        return (MeshAs::Surfels, Some("as Gaussians show through each other and triangles do not".into()));
+    let alone = inputs.iter().all(|points| points.is_mesh() || points.positions.is_empty());
+    match (request.triangles().mesh, needed) {
+        (Some(MeshAs::Triangles), Some(option)) if alone => Err(Error::Usage(format!(
+            "{option} is for surfels, and --mesh triangles draws none: leave one of them out"
+        ))),
+        (Some(chosen), _) => Ok((chosen, None)),
+        (None, None) if inputs.iter().any(|points| points.encoded) => {
+            Ok((MeshAs::Surfels, Some("as Gaussians show through each other and triangles do not".into())))
+        }
+        (None, needed) => Ok((drawn_as, needed.map(|option| format!("which {option} is for")))),
     }
-    (drawn_as, needed.map(|option| format!("which {option} is for")))
 }
 
 impl Meshes {
@@ -41,9 +51,13 @@ impl Meshes {
     pub fn of_inputs(request: &Request<'_>, inputs: &mut [Points], progress: &dyn Progress) -> Result<Self> {
         let mut meshes = Self::default();
         if !inputs.iter().any(Points::is_mesh) {
+            let options = request.triangles();
+            if (options.smooth.is_some() || options.mesh.is_some()) && options.meshes.is_empty() {
+                progress.note("warning: no input is a mesh, so --mesh and --smooth change nothing");
+            }
             return Ok(meshes);
         }
-        let (drawn_as, because) = drawn_as(request, inputs);
+        let (drawn_as, because) = drawn_as(request, inputs)?;
         if let Some(because) = because {
             progress.note(&format!("meshes are drawn as surfels, {because} (--mesh chooses)"));
         }

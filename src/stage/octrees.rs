@@ -53,6 +53,10 @@ impl Octrees {
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
         let mut rules = ColorRules::default();
         let mut points = read(request, (&mut files, &mut rules), &nodes, progress)?;
+        // A filter may leave points of finer nodes alone, so the files are read whole.
+        if are_empty(&points) {
+            return Ok(None);
+        }
         let mut coloring = Coloring::of(&request.scene.options.colors, None);
         coloring.settle(&mut points)?;
         let ends = coloring.ends();
@@ -74,6 +78,11 @@ impl Octrees {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
         let mut points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        // A filter may leave none of these points. Those of the overview lie outside the picture.
+        if are_empty(&points) {
+            nodes = self.octrees.iter().map(PointOctree::overview).collect();
+            points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        }
         let key = Coloring::of(&request.scene.options.colors, self.ends).settle(&mut points)?;
         let mut made = scene_of(request, points, progress)?;
         self.end(&mut made.0, &nodes);
@@ -82,21 +91,28 @@ impl Octrees {
         Ok(Part { made, settings, read: read_of(&self.files, &nodes), key })
     }
 
+    /// The bounding box of all points; None if a file states none.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let stated = self.octrees.iter().all(|octree| !octree.bounds.is_empty());
+        stated.then(|| self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds)))
+    }
+
     /// Makes surfels of these nodes end at the bounding box of all points.
     ///
     /// Surfels of coarse nodes are large and would reach beyond it. Does nothing if a file states
     /// no bounding box.
     fn end(&self, scene: &mut Scene, nodes: &[Vec<usize>]) {
-        if self.octrees.iter().any(|octree| octree.bounds.is_empty()) {
-            return;
-        }
-        let bounds = self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds));
+        let Some(bounds) = self.bounds() else { return };
         let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
         let thinned: Vec<Thinned> = thinned.collect();
         // Where files overlap, their points are interleaved, so the largest fraction is used.
         let part = |place| thinned.iter().filter_map(|octree| octree.part_of_size(place)).reduce(f64::max);
         borders::end_at(scene, &bounds, |place| part(place).unwrap_or(1.0));
     }
+}
+
+fn are_empty(inputs: &[Points]) -> bool {
+    inputs.iter().all(|points| points.positions.is_empty())
 }
 
 /// Counts these nodes, their points and bytes, and the totals of the files.

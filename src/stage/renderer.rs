@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::in_part::{Part, Parts};
 use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, levels, memory};
 use crate::annotate::Marks;
@@ -19,7 +21,7 @@ use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps};
 /// from one view to the next.
 pub struct Renderer {
     inputs: Arc<Inputs>,
-    options: RenderOptions,
+    pub(super) options: RenderOptions,
     device: DeviceOptions,
     views: bool,
     settings: Settings,
@@ -202,6 +204,14 @@ impl Renderer {
         }
     }
 
+    /// The box of all points of files that are read in part, as they state it, world coordinates.
+    pub(super) fn data(&self) -> Option<Bounds> {
+        match &self.drawn {
+            Drawn::Parts { parts, .. } => parts.bounds(),
+            Drawn::Whole { .. } => None,
+        }
+    }
+
     /// Returns the camera of a view, with values from the scene filled in.
     ///
     /// # Errors
@@ -218,16 +228,24 @@ impl Renderer {
     /// [`Error::Limit`] if a limit of the adapter is too small, [`Error::Usage`] if the limit of
     /// memory is too small, and errors of reading and of the device.
     pub fn frame(&mut self, view: &View, progress: &dyn Progress) -> Result<Picture> {
+        // Many views would give a line each.
         let is_told = !self.views;
-        self.rendered(view, is_told, progress)
+        let marks = self.options.marks.marks();
+        marks.check(&self.camera(view)?)?;
+        let up = self.scene().up.axis();
+        self.rendered(view, (is_told, up), progress)?.marked(marks)
     }
 
-    /// Renders a view, and describes it in a note if `is_told`: many views would give a line each.
-    pub(super) fn rendered(&mut self, view: &View, is_told: bool, progress: &dyn Progress) -> Result<Picture> {
+    /// Renders a view without marks, and describes it in a note if `is_told`. `up` is the axis of
+    /// heights, of length 1.
+    pub(super) fn rendered(
+        &mut self,
+        view: &View,
+        (is_told, up): (bool, DVec3),
+        progress: &dyn Progress,
+    ) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
-        let marks = options.marks.marks();
-        marks.check(&camera)?;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
@@ -241,7 +259,7 @@ impl Renderer {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let rendered = renderer.frame(&camera, progress)?;
-                picture(scene, settings, rendered, (camera, view), (None, maps, key.clone())).marked(marks)
+                Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
             }
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read, key } =
@@ -258,13 +276,19 @@ impl Renderer {
                 let rendered = render(&scene, &camera, &settings, backend, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                picture(&scene, &settings, rendered, (camera, view), (Some(read), maps, key)).marked(marks)
+                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))
             }
         }
     }
 }
 
 impl Picture {
+    /// Adds the maps of `wanted` that are made from others. `up` is the axis of heights.
+    fn with_heights(self, up: DVec3, wanted: Maps) -> Self {
+        let frame = heights::made(self.frame, &self.camera, up, wanted);
+        Self { frame, ..self }
+    }
+
     /// Draws marks on the frame.
     fn marked(self, marks: Marks) -> Result<Self> {
         if marks == Marks::default() {
@@ -322,16 +346,14 @@ fn whole(
     Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
 }
 
-/// Combines a rendered frame with its view and counts, with `maps` that are made from others, and
-/// with the reason if the frame is empty.
+/// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
 fn picture(
     scene: &scene::Scene,
     settings: &Settings,
     (frame, report): (Frame, Report),
     (camera, view): (Camera, ViewReport),
-    (read, maps, key): (Option<ReadReport>, Maps, Option<ColorKey>),
+    (read, key): (Option<ReadReport>, Option<ColorKey>),
 ) -> Picture {
-    let frame = heights::made(frame, &camera, scene.up.axis(), maps);
     let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
     Picture { frame, report, camera, view, read, unseen, key }
 }

@@ -26,6 +26,9 @@ impl Request<'_> {
         if self.surfels().textures.is_empty() {
             return Ok(settings);
         }
+        if self.scene.options.colors.is_given() {
+            return Err(Error::Usage("--color-by replaces the colours of an image: leave it or --texture out".into()));
+        }
         if self.options.points.facing.is_some() {
             return Err(Error::Usage("--facing leaves points no plane to paint: leave it or --texture out".into()));
         }
@@ -76,7 +79,10 @@ impl Request<'_> {
                 .and_then(|()| check::scene(&Facts::of(scene), &layered, self.is_reference()))
                 .is_ok()
         };
-        !chosen && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0) && layers_can_be_drawn()
+        // With layers, meshes of the inputs are drawn as surfels.
+        let turns_to_surfels = self.triangles().mesh.is_none() && self.triangles().meshes.is_empty();
+        let can = (!scene.triangles.is_empty() && turns_to_surfels) || layers_can_be_drawn();
+        !chosen && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0) && can
     }
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {

@@ -186,8 +186,9 @@ impl Given {
                     false => self.lens,
                 };
                 let (camera, target) = Camera::framing_from(self.size, lens, scene, near, (*side, *up))?;
+                // Near the vertical, the printed view would else have another roll.
                 let up = match side {
-                    Some(vertical @ (Side::Above | Side::Below)) => Some(vertical.view(*up, scene.up)?.1),
+                    Some(side) if side.is_steep() => Some(side.view(*up, scene.up)?.1),
                     _ => *up,
                 };
                 return Ok((camera, Seen { target, up, by: By::Choice }));

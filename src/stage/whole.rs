@@ -116,12 +116,15 @@ pub(super) fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &
 }
 
 fn uncolored(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
-    let textures = request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+    let mut textures =
+        request.surfels().textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
     if !textures.is_empty() && inputs.iter().any(bare) {
         let paths =
             request.files().paths().iter().zip(&inputs).filter(|(_, points)| bare(points)).map(|(path, _)| path);
-        if !inputs.iter().any(Points::has_places) {
+        // The places of meshes that the images paint as triangles hold no points.
+        let paints_triangles = inputs.iter().any(|points| points.positions.is_empty());
+        if !inputs.iter().any(Points::has_places) && !paints_triangles {
             let what = "its points have no texture coordinates, so they cannot be textured: use `epsplat sample` to make surfels of a mesh with texture coordinates";
             let unnamed = Path::new("the scene");
             return Err(Error::malformed(paths.clone().next().map_or(unnamed, PathBuf::as_path), what));
@@ -133,6 +136,9 @@ fn uncolored(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress
         progress.note(&format!(
             "{names}: no texture coordinates, so the points have their own colours in spite of --texture"
         ));
+        if !inputs.iter().any(Points::has_places) {
+            textures.clear();
+        }
     }
     let limits = request.surfels().limits.limits();
     let in_file = |error| request.files().named(error);

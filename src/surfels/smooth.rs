@@ -6,6 +6,8 @@
 //! shows in the shading. Each triangle is weighted by its angle at the vertex, so that the result
 //! does not depend on how polygons are cut into triangles (Thürmer and Wüthrich 1998).
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -29,7 +31,12 @@ pub fn smooth_normals(positions: &[[f64; 3]], triangles: &[[u32; 3]], angle: f64
     let facets: Vec<DVec3> = triangles
         .par_iter()
         .map(|corners| {
-            let [a, b, c] = corners.map(place);
+            let mut places = corners.map(place);
+            // The first corner must not depend on the file, as rounding depends on it.
+            let order = |k: &usize| places[*k].to_array().map(f64::to_bits);
+            let first = (0..3).min_by_key(order).unwrap_or(0);
+            places.rotate_left(first);
+            let [a, b, c] = places;
             (b - a).cross(c - a).normalize_or_zero()
         })
         .collect();
@@ -44,15 +51,19 @@ pub fn smooth_normals(positions: &[[f64; 3]], triangles: &[[u32; 3]], angle: f64
                 let of = triangles[corner.triangle as usize];
                 [1, 2].map(|step| welded[of[(usize::from(corner.place) + step) % 3] as usize])
             };
-            let sets = joined(around, ends, |a, b| facets[a as usize].dot(facets[b as usize]) >= least);
+            let sets = joined(around, ends, |triangle| facets[triangle as usize], least);
             let weighted = |corner: &Corner| {
                 let of = triangles[corner.triangle as usize];
                 let [at, next, last] = [0, 1, 2].map(|step| place(of[(usize::from(corner.place) + step) % 3]));
                 let angle = (next - at).angle_between(last - at);
                 if angle.is_finite() { facets[corner.triangle as usize] * angle } else { DVec3::ZERO }
             };
+            // Sums in the order of their terms do not depend on the order of triangles.
+            let mut terms: Vec<(u32, DVec3)> =
+                around.iter().zip(&sets).map(|(corner, set)| (*set, weighted(corner))).collect();
+            terms.sort_unstable_by(|(a, p), (b, q)| a.cmp(b).then_with(|| in_order(*p, *q)));
             let mut sums = vec![DVec3::ZERO; around.len()];
-            around.iter().zip(&sets).for_each(|(corner, set)| sums[*set as usize] += weighted(corner));
+            terms.into_iter().for_each(|(set, term)| sums[set as usize] += term);
             let normal = move |(corner, set): (&Corner, u32)| {
                 (*corner, sums[set as usize].normalize_or_zero().as_vec3().to_array())
             };
@@ -96,20 +107,39 @@ fn corners_of_vertices(welded: &[u32], triangles: &[[u32; 3]]) -> Vec<Corner> {
     corners
 }
 
+/// The most triangles at a side of which each is compared with each.
+const FEW: usize = 16;
+
+/// An order of vectors.
+fn in_order(p: DVec3, q: DVec3) -> Ordering {
+    let each = p.to_array().into_iter().zip(q.to_array()).map(|(a, b)| a.total_cmp(&b));
+    each.fold(Ordering::Equal, Ordering::then)
+}
+
 /// Returns for each corner around a vertex the number of its fan. `ends` are the other two vertices
-/// of a corner's triangle, and `goes_on` tells whether two triangles meet without a crease.
-fn joined(around: &[Corner], ends: impl Fn(Corner) -> [u32; 2], goes_on: impl Fn(u32, u32) -> bool) -> Vec<u32> {
+/// of a corner's triangle, and `facet` gives a triangle's normal. Two triangles at a side are joined
+/// if the cosine between their normals is at least `least`.
+fn joined(around: &[Corner], ends: impl Fn(Corner) -> [u32; 2], facet: impl Fn(u32) -> DVec3, least: f64) -> Vec<u32> {
     let numbered = around.iter().zip(0..);
     let mut sides: Vec<(u32, u32)> =
         numbered.flat_map(|(corner, number)| ends(*corner).map(|end| (end, number))).collect();
     sides.sort_unstable();
     let mut sets = Sets::new(around.len());
     for at_side in sides.chunk_by(|a, b| a.0 == b.0) {
-        for pair in at_side.windows(2) {
-            let [a, b] = [pair[0].1, pair[1].1];
-            if goes_on(around[a as usize].triangle, around[b as usize].triangle) {
+        let normal = |number: u32| facet(around[number as usize].triangle);
+        let mut numbers: Vec<u32> = at_side.iter().map(|(_, number)| *number).collect();
+        numbers.retain(|number| normal(*number) != DVec3::ZERO);
+        let mut unite = |a: u32, b: u32| {
+            if normal(a).dot(normal(b)) >= least {
                 sets.unite(a, b);
             }
+        };
+        if numbers.len() <= FEW {
+            let pairs = numbers.iter().enumerate().flat_map(|(k, a)| numbers[k + 1..].iter().map(move |b| (*a, *b)));
+            pairs.for_each(|(a, b)| unite(a, b));
+        } else {
+            numbers.sort_unstable_by(|a, b| in_order(normal(*a), normal(*b)));
+            numbers.windows(2).for_each(|pair| unite(pair[0], pair[1]));
         }
     }
     sets.all()
@@ -156,6 +186,36 @@ mod tests {
         let apart: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|&vertex| positions[vertex as usize]).collect();
         let numbers: Vec<[u32; 3]> = (0..4).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         assert_eq!(smooth_normals(&apart, &numbers, 60.0), smooth_normals(&positions, &triangles, 60.0));
+    }
+
+    /// A pyramid without a base, each side of it twice with opposite fronts: four triangles at each
+    /// edge. Their order and the first corner of each change no bit.
+    #[test]
+    fn the_order_of_triangles_and_corners_shows_nowhere() {
+        let positions = vec![[0.0, 0.0, 0.31], [1.0, 0.1, 0.0], [0.2, 1.0, 0.03], [-1.0, 0.3, 0.0], [0.1, -1.1, 0.0]];
+        let sides: Vec<[u32; 3]> = vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]];
+        let back = sides.iter().map(|[a, b, c]| [*a, *c, *b]);
+        let apart: Vec<[u32; 3]> = sides.iter().copied().chain(back).collect();
+        let expected = smooth_normals(&positions, &apart, 50.0);
+        // The fronts of all sides are joined, and so are the backs.
+        assert!(expected[..4].iter().all(|normals| normals[0] == expected[0][0] && normals[0][2] > 0.9));
+        for step in 1..8 {
+            let order: Vec<usize> = (0..8).map(|k| (k * 5 + step) % 8).collect();
+            let turned: Vec<[u32; 3]> = order
+                .iter()
+                .map(|&k| {
+                    let mut corners = apart[k];
+                    corners.rotate_left((k + step) % 3);
+                    corners
+                })
+                .collect();
+            let normals = smooth_normals(&positions, &turned, 50.0);
+            for (at, &k) in order.iter().enumerate() {
+                let mut own = normals[at];
+                own.rotate_right((k + step) % 3);
+                assert_eq!(own, expected[k], "{step} {k}");
+            }
+        }
     }
 
     /// The largest angle, degrees, between a smooth normal and that of the sphere, for an octahedron

@@ -7,7 +7,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::Files;
 use epsplat::io::images::ImageFormat;
-use epsplat::options::parse::scale;
+use epsplat::options::parse::{scale, turns};
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 
 use super::super::inputs::help_of_all;
@@ -45,7 +45,7 @@ use super::super::outputs::Source;
     ffmpeg -f rawvideo -pix_fmt rgba -s 640x480 -r 30 -i - turntable.mp4"
 )]
 pub struct Arguments {
-    #[arg(required_unless_present = "triangles", help = help_of_all("Point clouds or meshes, which become surfels"))]
+    #[arg(required_unless_present = "triangles", help = help_of_all("Point clouds, drawn as surfels, or meshes, drawn as triangles"))]
     pub(super) inputs: Vec<PathBuf>,
     /// The image: .png, .exr (linear, with maps), .jpg, .tif, .npy or .npz; - is standard output;
     /// with --cameras or --turntable a folder of images
@@ -114,7 +114,7 @@ pub(super) struct ViewArguments {
     /// The camera moves counter-clockwise, seen from above, in N equal steps around the up axis
     /// through the scene's centre, at one distance from which the whole scene stays in view. The
     /// pictures are named 0000.png and so on
-    #[arg(long, value_name = "N", conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics", "pixel_size"], hide_short_help = true)]
+    #[arg(long, value_name = "N", value_parser = turns, conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics", "pixel_size"], hide_short_help = true)]
     pub(super) turntable: Option<NonZeroU32>,
     /// Factor of the width and height of --cameras' images; intrinsics are scaled too
     #[arg(long, value_name = "FACTOR", value_parser = scale, requires = "cameras", hide_short_help = true)]

@@ -30,6 +30,9 @@ struct Outcome<'a> {
     bits: Option<BTreeMap<&'static str, String>>,
 }
 
+/// The most pixels in a row or column of a JPEG.
+const LONGEST_JPEG: u32 = 65_535;
+
 /// Renders a map.
 pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
@@ -43,6 +46,13 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     let bars = Bars::new();
     let mut renderer = Renderer::new(&scene, &arguments.options, &arguments.device, &bars)?;
     let grid = renderer.grid(&arguments.camera)?;
+    if target.format.name() == "jpg" && grid.columns.max(grid.rows) > LONGEST_JPEG {
+        let what = format!(
+            "a JPEG has at most {LONGEST_JPEG} pixels in a row, and this map has {}x{}",
+            grid.columns, grid.rows
+        );
+        return Err(Error::Usage(format!("{what}: write a .tif, or give a larger --pixel-size")));
+    }
     let place = Place { left: grid.left, top: grid.top, pixel: grid.pixel, keys };
     describe(&grid);
     let streams = target.format.name() == "tif" && !target.is_standard;

@@ -23,7 +23,7 @@ pub enum Group {
 /// Each group with the names of its attributes, in the form of [`plain`]; the first is what users
 /// call it.
 const GROUPS: [(Group, &[&str]); 5] = [
-    (Group::Class, &["class", "classification", "classificationid", "label"]),
+    (Group::Class, &["class", "classification", "classificationid"]),
     (Group::Return, &["return", "returnnumber", "returnnum", "returnindex"]),
     (Group::GpsTime, &["gpstime", "time", "timestamp"]),
     (Group::ScanAngle, &["scanangle", "scananglerank"]),

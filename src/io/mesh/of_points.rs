@@ -39,6 +39,12 @@ impl Mesh {
         if let Some(paint) = paint {
             mesh.take(*paint);
         }
+        let mut is_named = vec![false; mesh.positions.len()];
+        mesh.triangles.as_flattened().iter().for_each(|vertex| is_named[*vertex as usize] = true);
+        let loose = is_named.iter().filter(|named| !**named).count();
+        if loose > 0 {
+            mesh.notes.push(format!("{loose} vertices of no triangle were left out"));
+        }
         mesh
     }
 

@@ -299,6 +299,32 @@ mod tests {
     }
 
     #[test]
+    fn the_order_of_inputs_decides_no_range() {
+        let time = |base: f64| (0..50).map(|k| base + 0.123 * f64::from(k)).collect::<Vec<_>>();
+        let (first, second) = (points("t", &time(3e8)), points("t", &time(3e8 + 9.1e5)));
+        let options = options("t", None, Some("60%,98%"));
+        let ends = |mut inputs: [Points; 2]| {
+            let mut coloring = Coloring::of(&options, None);
+            coloring.settle(&mut inputs).unwrap();
+            coloring.ends().unwrap()
+        };
+        let expected = ends([first.clone(), second.clone()]);
+        assert_eq!(ends([second, first]), expected);
+        assert!((expected[0] - (3e8 + 9.1e5 + 0.123 * 9.0)).abs() < 1e-3, "{expected:?}");
+    }
+
+    /// Clusterings call noise -1, which is no class.
+    #[test]
+    fn numbers_that_are_no_codes_are_no_categories() {
+        for values in [[-1.0, 2.0], [0.5, 2.0]] {
+            let options = options("class", None, None);
+            let mut inputs = [points("Classification", &values)];
+            let key = Coloring::of(&options, None).settle(&mut inputs).unwrap().unwrap();
+            assert!(matches!(key.colors, KeyColors::Ramp { .. }), "{values:?}");
+        }
+    }
+
+    #[test]
     fn alphas_stay() {
         let options = options("a", Some("gray"), Some("0,1"));
         let mut inputs = [points("a", &[1.0])];

@@ -513,6 +513,8 @@ fn simplify_keeps_the_picture_with_fewer_surfels() {
 
 /// A mesh's triangles are drawn alone and beside surfels; options that do not apply to them are
 /// refused in a sentence.
+const CLOUD: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+
 #[test]
 fn triangles_are_drawn_alone_and_beside_surfels() {
     let folder = Folder::new();
@@ -559,6 +561,14 @@ fn triangles_are_drawn_alone_and_beside_surfels() {
     by(&cube, &["--composite", "layers"], 2, &["--composite"]);
     by(&cube, &["--join", "glued"], 2, &["corrected, nearest or blended"]);
     fails(&[&with(&[])[..], &[image, "--join", "nearest", "--mesh", "surfels", &bunny]].concat(), 2, &["--triangles"]);
+    // Options that triangles do not have are refused, not left out.
+    fails(&[&with(&[])[..], &[image, "--mesh", "triangles", "--opacity", "0.5", &bunny]].concat(), 2, &["--opacity"]);
+    let warned = succeeds(&[&with(&[])[..], &[image, "--smooth", "30", text(&folder.file("c.obj", CLOUD))]].concat());
+    let warned = String::from_utf8(warned.stderr).unwrap();
+    assert!(warned.contains("no input is a mesh"), "{warned}");
+    let half = folder.file("half.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 1 2 3\n");
+    let told = String::from_utf8(succeeds(&[&with(&[])[..], &[image, text(&half)]].concat()).stderr).unwrap();
+    assert!(told.contains("1 vertices of no triangle"), "{told}");
     let painted = [image, "--triangle-texture", &painted, &cube];
     fails(&[&with(&[])[..], &painted].concat(), 2, &["--triangle-texture", "take --texture"]);
     fails(&with(&["t.png"]), 2, &["INPUTS"]);

@@ -292,3 +292,30 @@ fn formats_are_found_by_their_names() {
     let said = ImageFormat::of_path(Path::new("a.bmp")).unwrap_err().to_string();
     assert!(said.contains(".png, .exr") && said.contains("a.bmp"), "{said}");
 }
+
+/// The unit cube of the data folder has y up and its top face at z = 1.
+#[test]
+fn heights_of_a_map_are_z_whatever_the_file_calls_up() {
+    let folder = Folder::new();
+    let (cube, output) = (format!("{DATA}/cube.obj"), folder.path("h.npy"));
+    let map = ["render", &cube, "-o", text(&output), "--backend", "reference", "--pixel-size", "0.5"];
+    succeeds(&[&map[..], &["--up", "z", "--aov", "height"]].concat());
+    let file = std::fs::read(&output).unwrap();
+    let (_, data) = npy(&file);
+    let heights: Vec<f32> = words(data).into_iter().map(f32::from_bits).collect();
+    assert!(heights.len() == 16 && heights.iter().all(|height| (height - 1.0).abs() < 1e-6), "{heights:?}");
+    fails(&[&map[..], &["--aov", "height"]].concat(), 2, &["y is up", "--up z"]);
+}
+
+#[test]
+fn marks_and_eye_dome_lighting_are_refused_where_tiles_would_repeat_them() {
+    let folder = Folder::new();
+    let (scan, output) = (format!("{DATA}/autzen.laz"), folder.path("m.png"));
+    let map = ["render", &scan, "-o", text(&output), "--facing", "square", "--bounds", "636550,848950,637050,848960"];
+    let refuses = |more: &[&str], words: &[&str]| fails(&[&map[..], more].concat(), 2, words);
+    // 5000 columns are two tiles.
+    refuses(&["--pixel-size", "0.1", "--edl"], &["--edl", "one tile", "5000x100"]);
+    refuses(&["--pixel-size", "0.005", "--scale-bar"], &["--scale-bar", "one band"]);
+    assert!(!output.exists());
+    succeeds(&[&map[..], &["--pixel-size", "0.1", "--scale-bar", "--backend", "reference", "--samples", "1"]].concat());
+}

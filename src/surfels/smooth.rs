@@ -117,8 +117,8 @@ fn in_order(p: DVec3, q: DVec3) -> Ordering {
 }
 
 /// Returns for each corner around a vertex the number of its fan. `ends` are the other two vertices
-/// of a corner's triangle, and `facet` gives a triangle's normal. Two triangles at a side are joined
-/// if the cosine between their normals is at least `least`.
+/// of a corner's triangle, and `facet` gives a triangle's normal. Two triangles at a side are
+/// joined if the cosine between their normals is at least `least`.
 fn joined(around: &[Corner], ends: impl Fn(Corner) -> [u32; 2], facet: impl Fn(u32) -> DVec3, least: f64) -> Vec<u32> {
     let numbered = around.iter().zip(0..);
     let mut sides: Vec<(u32, u32)> =
@@ -218,8 +218,8 @@ mod tests {
         }
     }
 
-    /// The largest angle, degrees, between a smooth normal and that of the sphere, for an octahedron
-    /// whose triangles are divided into four this many times.
+    /// The largest angle, degrees, between a smooth normal and that of the sphere, for an
+    /// octahedron whose triangles are divided into four this many times.
     fn worst_of_sphere(divisions: usize) -> f64 {
         let mut triangles: Vec<[DVec3; 3]> = Vec::new();
         for (x, y, z) in

@@ -315,7 +315,7 @@ fn marks_and_eye_dome_lighting_are_refused_where_tiles_would_repeat_them() {
     let refuses = |more: &[&str], words: &[&str]| fails(&[&map[..], more].concat(), 2, words);
     // 5000 columns are two tiles.
     refuses(&["--pixel-size", "0.1", "--edl"], &["--edl", "one tile", "5000x100"]);
-    refuses(&["--pixel-size", "0.005", "--scale-bar"], &["--scale-bar", "one band"]);
+    refuses(&["--pixel-size", "0.02", "--scale-bar"], &["--scale-bar", "one band"]);
     assert!(!output.exists());
     succeeds(&[&map[..], &["--pixel-size", "0.1", "--scale-bar", "--backend", "reference", "--samples", "1"]].concat());
 }

@@ -2,6 +2,7 @@
 
 mod adapters;
 mod bench;
+mod cameras;
 mod card;
 mod compare;
 mod coverage;

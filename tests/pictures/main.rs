@@ -24,6 +24,7 @@ mod oit;
 mod on_device;
 mod pictures;
 mod points;
+mod programs;
 mod properties;
 mod raster;
 mod refusals;

@@ -65,6 +65,26 @@ impl Color {
     }
 }
 
+/// A whole number for each point, in a property of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Column<'a> {
+    /// The name of the property, in which there is no space.
+    pub name: &'a str,
+    /// A value for each point; missing ones are written as 0.
+    pub values: &'a [u32],
+}
+
+impl Column<'_> {
+    /// Writes the header lines of `columns`.
+    pub(super) fn write_properties(columns: &[Self], out: &mut impl Write) -> io::Result<()> {
+        columns.iter().try_for_each(|column| writeln!(out, "property uint {}", column.name))
+    }
+
+    pub(super) fn bytes(&self, index: usize) -> [u8; 4] {
+        self.values.get(index).copied().unwrap_or_default().to_le_bytes()
+    }
+}
+
 /// The encoding of a file's colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorProperties {
@@ -274,16 +294,29 @@ pub fn write(
 ///
 /// [`Error::Write`](crate::Error::Write) if the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
+    write_points_with(path, points, &[], progress)
+}
+
+/// Writes `points` as [`write_points`] does, with further `columns` after their properties.
+///
+/// # Errors
+///
+/// [`Error::Write`](crate::Error::Write) if the system cannot write.
+pub fn write_points_with(path: &Path, points: &Points, columns: &[Column<'_>], progress: &dyn Progress) -> Result<()> {
     if points.encoded {
-        return write_gaussians::write(path, points, progress);
+        return write_gaussians::write(path, points, columns, progress);
     }
     let (properties, count) = (Properties::of(points), points.positions.len());
     let comments: Vec<String> = points.beside.iter().map(|mesh| format!("triangles {}", mesh.display())).collect();
     progress.begin("writing points", count as u64);
     let written = write_whole(path, |out| {
         properties.write_header(out, count as u64, &comments)?;
+        Column::write_properties(columns, out)?;
         out.write_all(b"end_header\n")?;
-        let of_point = |index: usize, rows: &mut Vec<u8>| properties.encode(&vertex(points, index), rows);
+        let of_point = |index: usize, rows: &mut Vec<u8>| {
+            properties.encode(&vertex(points, index), rows);
+            columns.iter().for_each(|column| rows.extend(column.bytes(index)));
+        };
         write_rows(out, count, of_point, progress)
     });
     progress.end();

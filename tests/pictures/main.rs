@@ -34,3 +34,4 @@ mod texture;
 mod traffic;
 mod transparency;
 mod triangles;
+mod visible;

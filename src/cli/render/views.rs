@@ -203,7 +203,8 @@ fn check_outputs(arguments: &Arguments, inputs: &Files, target: &Target, files: 
     folders.into_iter().try_for_each(atomic::try_folder)
 }
 
-/// Fails if the output folder is that of the cameras or of a project's images, or cannot be created.
+/// Fails if the output folder is that of the cameras or of a project's images, or if it cannot be
+/// created.
 ///
 /// Pictures have the names of the cameras' photographs, so in that folder they would overwrite
 /// these.

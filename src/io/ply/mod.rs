@@ -46,6 +46,7 @@
 
 mod ascii;
 mod binary;
+mod column;
 mod contents;
 mod face_colors;
 mod faces;

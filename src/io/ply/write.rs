@@ -1,5 +1,6 @@
 //! Writes surfels and points as PLY.
 
+use super::column::Column;
 use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::write_whole;
@@ -62,26 +63,6 @@ impl Color {
             }
             Self::Linear(color) => color,
         }
-    }
-}
-
-/// A whole number for each point, in a property of its own.
-#[derive(Clone, Copy, Debug)]
-pub struct Column<'a> {
-    /// The name of the property, in which there is no space.
-    pub name: &'a str,
-    /// A value for each point; missing ones are written as 0.
-    pub values: &'a [u32],
-}
-
-impl Column<'_> {
-    /// Writes the header lines of `columns`.
-    pub(super) fn write_properties(columns: &[Self], out: &mut impl Write) -> io::Result<()> {
-        columns.iter().try_for_each(|column| writeln!(out, "property uint {}", column.name))
-    }
-
-    pub(super) fn bytes(&self, index: usize) -> [u8; 4] {
-        self.values.get(index).copied().unwrap_or_default().to_le_bytes()
     }
 }
 

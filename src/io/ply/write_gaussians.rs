@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::write::Column;
+use super::column::Column;
 use crate::io::Points;
 use crate::io::atomic::{Output, write_whole};
 use crate::scene::gaussian::EXTENT;

@@ -199,7 +199,8 @@ fn a_damaged_binary_model_ends_in_one_sentence() {
     // On the command line too.
     std::fs::write(&images, &model.binary[1][..99]).unwrap();
     let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 1, "0 0 0 0 0 1 1\n"));
-    let line = ["render", text(&cloud), "-o", text(&folder.path("views")), "--cameras", text(&folder.path(""))];
+    let (views, project) = (folder.path("views"), folder.path(""));
+    let line = ["render", text(&cloud), "-o", text(&views), "--cameras", text(&project)];
     fails(&line, 1, &["images.bin", "image 1 of 2: "]);
 }
 
@@ -242,8 +243,9 @@ fn a_file_of_no_known_kind_is_refused_with_what_is_read() {
     let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 1, "0 0 0 0 0 1 1\n"));
     let image = folder.file("a.png", std::fs::read(Path::new(common::command::DATA).join("cube.png")).unwrap());
     let files = [image, folder.file("x.json", r#"{"views": []}"#), folder.file("x.txt", "1 2 3")];
+    let views = folder.path("views");
     for file in &files {
-        let line = ["render", text(&cloud), "-o", text(&folder.path("views")), "--cameras", text(file)];
+        let line = ["render", text(&cloud), "-o", text(&views), "--cameras", text(file)];
         fails(&line, 1, &["transforms.json", "camera_path.json", "COLMAP", "--camera"]);
         let stderr = String::from_utf8(epsplat(&line).stderr).unwrap();
         assert_eq!(stderr.lines().count(), 1, "{stderr}");

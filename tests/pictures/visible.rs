@@ -111,7 +111,7 @@ fn a_sphere_behind_a_square_is_seen_from_its_sides() {
     };
     let cloud = |positions: Vec<DVec3>, normals: Vec<DVec3>, radius: f32| Points {
         radii: Some(vec![radius; positions.len()]),
-        positions: positions.into_iter().map(DVec3::to_array).collect(),
+        positions: positions.into_iter().map(|at| at.to_array()).collect(),
         normals: Some(normals.into_iter().map(|normal| normal.as_vec3().to_array()).collect()),
         ..Points::default()
     };

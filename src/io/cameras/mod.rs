@@ -72,7 +72,7 @@ const KINDS: [Kind; 3] = [
 ];
 
 /// The sentence for files of no known kind.
-const READ: &str = "cameras are a transforms.json, a list of cameras, a cameras.json of 3D Gaussian Splatting, a \
+const READ: &str = "its kind is not known; cameras are a transforms.json, a list of cameras, a cameras.json of 3D Gaussian Splatting, a \
                     camera_path.json of nerfstudio, or a folder with COLMAP's cameras and images, .bin or .txt (a single \
                     camera is given with --camera)";
 

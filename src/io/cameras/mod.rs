@@ -72,9 +72,9 @@ const KINDS: [Kind; 3] = [
 ];
 
 /// The sentence for files of no known kind.
-const READ: &str = "its kind is not known; cameras are a transforms.json, a list of cameras, a cameras.json of 3D Gaussian Splatting, a \
-                    camera_path.json of nerfstudio, or a folder with COLMAP's cameras and images, .bin or .txt (a single \
-                    camera is given with --camera)";
+const READ: &str = "its kind is not known; cameras are a transforms.json, a list of cameras, a cameras.json of 3D \
+                    Gaussian Splatting, a camera_path.json of nerfstudio, or a folder with COLMAP's cameras and \
+                    images, .bin or .txt (a single camera is given with --camera)";
 
 /// Reads a set of cameras, in the order of the file:
 ///
@@ -122,7 +122,7 @@ fn of_file(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
 
 fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
     let file: Value =
-        serde_json::from_str(text).map_err(|error| format!("not JSON, {}; {READ}", one_line(&error.to_string())))?;
+        serde_json::from_str(text).map_err(|error| format!("not JSON, {}: {READ}", one_line(&error.to_string())))?;
     let kind = KINDS.iter().find(|kind| (kind.is)(&file)).ok_or(READ)?;
     (kind.read)(&file, size)
 }

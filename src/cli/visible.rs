@@ -28,16 +28,12 @@ use super::{note, outputs, write_json};
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Point clouds, or meshes, whose vertices are looked at"))]
     inputs: Vec<PathBuf>,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Cameras: transforms.json, camera_path.json, cameras.json, a list, or COLMAP's folder
     #[arg(long, value_name = "PATH")]
     cameras: PathBuf,
     /// Size of the images of cameras that have none, in pixels [default: 1024x1024]
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
-    #[command(flatten)]
-    lens: LensArguments,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -52,6 +48,10 @@ pub struct Arguments {
     /// Write the number of points of each view as JSON, to a file or - for standard output
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    lens: LensArguments,
+    #[command(flatten)]
+    reading: InputOptions,
     #[command(flatten)]
     limits: LimitOptions,
     #[command(flatten)]

@@ -2,6 +2,7 @@
 
 mod adapters;
 mod bench;
+mod cameras;
 mod card;
 mod compare;
 mod coverage;
@@ -18,6 +19,7 @@ mod sample;
 mod signals;
 mod simplify;
 mod surfels;
+mod visible;
 
 use std::io::Write;
 use std::path::Path;
@@ -49,6 +51,7 @@ enum Command {
     Render(Box<render::Arguments>),
     Info(info::Arguments),
     Surfels(surfels::Arguments),
+    Visible(visible::Arguments),
     Sample(sample::Arguments),
     Simplify(simplify::Arguments),
     Hybrid(hybrid::Arguments),
@@ -75,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
         Command::Surfels(arguments) => surfels::run(&arguments),
+        Command::Visible(arguments) => visible::run(&arguments),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),

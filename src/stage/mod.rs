@@ -22,6 +22,7 @@ mod settings;
 mod tree;
 mod turntable;
 mod view;
+mod visible;
 mod whole;
 
 use std::path::PathBuf;
@@ -33,6 +34,7 @@ pub use self::in_part::ReadReport;
 pub use self::map::Survey;
 pub use self::renderer::{Picture, Renderer};
 pub use self::view::{View, ViewReport};
+pub use self::visible::Visible;
 
 use self::coloring::Coloring;
 use self::whole::{Making, Whole};

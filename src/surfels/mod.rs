@@ -19,7 +19,7 @@ mod few;
 mod forest;
 mod from_points;
 mod gaps;
-mod gather;
+pub(crate) mod gather;
 mod graph;
 pub mod hierarchy;
 pub mod hybrid;

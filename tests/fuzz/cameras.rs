@@ -78,10 +78,15 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
 }
 
 fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
-    let set = match cameras::read(path, (16, 16)) {
+    read(path, path, valid)
+}
+
+/// Reads the set of cameras at `set` and draws its views; `file` is the file that errors name.
+pub fn read(set: &Path, file: &Path, valid: Option<usize>) -> Result<Outcome, String> {
+    let set = match cameras::read(set, (16, 16)) {
         Ok(set) => set,
         Err(error) if valid.is_some() => return Err(format!("a valid file is refused: {error}")),
-        Err(error) => return sentence(&error, Some(path)).map(|()| Outcome::Refused),
+        Err(error) => return sentence(&error, Some(file)).map(|()| Outcome::Refused),
     };
     let mut names = std::collections::HashSet::new();
     for camera in &set {

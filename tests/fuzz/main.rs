@@ -12,6 +12,7 @@
 
 mod camera;
 mod cameras;
+mod colmap;
 mod copc;
 #[cfg(feature = "e57")]
 mod e57;
@@ -109,6 +110,11 @@ fn camera() {
 #[test]
 fn cameras() {
     session::run(&cameras::TARGET);
+}
+
+#[test]
+fn colmap() {
+    session::run(&colmap::TARGET);
 }
 
 #[cfg(feature = "pcd")]

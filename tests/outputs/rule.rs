@@ -63,6 +63,11 @@ const COMMANDS: &[(&str, &[&str])] = &[
     ("render painted.ply --texture t.png --backend reference --size 8x8 -o OUT", &["painted.ply", "t.png"]),
     ("render s.ply --camera camera.json --backend reference -o made.png --json OUT", &["s.ply", "camera.json"]),
     ("render s.ply --cameras transforms.json --backend reference -o views --json OUT", &["s.ply", "transforms.json"]),
+    ("visible s.ply --cameras transforms.json --backend reference -o OUT", &["s.ply", "transforms.json"]),
+    (
+        "visible s.ply --cameras colmap --backend reference -o made.ply --json OUT",
+        &["s.ply", "colmap/cameras.txt", "colmap/images.txt"],
+    ),
     (
         "render s.ply --cameras colmap --backend reference -o views --json OUT",
         &["colmap/cameras.txt", "colmap/images.txt"],

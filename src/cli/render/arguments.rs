@@ -10,6 +10,7 @@ use epsplat::io::images::ImageFormat;
 use epsplat::options::parse::{scale, turns};
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 
+use super::super::cameras::LensArguments;
 use super::super::inputs::help_of_all;
 use super::super::outputs::Source;
 
@@ -103,10 +104,12 @@ fn formats() -> impl TypedValueParser<Value = ImageFormat> {
 #[derive(Args)]
 #[command(next_help_heading = "Camera")]
 pub(super) struct ViewArguments {
-    /// Many cameras: a transforms.json, a list of cameras, or a folder of COLMAP's text files
+    /// Many cameras: transforms.json, camera_path.json, cameras.json, a list, or COLMAP's folder
     ///
-    /// A transforms.json has the format of NeRF, instant-ngp or nerfstudio. Each picture is named
-    /// after its camera's image, folders included
+    /// transforms.json is that of NeRF, instant-ngp or nerfstudio, camera_path.json that of
+    /// nerfstudio, cameras.json that of 3D Gaussian Splatting. COLMAP's model is binary or text, in
+    /// the folder itself or in its sparse/0. Each picture is named after its camera's image,
+    /// folders included
     #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics", "pixel_size"])]
     pub(super) cameras: Option<PathBuf>,
     /// N pictures around the scene, from the elevation of the default view or the side of --from
@@ -116,12 +119,8 @@ pub(super) struct ViewArguments {
     /// pictures are named 0000.png and so on
     #[arg(long, value_name = "N", value_parser = turns, conflicts_with_all = ["cameras", "file", "eye", "target", "intrinsics", "pixel_size"], hide_short_help = true)]
     pub(super) turntable: Option<NonZeroU32>,
-    /// Factor of the width and height of --cameras' images; intrinsics are scaled too
-    #[arg(long, value_name = "FACTOR", value_parser = scale, requires = "cameras", hide_short_help = true)]
-    pub(super) scale: Option<f64>,
-    /// Ignore the lens distortion of --cameras; by default a distorted camera is an error
-    #[arg(long, requires = "cameras", hide_short_help = true)]
-    pub(super) ignore_distortion: bool,
+    #[command(flatten)]
+    pub(super) lens: LensArguments,
 }
 
 impl Arguments {

@@ -169,24 +169,10 @@ fn tell(arguments: &Arguments, views: Vec<Written>, writers: NonZeroUsize, start
 /// [`Error::Malformed`] if a lens is distorted, unless `--ignore-distortion` is given, or an error
 /// of a view that the arguments contradict.
 fn views(arguments: &Arguments, path: &Path, target: &Target) -> Result<Vec<(PathBuf, View)>> {
-    let cameras = cameras::read(path, arguments.camera.size.unwrap_or(View::DEFAULT_SIZE))?;
-    let distorted = cameras.iter().filter(|camera| camera.distortion.is_some());
-    if let Some((first, (name, value))) = distorted.clone().find_map(|camera| Some((&camera.name, camera.distortion?)))
-    {
-        if !arguments.views.ignore_distortion {
-            return Err(Error::malformed(
-                path,
-                format!(
-                    "the lens of {first} is distorted ({name} = {value}), which is not rendered: undistort the pictures, or give \
-                     --ignore-distortion"
-                ),
-            ));
-        }
-        note(&format!("the lens distortion of {} cameras is left out", distorted.count()));
-    }
+    let cameras = arguments.views.lens.read(path, arguments.camera.size)?;
     let view = |camera: cameras::NamedCamera| {
         let file = file_of(arguments, target, &camera.name);
-        let view = View::of_file(&arguments.camera, camera.camera, path, arguments.views.scale)
+        let view = View::of_file(&arguments.camera, camera.camera, path, arguments.views.lens.scale)
             .map_err(|error| error.of_view(&file))?;
         Ok((file, view))
     };
@@ -196,9 +182,8 @@ fn views(arguments: &Arguments, path: &Path, target: &Target) -> Result<Vec<(Pat
 /// Fails, before anything is rendered, if a picture would overwrite an input or cannot be written.
 fn check_outputs(arguments: &Arguments, inputs: &Files, target: &Target, files: &[PathBuf]) -> Result<()> {
     let cameras = arguments.views.cameras.as_deref();
-    let of_colmap = cameras.map(|cameras| ["cameras.txt", "images.txt"].map(|name| cameras.join(name)));
-    let of_cameras = cameras.map(Source::other).into_iter().chain(of_colmap.iter().flatten().map(Source::other));
-    let read = arguments.files(inputs).chain(of_cameras);
+    let of_cameras = cameras.map(cameras::files).unwrap_or_default();
+    let read = arguments.files(inputs).chain(of_cameras.iter().map(Source::other));
     let json = arguments.file.json.as_deref();
     if target.is_standard {
         return outputs::check(read, json);
@@ -218,7 +203,8 @@ fn check_outputs(arguments: &Arguments, inputs: &Files, target: &Target, files: 
     folders.into_iter().try_for_each(atomic::try_folder)
 }
 
-/// Fails if the output folder is the folder of the cameras, or cannot be created.
+/// Fails if the output folder is that of the cameras or of a project's images, or if it cannot be
+/// created.
 ///
 /// Pictures have the names of the cameras' photographs, so in that folder they would overwrite
 /// these.
@@ -229,11 +215,11 @@ fn check_folder(output: &Path, cameras: Option<&Path>) -> Result<()> {
     let or_current =
         |folder: &'_ Path| if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() };
     let beside = cameras.map(|cameras| match cameras.is_dir() {
-        true => cameras,
-        false => cameras.parent().unwrap_or(Path::new("")),
+        true => vec![cameras.to_owned(), cameras.join("images")],
+        false => vec![or_current(cameras.parent().unwrap_or(Path::new("")))],
     });
     if let (Ok(output), Some(beside)) = (output.canonicalize(), beside)
-        && or_current(beside).canonicalize().is_ok_and(|beside| output == beside)
+        && beside.iter().any(|beside| beside.canonicalize().is_ok_and(|beside| output == beside))
     {
         return Err(Error::Usage(
             "the pictures would overwrite the cameras' photographs, which have the same names: choose another folder"

@@ -1,16 +1,23 @@
 //! Sets of cameras, as reconstruction and radiance-field programs write them. Each camera gives one
 //! picture.
 
+mod camera_path;
 mod colmap;
+mod splats;
 mod transforms;
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
 
 use super::camera::CameraFile;
 use super::fault::Fault;
-use super::values::shown;
-use crate::error::Result;
+use super::input::text;
+use super::values::{one_line, shown};
+use crate::error::{Error, Result};
 
 /// A camera of a set.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,20 +27,69 @@ pub struct NamedCamera {
     pub name: String,
     /// Lens and pose.
     pub camera: CameraFile,
-    /// The first coefficient of lens distortion that is not 0, and its value.
-    /// [`camera`](Self::camera) ignores distortion.
-    pub distortion: Option<(&'static str, f64)>,
+    /// The first reason why the lens is no pinhole; None if it is one. [`camera`](Self::camera)
+    /// ignores distortion.
+    pub distortion: Option<Distortion>,
 }
+
+/// A reason why a lens is no pinhole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Distortion {
+    /// A coefficient that is not 0: its name and value.
+    Coefficient(&'static str, f64),
+    /// A model of fisheye lenses, or the key that says so. Even without coefficients the distance
+    /// from the principal point grows with the angle and not with its tangent.
+    Fisheye(&'static str),
+}
+
+impl Distortion {
+    /// Returns the distortion of a coefficient; None if it is 0.
+    fn of(name: &'static str, value: f64) -> Option<Self> {
+        (value != 0.0).then_some(Self::Coefficient(name, value))
+    }
+}
+
+impl fmt::Display for Distortion {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coefficient(name, value) => write!(formatter, "{name} = {value}"),
+            Self::Fisheye(name) => write!(formatter, "{name}: a fisheye lens"),
+        }
+    }
+}
+
+/// A kind of JSON file: a test of its content, and its reader, which gets the default size.
+struct Kind {
+    is: fn(&Value) -> bool,
+    read: fn(&Value, (u32, u32)) -> Result<Vec<NamedCamera>, String>,
+}
+
+/// All kinds of JSON files. The first one that fits is taken.
+const KINDS: [Kind; 3] = [
+    Kind { is: camera_path::is, read: camera_path::read },
+    Kind { is: splats::is, read: splats::read },
+    Kind { is: transforms::is, read: transforms::read },
+];
+
+/// The sentence for files of no known kind.
+const READ: &str = "its kind is not known; cameras are a transforms.json, a list of cameras, a cameras.json of 3D \
+                    Gaussian Splatting, a camera_path.json of nerfstudio, or a folder with COLMAP's cameras and \
+                    images, .bin or .txt (a single camera is given with --camera)";
 
 /// Reads a set of cameras, in the order of the file:
 ///
-/// - A file is a `transforms.json` as NeRF, instant-ngp and nerfstudio write it. `transform_matrix`
-///   is camera-to-world with the axes of OpenGL (x right, y up, z back). The lens is
-///   `fl_x fl_y cx cy` in pixels of a picture of `w` x `h`, or `camera_angle_x` (the horizontal
-///   field of view, radians); a frame's own values take precedence over those for all frames.
-///   `file_path` is the name.
-/// - A folder contains COLMAP's `cameras.txt` and `images.txt`, whose poses are world-to-camera
-///   with x right, y down, z forward.
+/// - `transforms.json`, as NeRF, instant-ngp and nerfstudio write it. `transform_matrix` is
+///   camera-to-world with the axes of OpenGL (x right, y up, z back). The lens is `fl_x fl_y cx cy`
+///   in pixels of a picture of `w` x `h`, or `camera_angle_x` (the horizontal field of view,
+///   radians); a frame's own values take precedence over those for all frames. `file_path` is the
+///   name. A list of camera files may stand in place of the frames.
+/// - `cameras.json` of 3D Gaussian Splatting: a list of objects with `img_name`, `width`, `height`,
+///   `position`, `rotation` (camera-to-world with x right, y down, z forward), `fx` and `fy`.
+/// - `camera_path.json` of nerfstudio: `camera_to_world` with the axes of OpenGL, `fov` (vertical,
+///   degrees), `render_width` and `render_height`.
+/// - A folder with COLMAP's `cameras.bin` and `images.bin`, or the same as `.txt`, in the folder
+///   itself or in its `sparse/0`, `sparse` or `colmap/sparse/0`. Poses are world-to-camera with x
+///   right, y down, z forward.
 ///
 /// Coordinates are those of the file. A camera without a picture size gets `size`, pixels.
 ///
@@ -43,13 +99,32 @@ pub struct NamedCamera {
 /// [`Error::Malformed`](crate::Error::Malformed) if a file violates its format, a lens is not a
 /// pinhole even without its distortion, there is no camera, or two have the same name.
 pub fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
-    let (path, cameras) = if path.is_dir() {
-        (path.join(colmap::IMAGES), colmap::read(path)?)
-    } else {
-        (path.to_owned(), transforms::read(path, size)?)
-    };
+    let (path, cameras) = if path.is_dir() { colmap::read(path)? } else { (path.to_owned(), of_file(path, size)?) };
     check_names(&cameras).map_err(|fault| fault.of(&path))?;
     Ok(cameras)
+}
+
+/// Returns the files that [`read`] reads.
+pub fn files(path: &Path) -> Vec<PathBuf> {
+    match path.is_dir() {
+        true => colmap::files(path).map(Vec::from).unwrap_or_default(),
+        false => vec![path.to_owned()],
+    }
+}
+
+fn of_file(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
+    let text = text(path).map_err(|error| match error {
+        Error::Read { source, .. } if source.kind() == io::ErrorKind::InvalidData => Error::malformed(path, READ),
+        error => error,
+    })?;
+    parse(&text, size).map_err(|what| Error::malformed(path, what))
+}
+
+fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
+    let file: Value =
+        serde_json::from_str(text).map_err(|error| format!("not JSON, {}: {READ}", one_line(&error.to_string())))?;
+    let kind = KINDS.iter().find(|kind| (kind.is)(&file)).ok_or(READ)?;
+    (kind.read)(&file, size)
 }
 
 fn check_names(cameras: &[NamedCamera]) -> Result<(), Fault> {

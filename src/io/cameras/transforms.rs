@@ -2,21 +2,15 @@
 //! keys of a camera file instead, and a list of frames may stand alone.
 
 use std::f64::consts::PI;
-use std::path::Path;
 
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use super::{NamedCamera, name_of};
-use crate::error::Result;
+use super::colmap::Model;
+use super::{Distortion, NamedCamera, name_of};
 use crate::io::camera::{CameraFile, Pose, of_value, rigid};
-use crate::io::fault::Fault;
-use crate::io::input::text;
-use crate::io::values::{one_line, shown};
+use crate::io::values::shown;
 use crate::scene::Lens;
-
-/// Lens models that are pinholes where all distortion coefficients are 0.
-const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"];
 
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
@@ -32,21 +26,21 @@ const SHARED: [&[&str]; 4] =
 const OF_TRANSFORMS: [&str; 8] =
     ["w", "h", "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye"];
 
-pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
-    let text = text(path)?;
-    parse(&text, size).map_err(|what| Fault::Malformed(what).of(path))
+/// Whether a file is of this kind: a list, or an object with a list `frames`.
+pub(super) fn is(file: &Value) -> bool {
+    frames(file).is_some()
 }
 
-fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
-    let file: Value = serde_json::from_str(text).map_err(|e| format!("not JSON: {}", one_line(&e.to_string())))?;
-    let ((Value::Array(frames), _) | (_, Some(Value::Array(frames)))) = (&file, file.get("frames")) else {
-        return Err("it has no list 'frames', as a transforms.json has; a single camera is given with --camera".into());
-    };
+fn frames(file: &Value) -> Option<&[Value]> {
+    file.as_array().or_else(|| file.get("frames")?.as_array()).map(Vec::as_slice)
+}
+
+pub(super) fn read(file: &Value, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
     let of_frame = |(index, own): (usize, &Value)| {
-        let frame = Frame { own, shared: &file };
+        let frame = Frame { own, shared: file };
         frame.camera(index, size).map_err(|what| format!("frame {}{}: {what}", index + 1, frame.shown()))
     };
-    frames.iter().enumerate().map(of_frame).collect()
+    frames(file).unwrap_or_default().iter().enumerate().map(of_frame).collect()
 }
 
 /// A frame, and the object of the file, whose values apply to all frames.
@@ -64,19 +58,7 @@ impl Frame<'_> {
         if let Some(camera) = self.of_camera_file() {
             return Ok(NamedCamera { name, camera: camera?, distortion: None });
         }
-        if let Some(model) = self.value("camera_model")
-            && !model.as_str().is_some_and(|model| PINHOLES.contains(&model))
-        {
-            let model = shown(model.as_str().unwrap_or_default().as_bytes());
-            return Err(format!("the camera_model '{model}' is not a pinhole; undistort the pictures first"));
-        }
-        if self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false)) {
-            return Err("a fisheye lens is not a pinhole; undistort the pictures first".into());
-        }
-        let mut distortion = None;
-        for key in DISTORTIONS {
-            distortion = distortion.or(self.number(key)?.filter(|k| *k != 0.0).map(|k| (key, k)));
-        }
+        let distortion = self.distortion()?;
         let given = match (self.pixels("w")?, self.pixels("h")?) {
             (Some(width), Some(height)) => Some((width, height)),
             (None, None) => None,
@@ -90,6 +72,29 @@ impl Frame<'_> {
             near: None,
         };
         Ok(NamedCamera { name, camera, distortion })
+    }
+
+    /// The first reason why the lens is no pinhole.
+    fn distortion(&self) -> Result<Option<Distortion>, String> {
+        if let Some(value) = self.value("camera_model") {
+            let name = value.as_str().unwrap_or_default();
+            match Model::of_name(name) {
+                Some(model) if model.fisheye => return Ok(Some(Distortion::Fisheye(model.name))),
+                Some(_) => {}
+                None => {
+                    let name = shown(name.as_bytes());
+                    return Err(format!("the camera_model '{name}' is not a pinhole; undistort the pictures first"));
+                }
+            }
+        }
+        if self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false)) {
+            return Ok(Some(Distortion::Fisheye("is_fisheye")));
+        }
+        let mut distortion = None;
+        for key in DISTORTIONS {
+            distortion = distortion.or(self.number(key)?.and_then(|value| Distortion::of(key, value)));
+        }
+        Ok(distortion)
     }
 
     /// The camera of a frame that has the keys of a camera file; `None` for other frames.
@@ -183,6 +188,10 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
 
+    fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
+        super::super::parse(text, size)
+    }
+
     const POSE: &str = r#""transform_matrix": [[1,0,0,3],[0,0,-1,4],[0,1,0,5],[0,0,0,1]]"#;
 
     fn one(shared: &str, own: &str) -> Result<NamedCamera, String> {
@@ -210,7 +219,12 @@ mod tests {
         assert_eq!(lens("").size, Some((800, 600)));
         let own = lens(r#""fl_x": 700, "fl_y": 710, "cy": 310, "w": 640, "cx": null,"#);
         assert_eq!((own.lens, own.size), (Lens::Intrinsics([700.0, 710.0, 390.5, 310.0]), Some((640, 600))));
-        assert_eq!(one(shared, r#""p2": -0.5,"#).unwrap().distortion, Some(("p2", -0.5)));
+        assert_eq!(one(shared, r#""p2": -0.5,"#).unwrap().distortion, Distortion::of("p2", -0.5));
+        for (own, model) in
+            [(r#""camera_model": "OPENCV_FISHEYE","#, "OPENCV_FISHEYE"), (r#""is_fisheye": true,"#, "is_fisheye")]
+        {
+            assert_eq!(one(shared, own).unwrap().distortion, Some(Distortion::Fisheye(model)));
+        }
     }
 
     #[test]
@@ -250,11 +264,10 @@ mod tests {
             (r#""w": 8, "h": 7.5, "fl_x": 5,"#, "", "h is not a number of pixels"),
             (r#""w": -8, "h": 7, "fl_x": 5,"#, "", "w is not a number of pixels"),
             (r#""camera_angle_x": "wide","#, "", "camera_angle_x is not a number"),
-            (r#""camera_angle_x": 1, "camera_model": "OPENCV_FISHEYE","#, "", "'OPENCV_FISHEYE'"),
+            (r#""camera_angle_x": 1, "camera_model": "EQUIRECTANGULAR","#, "", "'EQUIRECTANGULAR'"),
             (r#""camera_angle_x": 3.2,"#, "", "camera_angle_x must lie between 0 and pi (radians), but it is 3.2"),
             (r#""camera_angle_x": 0,"#, "", "camera_angle_x must lie between 0 and pi"),
             (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y must lie between 0 and pi"),
-            (r#""camera_angle_x": 1, "is_fisheye": true,"#, "", "fisheye"),
             (r#""camera_angle_x": 1,"#, r#""k2": [],"#, "k2 is not a number"),
         ] {
             let message = one(shared, own).unwrap_err();
@@ -262,10 +275,10 @@ mod tests {
         }
         for (text, said) in [
             ("", "not JSON"),
-            ("5", "no list 'frames'"),
+            ("5", "cameras are a transforms.json, "),
             (r#"[{"eye": [1,2,3]}]"#, "frame 1: the camera needs eye and target"),
             (r#"[{"eye": [1,2,3], "target": [0,0,0], "fl_x": 5}]"#, "unknown field"),
-            (r#"{"frames": 5}"#, "no list 'frames'"),
+            (r#"{"frames": 5}"#, "(a single camera is given with --camera)"),
             (r#"{"frames": [5]}"#, "frame 1: it gives neither"),
             (
                 r#"{"camera_angle_x": 1, "frames": [{}]}"#,

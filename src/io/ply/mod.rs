@@ -46,6 +46,7 @@
 
 mod ascii;
 mod binary;
+mod column;
 mod contents;
 mod face_colors;
 mod faces;
@@ -64,13 +65,14 @@ mod write_gaussians;
 mod write_mesh;
 mod write_scene;
 
+pub use column::Column;
 pub(crate) use kept_nodes::KeptNodes;
 pub use levels::Levels;
 pub(super) use read::companions;
 pub use read::{read, read_mesh, textures_of_hybrid};
 pub use rows::Rows;
 pub(crate) use rows::position;
-pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};
+pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points, write_points_with};
 pub use write_mesh::write_mesh;
 pub use write_scene::write_scene;
 pub(crate) use write_scene::{Nodes, needs_double, write_kept};

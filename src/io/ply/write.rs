@@ -1,5 +1,6 @@
 //! Writes surfels and points as PLY.
 
+use super::column::Column;
 use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::write_whole;
@@ -274,16 +275,29 @@ pub fn write(
 ///
 /// [`Error::Write`](crate::Error::Write) if the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
+    write_points_with(path, points, &[], progress)
+}
+
+/// Writes `points` as [`write_points`] does, with further `columns` after their properties.
+///
+/// # Errors
+///
+/// [`Error::Write`](crate::Error::Write) if the system cannot write.
+pub fn write_points_with(path: &Path, points: &Points, columns: &[Column<'_>], progress: &dyn Progress) -> Result<()> {
     if points.encoded {
-        return write_gaussians::write(path, points, progress);
+        return write_gaussians::write(path, points, columns, progress);
     }
     let (properties, count) = (Properties::of(points), points.positions.len());
     let comments: Vec<String> = points.beside.iter().map(|mesh| format!("triangles {}", mesh.display())).collect();
     progress.begin("writing points", count as u64);
     let written = write_whole(path, |out| {
         properties.write_header(out, count as u64, &comments)?;
+        Column::write_properties(columns, out)?;
         out.write_all(b"end_header\n")?;
-        let of_point = |index: usize, rows: &mut Vec<u8>| properties.encode(&vertex(points, index), rows);
+        let of_point = |index: usize, rows: &mut Vec<u8>| {
+            properties.encode(&vertex(points, index), rows);
+            columns.iter().for_each(|column| rows.extend(column.bytes(index)));
+        };
         write_rows(out, count, of_point, progress)
     });
     progress.end();

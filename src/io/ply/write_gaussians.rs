@@ -7,6 +7,7 @@ use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::column::Column;
 use crate::io::Points;
 use crate::io::atomic::{Output, write_whole};
 use crate::scene::gaussian::EXTENT;
@@ -21,11 +22,11 @@ const NEAREST: f64 = 1e-9;
 const TOLD: usize = 1 << 16;
 
 /// Writes `points`, which are Gaussians; [`read`](super::read) returns them up to rounding.
-pub(super) fn write(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
+pub(super) fn write(path: &Path, points: &Points, columns: &[Column<'_>], progress: &dyn Progress) -> Result<()> {
     let count = points.positions.len();
     progress.begin("writing Gaussians", count as u64);
     let written = write_whole(path, |out| {
-        header(out, points)?;
+        header(out, points, columns)?;
         let mut row = Vec::with_capacity(256);
         for index in 0..count {
             if index % TOLD == TOLD - 1 {
@@ -36,6 +37,7 @@ pub(super) fn write(path: &Path, points: &Points, progress: &dyn Progress) -> Re
             for value in &row {
                 out.write_all(&value.to_le_bytes())?;
             }
+            columns.iter().try_for_each(|column| out.write_all(&column.bytes(index)))?;
         }
         Ok(())
     });
@@ -47,7 +49,7 @@ fn harmonics(points: &Points) -> Option<&Harmonics> {
     if let Some(Colors::Harmonics(harmonics)) = &points.colors { Some(harmonics) } else { None }
 }
 
-fn header(out: &mut Output<'_>, points: &Points) -> io::Result<()> {
+fn header(out: &mut Output<'_>, points: &Points, columns: &[Column<'_>]) -> io::Result<()> {
     write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
     if let Some(up) = points.up {
         writeln!(out, "comment up {}", up.name())?;
@@ -60,6 +62,7 @@ fn header(out: &mut Output<'_>, points: &Points) -> io::Result<()> {
     for name in names.iter().flatten().chain(&named("rot", 4)) {
         writeln!(out, "property float {name}")?;
     }
+    Column::write_properties(columns, out)?;
     out.write_all(b"end_header\n")
 }
 

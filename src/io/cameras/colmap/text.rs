@@ -4,108 +4,43 @@
 //!   the first pixel is (0.5, 0.5).
 //! - An image in `images.txt` is a line `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and a line
 //!   of its points `X Y POINT3D_ID ...`, which may be empty.
-//!
-//! The quaternion and the translation map world coordinates to camera coordinates: x right, y down,
-//! z forward.
 
-use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
-use std::path::Path;
 
-use glam::{DMat3, DQuat, DVec3};
-
-use super::{NamedCamera, name_of};
-use crate::error::{Error, Result};
-use crate::io::camera::{CameraFile, Pose};
+use super::models::{Camera, Model};
+use super::{Lenses, NamedCamera};
 use crate::io::fault::Fault;
-use crate::io::input::check_regular;
 use crate::io::values::{parse_number, shown};
-use crate::scene::Lens;
 
-const CAMERAS: &str = "cameras.txt";
-pub(super) const IMAGES: &str = "images.txt";
-
-pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
-    let path = folder.join(CAMERAS);
-    let file = opened(&path).map_err(|error| {
-        if error.kind() == io::ErrorKind::NotFound && folder.join("cameras.bin").exists() {
-            let what = "only COLMAP's text is read: make it with 'colmap model_converter --output_type TXT'";
-            return Error::malformed(folder, what);
-        }
-        Error::read(&path, error)
-    })?;
-    let lenses = lenses(&mut Lines::of(BufReader::new(file))).map_err(|fault| fault.of(&path))?;
-    let path = folder.join(IMAGES);
-    let file = opened(&path).map_err(|error| Error::read(&path, error))?;
-    images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
+pub(super) fn lenses(file: File, name: &'static str) -> Result<Lenses, Fault> {
+    cameras_of(&mut Lines::of(BufReader::new(file)), name)
 }
 
-/// The cameras by identifier. For a camera that cannot be used, the map has its line and the
-/// reason: only images that refer to this camera are errors.
-type Lenses = HashMap<u64, Result<Camera, String>>;
-
-fn opened(path: &Path) -> io::Result<File> {
-    check_regular(path)?;
-    File::open(path)
+pub(super) fn images(file: File, lenses: &Lenses) -> Result<Vec<NamedCamera>, Fault> {
+    images_of(&mut Lines::of(BufReader::new(file)), lenses)
 }
 
-/// A line of `cameras.txt`.
-struct Camera {
-    size: (u32, u32),
-    intrinsics: [f64; 4],
-    distortion: Option<(&'static str, f64)>,
-}
-
-/// The models that are pinholes where all distortion coefficients are 0: name, whether they have
-/// two focal lengths, and the names of the coefficients after the principal point.
-const MODELS: [(&str, bool, &[&str]); 6] = [
-    ("SIMPLE_PINHOLE", false, &[]),
-    ("PINHOLE", true, &[]),
-    ("SIMPLE_RADIAL", false, &["k"]),
-    ("RADIAL", false, &["k1", "k2"]),
-    ("OPENCV", true, &["k1", "k2", "p1", "p2"]),
-    ("FULL_OPENCV", true, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
-];
-
-fn lenses(lines: &mut Lines<impl BufRead>) -> Result<Lenses, Fault> {
-    let mut lenses = Lenses::new();
+fn cameras_of(lines: &mut Lines<impl BufRead>, name: &'static str) -> Result<Lenses, Fault> {
+    let mut lenses = Lenses::new(name);
     while lines.next_record()? {
         let mut words = lines.words();
         let id = whole(words.next(), "CAMERA_ID").map_err(|what| lines.fault(&what))?;
-        let line = lines.number;
-        let camera = match lenses.contains_key(&id) {
-            false => lens(words),
-            true => Err(format!("there is another camera {id}")),
-        };
-        lenses.insert(id, camera.map_err(|what| format!("line {line} of {CAMERAS}: {what}")));
+        lenses.add(id, lens(words), &format!("line {}", lines.number));
     }
     Ok(lenses)
 }
 
 fn lens<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Camera, String> {
     let name = words.next().ok_or("it ends before its MODEL")?;
-    let model = MODELS.iter().find(|(model, ..)| *model == name);
-    let (_, two, distortions) = model.ok_or_else(|| {
-        format!("the model '{}' is not a pinhole; undistort the pictures first", shown(name.as_bytes()))
-    })?;
+    let model = Model::of_name(name)
+        .ok_or_else(|| format!("the model '{}' is not known: undistort the pictures first", shown(name.as_bytes())))?;
     let size = (whole(words.next(), "WIDTH")?, whole(words.next(), "HEIGHT")?);
     let parameters = words.map(|word| number(Some(word), "PARAMS")).collect::<Result<Vec<_>, _>>()?;
-    let needed = 3 + usize::from(*two) + distortions.len();
-    if parameters.len() != needed {
-        return Err(format!("a {name} camera has {needed} parameters, not {}", parameters.len()));
-    }
-    let (lens, rest) = parameters.split_at(needed - distortions.len());
-    let intrinsics = match *lens {
-        [fx, fy, cx, cy] => [fx, fy, cx, cy],
-        [f, cx, cy] => [f, f, cx, cy],
-        _ => return Err("its parameters are not a lens's".into()),
-    };
-    let distortion = distortions.iter().zip(rest).map(|(name, value)| (*name, *value)).find(|(_, value)| *value != 0.0);
-    Ok(Camera { size, intrinsics, distortion })
+    model.camera(size, &parameters)
 }
 
-fn images(lines: &mut Lines<impl BufRead>, lenses: &Lenses) -> Result<Vec<NamedCamera>, Fault> {
+fn images_of(lines: &mut Lines<impl BufRead>, lenses: &Lenses) -> Result<Vec<NamedCamera>, Fault> {
     let mut images = Vec::new();
     while lines.next_record()? {
         images.push(image(&lines.line, lenses).map_err(|what| lines.fault(&what))?);
@@ -138,24 +73,7 @@ fn image(line: &str, lenses: &Lenses) -> Result<NamedCamera, String> {
     }
     let id = whole(next(), "CAMERA_ID")?;
     // A name may contain spaces.
-    let name = name_of(rest.trim()).ok_or("its NAME is not a valid file name")?;
-    let lens = lenses.get(&id).ok_or_else(|| format!("there is no camera {id} in {CAMERAS}"))?;
-    let lens = lens.as_ref().map_err(|what| format!("its camera {id} cannot be used, {what}"))?;
-    let [w, x, y, z, tx, ty, tz] = pose;
-    let quaternion = DQuat::from_xyzw(x, y, z, w);
-    let length = quaternion.length();
-    if !(0.99..=1.01).contains(&length) {
-        return Err(format!("its quaternion has the length {length}, not 1"));
-    }
-    let rotation = DMat3::from_quat(quaternion.normalize());
-    let eye = -(rotation.transpose() * DVec3::new(tx, ty, tz));
-    let camera = CameraFile {
-        size: Some(lens.size),
-        lens: Lens::Intrinsics(lens.intrinsics),
-        pose: Pose::Rigid(rotation, eye),
-        near: None,
-    };
-    Ok(NamedCamera { name, camera, distortion: lens.distortion })
+    lenses.image(rest.trim(), pose, id)
 }
 
 fn number(word: Option<&str>, what: &str) -> Result<f64, String> {
@@ -229,6 +147,10 @@ impl<R: BufRead> Lines<R> {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
+    use crate::io::camera::Pose;
+    use crate::io::cameras::Distortion;
+    use crate::scene::Lens;
+    use glam::{DMat3, DVec3};
 
     const LENSES: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240.5\n\n  2 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
 
@@ -237,8 +159,8 @@ mod tests {
             Fault::Malformed(what) | Fault::Usage(what) => what,
             Fault::Io(error) => error.to_string(),
         };
-        let lenses = lenses(&mut Lines::of(cameras.as_bytes())).map_err(said)?;
-        images(&mut Lines::of(poses.as_bytes()), &lenses).map_err(said)
+        let lenses = cameras_of(&mut Lines::of(cameras.as_bytes()), "cameras.txt").map_err(said)?;
+        images_of(&mut Lines::of(poses.as_bytes()), &lenses).map_err(said)
     }
 
     #[test]
@@ -257,7 +179,7 @@ mod tests {
         assert_eq!(rotation * eye + DVec3::new(1.0, 2.0, 3.0), DVec3::ZERO);
         assert_eq!(pose(&images[2]), (DMat3::IDENTITY, DVec3::new(-6e6, 0.0, 0.0)));
         assert_eq!(images[0].camera.lens, Lens::Intrinsics([500.0, 510.0, 320.0, 240.5]));
-        assert_eq!((images[1].camera.size, images[1].distortion), (Some((64, 48)), Some(("k", 0.1))));
+        assert_eq!((images[1].camera.size, images[1].distortion), (Some((64, 48)), Distortion::of("k", 0.1)));
         assert_eq!(images[1].camera.lens, Lens::Intrinsics([50.0, 50.0, 32.0, 24.0]));
     }
 
@@ -267,8 +189,8 @@ mod tests {
         for (cameras, said) in [
             ("1 PINHOLE 640 480 500 510 320", "line 1 of cameras.txt: a PINHOLE camera has 4 parameters, not 3"),
             (
-                "\n1 OPENCV_FISHEYE 6 4 5 5 3 2 0 0 0 0",
-                "line 2 of cameras.txt: the model 'OPENCV_FISHEYE' is not a pinhole",
+                "\n1 EQUIRECTANGULAR 6 4 5 5 3 2 0 0 0 0",
+                "line 2 of cameras.txt: the model 'EQUIRECTANGULAR' is not known",
             ),
             ("1", "line 1 of cameras.txt: it ends before its MODEL"),
             ("1 PINHOLE 640 -480 1 1 1 1", "line 1 of cameras.txt: its HEIGHT, '-480', is not a whole number"),

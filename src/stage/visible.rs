@@ -1,0 +1,181 @@
+//! The points that views see.
+
+use rayon::prelude::*;
+
+use glam::DVec3;
+
+use super::{Renderer, Scene, View};
+use crate::error::{Error, Result};
+use crate::io::Points;
+use crate::options::{DeviceOptions, RenderOptions};
+use crate::progress::Progress;
+use crate::scene::camera::Projection;
+use crate::scene::{self, Camera, Epsilon, Map, Samples, Surfel};
+use crate::surfels::gather::gather;
+
+/// The number of views that see each point of a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Visible {
+    /// For each input, and for each of its points in order, the number of views that see it.
+    pub views: Vec<Vec<u32>>,
+    /// For each view, the number of points that it sees.
+    pub points: Vec<u64>,
+}
+
+impl Scene {
+    /// Returns the points in memory, one entry for each input; empty for a scene of files.
+    pub fn points(&self) -> &[Points] {
+        &self.0.given
+    }
+
+    /// Counts the views that see each point of a scene in memory ([`Scene::from_points`]).
+    ///
+    /// A view sees a point that lies in its image if no surface lies in front of it by more than
+    /// the tolerance `epsilon` of the options. The depth of the surface is that of the pixel with
+    /// the point in it, the nearest one, at one sample a pixel. The point's disk, where it has one,
+    /// is extended to the centre of that pixel, as a surface seen aslant is deeper there.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a scene of files, and the errors of [`Renderer::of_views`] and
+    /// [`Renderer::frame`].
+    pub fn visible(
+        &self,
+        views: &[View],
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        progress: &dyn Progress,
+    ) -> Result<Visible> {
+        if self.points().is_empty() {
+            let what = "points that views see are found in memory: read the files and make a scene of their points";
+            return Err(Error::Usage(what.into()));
+        }
+        let mut options = options.clone();
+        options.maps.aov = vec![Map::Depth];
+        options.look.samples = Some(Samples::ONE);
+        let mut renderer = Renderer::of_views(self, &options, device, progress)?;
+        let own = own_surfels(self.points(), renderer.scene());
+        let empty = self.points().iter().map(|points| vec![0; points.positions.len()]).collect();
+        let mut visible = Visible { views: empty, points: Vec::with_capacity(views.len()) };
+        progress.begin("looking at points", views.len() as u64);
+        for view in views {
+            let picture = renderer.frame(view, &())?;
+            let scene = renderer.scene();
+            let epsilon = renderer.settings().epsilon;
+            let depths = picture.frame.map(Map::Depth).unwrap_or_default();
+            let eye = Eye { camera: &picture.camera, depths, epsilon };
+            let inputs = self.points().iter().zip(&own).zip(&mut visible.views);
+            let seen = inputs.map(|((points, own), counts)| eye.count(points, (scene, own), counts));
+            visible.points.push(seen.sum());
+            progress.advance(1);
+        }
+        progress.end();
+        Ok(visible)
+    }
+}
+
+impl Visible {
+    /// Returns the points that at least `least` views see, as one cloud in the order of the inputs,
+    /// and the number of views of each. There are no triangles and no levels of detail.
+    ///
+    /// # Errors
+    ///
+    /// The errors of joining inputs, such as more than 2^32 - 1 points.
+    pub fn of_points(&self, inputs: &[Points], least: u32) -> Result<(Points, Vec<u32>)> {
+        let mut views: Vec<Vec<u32>> = Vec::new();
+        let part = |(points, counts): (&Points, &Vec<u32>)| {
+            let keep: Vec<bool> = counts.iter().map(|count| *count >= least).collect();
+            let mut points = Points { faces: None, beside: None, tree: None, whole: None, ..points.clone() };
+            points.retain(&keep);
+            (points.left_out, points.numbers) = (Vec::new(), None);
+            views.push(counts.iter().copied().filter(|count| *count >= least).collect());
+            points
+        };
+        let parts: Vec<Points> = inputs.iter().zip(&self.views).map(part).collect();
+        if parts.iter().all(|points| points.positions.is_empty()) {
+            return Ok((Points::default(), Vec::new()));
+        }
+        let gathered = gather(parts)?;
+        let of_point = |index: usize| {
+            let (input, number) = gathered.provenance.of(index as u64);
+            views.get(input as usize)?.get(number as usize).copied()
+        };
+        let counts = (0..gathered.points.positions.len()).map(|index| of_point(index).unwrap_or_default());
+        let counts = counts.collect();
+        Ok((gathered.points, counts))
+    }
+}
+
+/// Index of no surfel.
+const NONE: u32 = u32::MAX;
+
+/// Returns the index of a surfel of each point, [`NONE`] for points that became no surfel.
+fn own_surfels(inputs: &[Points], scene: &scene::Scene) -> Vec<Vec<u32>> {
+    let mut own: Vec<Vec<u32>> = inputs.iter().map(|points| vec![NONE; points.positions.len()]).collect();
+    for index in 0..scene.surfels.len() as u32 {
+        let (input, number) = scene.provenance.of(index.into());
+        let Some(points) = inputs.get(input as usize) else { continue };
+        // The number counts the points of the file, also those that the reader left out.
+        let before = points.left_out.partition_point(|left_out| *left_out < number);
+        if let Some(place) = own[input as usize].get_mut(number as usize - before) {
+            *place = index;
+        }
+    }
+    own
+}
+
+/// A camera and what it sees.
+struct Eye<'a> {
+    camera: &'a Camera,
+    /// The depth of each pixel, +inf where there is nothing.
+    depths: &'a [f32],
+    epsilon: Epsilon,
+}
+
+impl Eye<'_> {
+    /// Adds 1 to the count of each point that is seen; returns the number of these points.
+    fn count(&self, points: &Points, (scene, own): (&scene::Scene, &[u32]), counts: &mut [u32]) -> u64 {
+        let points = points.positions.par_iter().zip(own).zip(counts);
+        let seen = points.map(|((position, own), count)| {
+            let seen = self.sees(DVec3::from_array(*position), scene.surfels.get(*own as usize));
+            *count += u32::from(seen);
+            u64::from(seen)
+        });
+        seen.sum()
+    }
+
+    fn sees(&self, point: DVec3, own: Option<&Surfel>) -> bool {
+        let camera = self.camera;
+        let at = camera.to_camera(point);
+        let along = match camera.projection {
+            Projection::Pinhole => at.z,
+            Projection::Orthographic => 1.0,
+        };
+        let (x, y) = (camera.fx * at.x / along + camera.cx, camera.fy * at.y / along + camera.cy);
+        // Comparisons with NaN are false.
+        let inside = at.z >= camera.near && x >= 0.0 && y >= 0.0;
+        if !(inside && x < f64::from(camera.width) && y < f64::from(camera.height)) {
+            return false;
+        }
+        let (x, y) = (x as u32, y as u32);
+        let Some(nearest) = self.depths.get(y as usize * camera.width as usize + x as usize) else { return false };
+        let radius = match (own, self.epsilon) {
+            (Some(own), _) => own.shorter().into(),
+            // The vertices of triangles have no radius, so the other part of the tolerance decides.
+            (None, Epsilon::Bounded { .. }) => f64::INFINITY,
+            (None, _) => 0.0,
+        };
+        let depth = own.map_or(at.z, |own| self.depth_at(point, at.z, own, (x, y)));
+        depth <= self.epsilon.farthest((*nearest).into(), radius, camera.along_axis(x, y))
+    }
+
+    /// The depth of a point's disk on the ray through the centre of a pixel; at most a longer
+    /// half-axis from the point's own depth.
+    fn depth_at(&self, point: DVec3, depth: f64, own: &Surfel, (x, y): (u32, u32)) -> f64 {
+        let [s, t] = [own.s, own.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+        let (normal, longer) = (s.cross(t), s.length().max(t.length()));
+        let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let there = normal.dot(point - self.camera.ray_start(x, y)) / normal.dot(self.camera.ray(x, y));
+        if there.is_finite() { there.clamp(depth - longer, depth + longer) } else { depth }
+    }
+}

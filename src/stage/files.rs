@@ -225,13 +225,14 @@ impl FormatOptions {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if the format is neither obj nor ply, or an error of reading.
+    /// [`Error::Usage`] if the format holds no meshes, or an error of reading.
     pub fn mesh(&self, path: &Path, progress: &dyn Progress) -> Result<Mesh> {
         let format = self.input_format;
-        if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
-            return Err(Error::Usage(
-                "only obj and ply files can be read as meshes: choose one of them for --input-format".into(),
-            ));
+        if format.is_some_and(|format| !Format::MESHES.contains(&format)) {
+            return Err(Error::Usage(format!(
+                "only {} files can be read as meshes: choose one of them for --input-format",
+                Format::meshes_sentence()
+            )));
         }
         let options = ReadOptions { format, ignore_alpha: self.ignore_alpha, ..ReadOptions::default() };
         io::read_mesh_with(path, options, progress)

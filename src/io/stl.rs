@@ -148,7 +148,7 @@ fn text(reader: &mut impl BufRead, progress: &dyn Progress) -> Result<Soup, Faul
             b"normal" if inside => (0..3).try_for_each(|_| words.number().map(drop))?,
             b"vertex" if inside => soup.corners.push([words.number()?, words.number()?, words.number()?]),
             b"outer" | b"loop" | b"endloop" if inside => {}
-            _ => return Err(words.fault("no word of an STL file is expected to be so here")),
+            _ => return Err(words.fault("a word of an STL file is needed here")),
         }
         if words.passed - reported > 1 << 18 {
             progress.advance(words.passed - std::mem::replace(&mut reported, words.passed));

@@ -1,7 +1,7 @@
 //! OFF files, as other programs write them, and damaged ones.
 
+use super::text::codes;
 use super::{Folder, io};
-use epsplat::low_level::scene::Colors;
 
 #[test]
 fn meshes_of_many_programs_are_read() {
@@ -40,7 +40,7 @@ fn meshes_of_many_programs_are_read() {
 fn vertices_and_faces_have_colours_and_normals() {
     let folder = Folder::new();
     let read = |text: &str| folder.read("a.off", text.as_bytes()).unwrap();
-    let codes = vec![[255, 0, 51, 255], [0, 255, 0, 255], [0, 0, 255, 255]];
+    let expected = [[255, 0, 51, 255], [0, 255, 0, 255], [0, 0, 255, 255]];
     for text in [
         "COFF\n3 1 0\n0 0 0 255 0 51 255\n1 0 0 0 255 0 255\n0 1 0 0 0 255 255\n3 0 1 2\n",
         "COFF\n3 1 0\n0 0 0 255 0 51\n1 0 0 0 255 0\n0 1 0 0 0 255\n3 0 1 2\n",
@@ -48,7 +48,7 @@ fn vertices_and_faces_have_colours_and_normals() {
         "STCNOFF\n3 1 0\n0 0 0 0 0 1 255 0 51 255 0 0\n1 0 0 0 0 1 0 255 0 255 1 0\n0 1 0 0 0 1 0 0 255 255 0 1\n3 0 1 2\n",
     ] {
         let points = read(text);
-        assert_eq!(points.colors, Some(Colors::Srgb8(codes.clone())), "{text}");
+        assert_eq!(codes(&points), expected, "{text}");
         assert_eq!(points.texture.is_some(), text.starts_with("ST"));
     }
     let normals = read("NOFF\n3 1 0\n0 0 0 0 0.6 0.8\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n");
@@ -88,7 +88,7 @@ fn damaged_files_are_refused_in_a_sentence() {
         assert!(refused == said || said.is_empty() && refused.starts_with("line 6: "), "{refused}");
     }
     assert_eq!(folder.refusal("a.off", b""), "the file ends before its numbers of vertices and faces");
-    assert_eq!(folder.refusal("a.off", &good.as_bytes()[..20]), "it promises 3 vertices, and ends after 2");
+    assert_eq!(folder.refusal("a.off", &good.as_bytes()[..22]), "it promises 3 vertices, and ends after 2");
     let nan = good.replace("1 0 0", "nan 0 0");
     assert_eq!(folder.read("a.off", nan.as_bytes()).unwrap().positions.len(), 3);
 }

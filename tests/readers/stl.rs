@@ -98,7 +98,7 @@ fn damaged_files_are_refused_in_a_sentence() {
     for (from, to, said) in [
         ("vertex 0 1 0", "vertex 0 one 0", "line 5: a number is needed, not 'one'"),
         ("vertex 0 1 0\n", "", "line 7: a facet has three corners, not 'endfacet'"),
-        ("endfacet", "endface", "line 8: no word of an STL file is expected to be so here, not 'endface'"),
+        ("endfacet", "endface", "line 8: a word of an STL file is needed here, not 'endface'"),
     ] {
         assert_eq!(folder.refusal("a.stl", text.replacen(from, to, 1).as_bytes()), said);
     }

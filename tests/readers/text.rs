@@ -4,10 +4,18 @@ use super::{Error, Folder, Points, ReadOptions, io, sentence};
 use epsplat::io::{Format, Wanted};
 use epsplat::low_level::scene::Colors;
 
-/// The 8-bit codes of the colours.
-fn codes(points: &Points) -> Vec<[u8; 4]> {
+/// The 8-bit sRGB codes of the colours.
+pub fn codes(points: &Points) -> Vec<[u8; 4]> {
+    let code = |light: f32| {
+        let light = f64::from(light);
+        let code = if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
+        (255.0 * code).round() as u8
+    };
     match &points.colors {
         Some(Colors::Srgb8(codes)) => codes.clone(),
+        Some(Colors::Linear(colors)) => {
+            colors.iter().map(|[r, g, b, a]| [code(*r), code(*g), code(*b), (255.0 * a).round() as u8]).collect()
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -98,7 +106,7 @@ fn other_columns_are_attributes() {
         let wanted = Wanted { column: column.map(str::to_owned), filter, spans: true };
         io::read_with(&path, ReadOptions { wanted, ..ReadOptions::default() }, &())
     };
-    let column = read(Some("scalar_field"), "").unwrap().column.unwrap();
+    let column = read(Some("SCALAR FIELD"), "").unwrap().column.unwrap();
     assert_eq!((column.value(0), column.value(2)), (7.5, -1.0));
     assert!(column.value(1).is_nan());
     let kept = read(None, "class[2:2]").unwrap();
@@ -215,7 +223,7 @@ fn texts_that_are_no_tables_are_refused_in_a_sentence() {
         ("1,5 2,5 3,5\n", "line 1: '1,5' has a decimal comma: write numbers with a decimal point"),
         ("x;y;z\n1,5;2,5;3,5\n", "line 2: '1,5' has a decimal comma: write numbers with a decimal point"),
         ("x y z\n1 2 3\n\n4 five 6\n", "line 4: 'five' is not a number"),
-        ("3\nH\nC 0 0 0\n", "line 2: 'H' is not a number"),
+        ("3\nH\nC 0 0 0\n", "line 2: it is no row of numbers, and names no columns x, y and z: 'H'"),
     ] {
         assert_eq!(folder.refusal("a.txt", text.as_bytes()), said, "{text:?}");
     }
@@ -226,8 +234,11 @@ fn texts_that_are_no_tables_are_refused_in_a_sentence() {
     assert_eq!(folder.refusal("a.txt", wide.as_bytes()), "line 1: it has 300000 columns, more than 256");
     assert!(folder.refusal("a.xyz", b"\x1f\x8b\x08\0\0").contains("gzip"));
     // Numbers that are not finite are points that no scene takes, as in all formats.
-    let points = folder.read("a.txt", b"nan 1 2\n1 inf 2\n-1.#IND 0 0\n1,,\n".split(|b| *b == b',').next().unwrap());
-    assert!(points.is_err() || points.unwrap().positions.len() == 3);
+    let points = folder.read("a.txt", b"nan 1 2\n1 inf 2\n-1.#IND 0 0\n").unwrap();
+    assert!(points.positions.len() == 3 && points.positions.iter().flatten().filter(|c| !c.is_finite()).count() == 3);
+    // Empty cells, also at the end of a line.
+    let points = folder.read("a.csv", b"x,y,z,a,b\n1,2,3,,\n1,,3,4,5\n").unwrap();
+    assert!(points.positions[0] == [1.0, 2.0, 3.0] && points.positions[1][1].is_nan());
     let missing = std::path::Path::new("no/such/file.csv");
     assert!(matches!(io::read(missing, &()), Err(Error::Read { .. })));
 }

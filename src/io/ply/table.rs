@@ -95,8 +95,8 @@ impl Rows<'_> {
         self.extend(&rows.flat_map(|row| needed.iter().map(|column| row[*column])).collect::<Vec<_>>());
     }
 
-    /// Returns the points, which may be the vertices of a mesh. Text has no types: numbers of colours and intensities are integers if
-    /// all of the file are whole.
+    /// Returns the points, which may be the vertices of a mesh. Text has no types: numbers of
+    /// colours and intensities are integers if all of the file are whole.
     pub fn finish(self, is_mesh: bool) -> Result<Points, Fault> {
         let Table { layout, flatten, places, .. } = self.table;
         let is_whole = |column: usize| self.whole[places[column]];

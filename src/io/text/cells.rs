@@ -30,11 +30,16 @@ impl Separator {
             }
             return Ok(Self::Mark(b','));
         }
-        let mut cells = line.split(|byte| *byte == b'\t');
-        let is_one = |cell: &[u8]| !cell.trim_ascii().iter().any(u8::is_ascii_whitespace);
-        let is_tabbed =
-            cells.clone().count() > 1 && (cells.clone().all(is_one) || !cells.any(|cell| number(cell).is_some()));
+        let cells = line.split(|byte| *byte == b'\t');
+        let words = |cell| <[u8]>::split(cell, u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let is_list = |cell| words(cell).count() > 1 && words(cell).all(|word| number(word).is_some());
+        let is_tabbed = line.contains(&b'\t') && !cells.into_iter().any(is_list);
         Ok(if is_tabbed { Self::Mark(b'\t') } else { Self::Space })
+    }
+
+    /// Whether a line ends with an empty cell, which [`cells`](Self::cells) does not count.
+    pub(super) fn ends_empty(self, line: &[u8]) -> bool {
+        matches!(self, Self::Mark(mark) if line.last() == Some(&mark))
     }
 
     /// Its name as a part of a sentence.
@@ -110,7 +115,7 @@ pub(in crate::io) fn number(cell: &[u8]) -> Option<f64> {
 }
 
 /// Whether a cell is a number as some countries write it: `1,5`.
-fn has_decimal_comma(cell: &[u8]) -> bool {
+pub(super) fn has_decimal_comma(cell: &[u8]) -> bool {
     let mut parts = cell.split(|byte| *byte == b',');
     let (whole, part) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
     let whole = whole.strip_prefix(b"-").unwrap_or(whole);

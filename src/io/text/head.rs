@@ -1,6 +1,6 @@
 //! The first lines of a table: the separator, the names of the columns, and where the rows start.
 
-use super::cells::{Separator, content, no_number, number};
+use super::cells::{Separator, content, has_decimal_comma, no_number, number};
 use super::guess;
 use crate::io::attributes::find;
 use crate::io::fault::Fault;
@@ -45,6 +45,17 @@ pub(in crate::io) fn in_line(line: u64) -> impl Fn(Fault) -> Fault {
 /// A line of names, and its number.
 type Header = (u64, Vec<String>);
 
+/// The lines in front of the rows.
+#[derive(Debug, Default)]
+struct Front {
+    /// The first line that is no comment, if it has names.
+    header: Option<Header>,
+    /// The last comment that has names.
+    comment: Option<Header>,
+    /// The number of points.
+    promised: Option<u64>,
+}
+
 impl Head {
     /// Finds the columns from the first block of a text.
     ///
@@ -52,92 +63,85 @@ impl Head {
     ///
     /// [`Fault::Malformed`] with the number of the line that is neither a header nor a row.
     pub(super) fn of(block: &[u8], line_end: u8) -> Result<Self, Fault> {
-        let (mut header, mut comment): (Option<Header>, Option<Header>) = (None, None);
-        let (mut promised, mut offset) = (None, 0);
-        for (number, line) in (1..).zip(block.split_inclusive(|byte| *byte == line_end)) {
-            let at = in_line(number);
+        let (mut front, mut offset, mut lines) = (Front::default(), 0, 0);
+        for line in block.split_inclusive(|byte| *byte == line_end) {
             if let Some(own) = content(line) {
-                let separator = Separator::of(own).map_err(&at)?;
-                let numbers = separator.cells(own).map(self::number);
-                if numbers.clone().all(|number| number.is_some()) {
-                    match (numbers.clone().count(), numbers.flatten().next()) {
-                        (1, Some(count)) if count >= 0.0 && count.fract() == 0.0 && promised.is_none() => {
-                            promised = Some(count as u64);
-                        }
-                        _ => {
-                            return Self::with_rows(
-                                (&block[offset..], line_end),
-                                (offset, number - 1),
-                                header,
-                                comment,
-                                promised,
-                            );
-                        }
-                    }
-                } else if header.is_none()
-                    && let Some(names) = names_in(own)
-                {
-                    header = Some((number, names));
-                } else if header.is_some() {
-                    return Self::with_rows(
-                        (&block[offset..], line_end),
-                        (offset, number - 1),
-                        header,
-                        comment,
-                        promised,
-                    );
-                } else {
-                    return Err(at(no_table(own, separator)));
+                if !front.take(own, lines + 1).map_err(in_line(lines + 1))? {
+                    break;
                 }
             } else if let Some(names) = comment_of(line).and_then(names_in) {
-                comment = Some((number, names));
+                front.comment = Some((lines + 1, names));
             }
             offset += line.len();
+            lines += 1;
         }
-        let names = header.or(comment).map_or_else(|| guess::names(&[vec![0.0; 3]]), |(_, names)| names);
-        let is_text = vec![false; names.len()];
-        let separator = Separator::Space;
-        Ok(Self { separator, names, is_guess: false, is_text, promised, start: (offset, 0), row_length: 1 })
+        front.head((&block[offset..], line_end), (offset, lines))
+    }
+}
+
+impl Front {
+    /// Takes a line that is no comment; returns false if it is the first row.
+    fn take(&mut self, line: &[u8], number: u64) -> Result<bool, Fault> {
+        let separator = Separator::of(line)?;
+        let numbers = separator.cells(line).map(self::number);
+        let is_row = numbers.clone().all(|number| number.is_some());
+        let count = numbers.clone().flatten().next().filter(|count| *count >= 0.0 && count.fract() == 0.0);
+        match (is_row, count) {
+            (true, Some(count)) if numbers.clone().count() == 1 && self.promised.is_none() => {
+                // The cast saturates.
+                self.promised = Some(count as u64);
+                Ok(true)
+            }
+            (true, _) => Ok(false),
+            _ if self.header.is_some() => Ok(false),
+            _ => {
+                self.header = Some((number, names_in(line).ok_or_else(|| no_table(line, separator))?));
+                Ok(true)
+            }
+        }
     }
 
-    /// The columns of the rows that `text` starts with, which lie behind `start` bytes and lines.
-    fn with_rows(
-        (text, line_end): (&[u8], u8),
-        start: (usize, u64),
-        header: Option<Header>,
-        comment: Option<Header>,
-        promised: Option<u64>,
-    ) -> Result<Self, Fault> {
-        let lines = (start.1 + 1..).zip(text.split_inclusive(|byte| *byte == line_end));
+    /// Finds the columns from the rows that `text` starts with, which lie behind `start` bytes and
+    /// lines.
+    fn head(self, (text, line_end): (&[u8], u8), start: (usize, u64)) -> Result<Head, Fault> {
+        let Self { header, comment, promised } = self;
         let (mut rows, mut length): (Vec<Vec<Option<f64>>>, usize) = (Vec::new(), 0);
         let mut separator = None;
-        for (number, line) in lines {
-            length += line.len();
-            let Some(own) = content(line) else { continue };
+        for (line, own) in (start.1 + 1..).zip(text.split_inclusive(|byte| *byte == line_end)) {
+            length += own.len();
+            let Some(own) = content(own) else { continue };
             let separator = match separator {
                 Some(known) => known,
-                None => *separator.insert(Separator::of(own).map_err(in_line(number))?),
+                None => *separator.insert(Separator::of(own).map_err(in_line(line))?),
             };
-            let cells: Vec<_> = separator.cells(own).map(self::number).collect();
-            check_count(cells.len(), header.as_ref()).map_err(in_line(number))?;
+            let mut cells: Vec<_> = separator.cells(own).map(self::number).collect();
+            let wanted = rows.first().map(Vec::len).or(header.as_ref().map(|(_, names)| names.len()));
+            if wanted == Some(cells.len() + 1) && separator.ends_empty(own) {
+                cells.push(Some(f64::NAN));
+            }
+            if rows.is_empty() {
+                check_count(cells.len(), header.as_ref()).map_err(in_line(line))?;
+            }
             // Rows of other lengths are refused where they are read.
             if rows.len() == SAMPLE || rows.first().is_some_and(|first| first.len() != cells.len()) {
                 break;
             }
             rows.push(cells);
         }
-        let separator = separator.unwrap_or(Separator::Space);
-        let count = rows.first().map_or(0, Vec::len);
-        let named = header.or(comment.filter(|(_, names)| names.len() == count)).map(|(_, names)| names);
+        let count = rows.first().map_or(3, Vec::len);
+        let named = header.or(comment.filter(|(_, names)| names.len() == count || rows.is_empty()));
         let is_guess = named.is_none() && count > 3;
         let values = |row: &Vec<Option<f64>>| row.iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
-        let names = named.unwrap_or_else(|| guess::names(&rows.iter().map(values).collect::<Vec<_>>()));
+        let guessed = || guess::names(&rows.iter().map(values).collect::<Vec<_>>());
+        let names = named.map_or_else(guessed, |(_, names)| names);
         let is_text = |(column, name): (usize, &String)| {
-            !["x", "y", "z"].contains(&name.as_str()) && rows.iter().all(|row| row[column].is_none())
+            let is_axis = ["x", "y", "z"].contains(&name.as_str());
+            !is_axis && !rows.is_empty() && rows.iter().all(|row| row[column].is_none())
         };
         let is_text = names.iter().enumerate().map(is_text).collect();
         let row_length = (length / rows.len().max(1)) as u64;
-        Ok(Self { separator, names, is_guess, is_text, promised, start, row_length })
+        let separator = separator.unwrap_or(Separator::Space);
+        Ok(Head { separator, names, is_guess, is_text, promised, start, row_length })
     }
 }
 
@@ -183,13 +187,9 @@ fn names_in(line: &[u8]) -> Option<Vec<String>> {
 
 /// The fault of a first line that is neither a row nor a header.
 fn no_table(line: &[u8], separator: Separator) -> Fault {
-    let words = separator.cells(line).filter(|cell| number(cell).is_none());
-    let first = words.clone().next().unwrap_or_default();
-    match no_number(first) {
-        Fault::Malformed(what) if words.count() < 2 => Fault::Malformed(what),
-        _ => Fault::Malformed(format!(
-            "it is no row of numbers, and names no columns x, y and z: '{}'",
-            shown(line.trim_ascii())
-        )),
+    if let Some(cell) = separator.cells(line).find(|cell| has_decimal_comma(cell)) {
+        return no_number(cell);
     }
+    let line = shown(line.trim_ascii());
+    Fault::Malformed(format!("it is no row of numbers, and names no columns x, y and z: '{line}'"))
 }

@@ -60,6 +60,10 @@ impl Shape {
             }
             count += 1;
         }
+        if count + 1 == self.is_read.len() && self.separator.ends_empty(line) {
+            parsed.values.extend(self.is_read.last().filter(|is_read| **is_read).map(|_| f64::NAN));
+            count += 1;
+        }
         if is_ragged {
             parsed.ends.push((parsed.values.len(), parsed.lines));
         } else if count != self.is_read.len() {

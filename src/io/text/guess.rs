@@ -54,7 +54,7 @@ fn triple_at(rows: &[Vec<f64>], at: usize, is_last: bool) -> Option<Triple> {
     let is_zero = |triple: &[f64]| triple.iter().all(|c| *c == 0.0);
     triples.clone().next()?;
     // Missing normals are zero; a table of zeros alone has none.
-    let are_unit = all(&|triple| is_zero(triple) || (length(triple) - 1.0).abs() < 0.02);
+    let are_unit = all(&|triple| is_zero(triple) || (length(triple) - 1.0).abs() < 0.01);
     if are_unit && !all(&is_zero) {
         return Some(Triple::Normal);
     }

@@ -86,7 +86,8 @@ pub struct ReadOptions {
 
 /// Reads a file of any supported format; see [`Input::open`].
 ///
-/// The formats are those of [`Format::READ`]. E57 and PCD need the features `e57` and `pcd`. Points keep the file's order and coordinates. A file without points is not an error here.
+/// The formats are those of [`Format::READ`]. E57 and PCD need the features `e57` and `pcd`. Points
+/// keep the file's order and coordinates. A file without points is not an error here.
 ///
 /// # Errors
 ///

@@ -24,8 +24,8 @@ use crate::{Progress, Result};
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) if the system cannot read,
-/// [`Error::Malformed`](crate::Error::Malformed) if a line does not fit its place, a polygon names a
-/// vertex that does not exist, or the file ends before what it promises.
+/// [`Error::Malformed`](crate::Error::Malformed) if a line does not fit its place, a polygon names
+/// a vertex that does not exist, or the file ends before what it promises.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

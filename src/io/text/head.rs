@@ -16,7 +16,7 @@ const MOST_COLUMNS: usize = 256;
 const COORDINATES: [&[&str]; 3] =
     [&["x", "easting", "east"], &["y", "northing", "north"], &["z", "elevation", "height", "altitude"]];
 
-/// What the first lines of a table say.
+/// The meaning of the first lines of a table.
 #[derive(Debug)]
 pub(super) struct Head {
     pub(super) separator: Separator,
@@ -114,7 +114,7 @@ impl Front {
                 Some(known) => known,
                 None => *separator.insert(Separator::of(own).map_err(in_line(line))?),
             };
-            let mut cells: Vec<_> = separator.cells(own).map(self::number).collect();
+            let mut cells: Vec<_> = separator.cells(own).map(number).collect();
             let wanted = rows.first().map(Vec::len).or(header.as_ref().map(|(_, names)| names.len()));
             if wanted == Some(cells.len() + 1) && separator.ends_empty(own) {
                 cells.push(Some(f64::NAN));

@@ -56,8 +56,8 @@ pub fn read_pts(input: Input, options: &ReadOptions, progress: &dyn Progress) ->
     Ok(Points { up: Some(Up::Z), ..points })
 }
 
-/// Reads the points of all scans of a PTX file, in the file's coordinate system. Points at 0 0 0 are
-/// missing returns and left out. Up is z.
+/// Reads the points of all scans of a PTX file, in the file's coordinate system. Points at 0 0 0
+/// are missing returns and left out. Up is z.
 ///
 /// # Errors
 ///

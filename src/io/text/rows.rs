@@ -4,7 +4,7 @@ use super::cells::{Separator, content, no_number, number};
 use super::head::{columns, in_line};
 use crate::io::fault::Fault;
 
-/// What rows look like.
+/// The form of rows.
 pub(super) struct Shape {
     pub(super) separator: Separator,
     pub(super) line_end: u8,

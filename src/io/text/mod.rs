@@ -7,7 +7,9 @@ mod head;
 mod ptx;
 mod rows;
 
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read};
+use std::path::Path;
 
 use rayon::prelude::*;
 
@@ -15,7 +17,7 @@ use crate::io::about::About;
 use crate::io::encoding;
 use crate::io::fault::{self, Fault};
 use crate::io::ply::Table;
-use crate::io::{Input, Points, ReadOptions, Up};
+use crate::io::{Format, Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
 pub(super) use blocks::Blocks;
 pub(super) use cells::{Separator, content, no_number, number};
@@ -66,6 +68,29 @@ pub fn read_pts(input: Input, options: &ReadOptions, progress: &dyn Progress) ->
 pub fn read_ptx(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let points = read_with(input, "PTX", scans, (options, progress))?;
     Ok(Points { up: Some(Up::Z), ..points })
+}
+
+/// Whether the file at `path` has an extension of text of any kind, `.txt` or `.csv`, and does not
+/// start as a table. Such files often lie beside point clouds.
+pub(crate) fn is_other_text(path: &Path) -> bool {
+    /// The bytes that decide.
+    const START: u64 = 1 << 16;
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+    if !["txt", "csv"].iter().any(|other| extension.eq_ignore_ascii_case(other)) {
+        return false;
+    }
+    let is_table = || -> Result<bool, Fault> {
+        let mut start = Vec::new();
+        File::open(path)?.take(START).read_to_end(&mut start)?;
+        let length = start.len() as u64;
+        if Format::of_start(&start).is_some() {
+            return Ok(true);
+        }
+        let mut blocks = Blocks::new(encoding::decoded(Cursor::new(start), length)?.0)?;
+        let first = blocks.next()?.unwrap_or_default();
+        Head::of(&first, blocks.line_end).map(|_| true)
+    };
+    !is_table().unwrap_or(false)
 }
 
 /// A text while it is being read.
@@ -209,5 +234,26 @@ impl Text<'_> {
         }
         points.unread.push(format!("{}: {what} (--strict refuses the file)", self.name));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn texts_beside_point_clouds_are_no_tables() {
+        let folder = tempfile::tempdir().unwrap();
+        let is_other = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            is_other_text(&path)
+        };
+        assert!(is_other("readme.txt", "tiles\n") && is_other("Report.CSV", "name,value\nwidth,3\n"));
+        assert!(!is_other("a.txt", "1 2 3\n") && !is_other("a.csv", "x,y,z\n1,2,3\n"));
+        assert!(!is_other("b.txt", "ply\nformat ascii 1.0\n"));
+        // Other extensions say that it is a table.
+        assert!(!is_other("a.xyz", "tiles\n"));
     }
 }

@@ -52,7 +52,8 @@ pub const OFF: Target = Target {
 fn stl(random: &mut Random) -> (Vec<u8>, usize) {
     let place = Place::any(random);
     let corners: Vec<[f32; 3]> = (0..1 + random.count(30)).map(|_| place.point(random).map(|c| c as f32)).collect();
-    let triangles: Vec<[[f32; 3]; 3]> = (0..random.count(40)).map(|_| [0; 3].map(|_| *random.pick(&corners))).collect();
+    let triangles: Vec<[[f32; 3]; 3]> =
+        (0..random.count(40)).map(|_| [0; 3].map(|_| corners[random.below(corners.len())])).collect();
     let used = triangles.as_flattened().iter().map(|corner| corner.map(|c| (f64::from(c) + 0.0).to_bits()));
     let count = used.collect::<HashSet<_>>().len();
     if random.one_in(2) {
@@ -82,8 +83,8 @@ fn off(random: &mut Random) -> (Vec<u8>, usize) {
     let place = Place::any(random);
     let (vertices, faces) = (random.count(40), random.count(40));
     let faces = if vertices == 0 { 0 } else { faces };
-    let (word, rest) =
-        *random.pick(&[("OFF", ""), ("COFF", " 1 2 255 128"), ("NOFF", " 0 0.6 0.8"), ("STOFF", " 0 1")]);
+    let kinds = [("OFF", ""), ("COFF", " 1 2 255 128"), ("NOFF", " 0 0.6 0.8"), ("STOFF", " 0 1")];
+    let (word, rest) = kinds[random.below(kinds.len())];
     let mut out = format!("{word}\n{vertices} {faces} 0\n");
     for _ in 0..vertices {
         let [x, y, z] = place.point(random);

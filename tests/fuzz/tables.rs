@@ -69,7 +69,7 @@ fn encoded(random: &mut Random, text: String) -> Vec<u8> {
 fn table(random: &mut Random) -> (Vec<u8>, usize) {
     let place = Place::any(random);
     let rows = random.count(60);
-    let separator = *random.pick(&[" ", "\t", ", ", ";", "  "]);
+    let separator = random.pick(&[" ", "\t", ", ", ";", "  "]);
     let kinds: [&[&str]; 6] = [
         &[],
         &["intensity"],

@@ -30,10 +30,9 @@ impl Separator {
             }
             return Ok(Self::Mark(b','));
         }
-        let cells = line.split(|byte| *byte == b'\t');
         let words = |cell| <[u8]>::split(cell, u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let is_list = |cell| words(cell).count() > 1 && words(cell).all(|word| number(word).is_some());
-        let is_tabbed = line.contains(&b'\t') && !cells.into_iter().any(is_list);
+        let is_tabbed = line.contains(&b'\t') && !line.split(|byte| *byte == b'\t').any(is_list);
         Ok(if is_tabbed { Self::Mark(b'\t') } else { Self::Space })
     }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::config::Config;
 use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
+use crate::io::Format;
 use crate::io::input::text;
 use crate::plan::check;
 use crate::scene::camera::check_size;
@@ -175,10 +176,10 @@ impl SceneEntry {
                 let of_shape = matches!(self.surfels, Making::Gaussians | Making::Triangles);
                 not_beside("surfels = gaussians or triangles", of_shape, "file: give a shape")?;
                 self.check_levels()?;
-                let is_mesh =
-                    file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
+                let is_mesh = file.extension().is_some_and(|e| Format::mesh_names().any(|m| e.eq_ignore_ascii_case(m)));
                 if self.truth && !is_mesh {
-                    return Err("truth: only OBJ and PLY files have triangles that rays can meet".into());
+                    let formats = Format::meshes_sentence();
+                    return Err(format!("truth: only {formats} files have triangles that rays can meet"));
                 }
             }
             (None, Some(_)) if self.texture.is_some() || self.source.is_some() => {

@@ -13,7 +13,7 @@ use epsplat::options::InputOptions;
 use epsplat::{Error, Files, Progress, Result, io};
 use serde::Serialize;
 
-use super::inputs::help_of_all;
+use super::inputs::{help_of_all, help_of_mesh};
 use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print, write_json};
@@ -31,8 +31,7 @@ pub struct Arguments {
     surfels: Vec<PathBuf>,
     #[command(flatten)]
     reading: InputOptions,
-    /// Mesh that the surfels represent: .obj or .ply
-    #[arg(long)]
+    #[arg(long, help = help_of_mesh("Mesh that the surfels represent"))]
     mesh: PathBuf,
     /// Number of directions to cast rays from
     #[arg(long, default_value_t = DEFAULT_VIEWS, value_parser = clap::value_parser!(u32).range(1..=65_536))]

@@ -9,6 +9,7 @@ use epsplat::options::FormatOptions;
 use epsplat::{Error, Result};
 use serde::Serialize;
 
+use super::inputs::help_of_mesh;
 use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print, write_json};
@@ -24,7 +25,7 @@ use super::{note, outputs, print, write_json};
     after_help = "Example:\n  epsplat hybrid dragon.ply -o far.ply --pixels 400\n  epsplat render far.ply -o far.png"
 )]
 pub struct Arguments {
-    /// Mesh: .obj or .ply; - is standard input
+    #[arg(help = help_of_mesh("Mesh, - for standard input"))]
     mesh: PathBuf,
     #[command(flatten)]
     input: FormatOptions,

@@ -8,6 +8,12 @@ pub(super) fn help_of(what: &str) -> String {
     format!("{what}: {}; - is standard input", extensions.join(", "))
 }
 
+/// Returns the help text of a mesh: `what` it is and its file extensions.
+pub(super) fn help_of_mesh(what: &str) -> String {
+    let extensions: Vec<_> = Format::mesh_names().map(|name| format!(".{name}")).collect();
+    format!("{what}: {}", extensions.join(", "))
+}
+
 /// Returns the help text of inputs that may also be folders.
 pub(super) fn help_of_all(what: &str) -> String {
     format!("{}; a folder stands for its files", help_of(what))

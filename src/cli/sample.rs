@@ -10,6 +10,7 @@ use epsplat::low_level::surfels::sampling::{MOST, MeshSurface, Method, Priority,
 use epsplat::options::FormatOptions;
 use epsplat::{Error, Result};
 
+use super::inputs::help_of_mesh;
 use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs};
@@ -23,7 +24,7 @@ use super::{note, outputs};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
-    /// Mesh: .obj or .ply; - is standard input
+    #[arg(help = help_of_mesh("Mesh, - for standard input"))]
     mesh: PathBuf,
     #[command(flatten)]
     input: FormatOptions,

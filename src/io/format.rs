@@ -18,7 +18,44 @@ pub enum Format {
     E57,
     /// Point Cloud Library; needs the feature `pcd`.
     Pcd,
+    /// Text with a point per line.
+    Xyz,
+    /// Text of a scanner with the number of points in front.
+    Pts,
+    /// Text of a scanner with the pose of each scan.
+    Ptx,
+    /// Triangles of stereolithography, in binary or text.
+    Stl,
+    /// Polygons of Geomview.
+    Off,
 }
+
+/// A format that is known by name and not read.
+struct Unread {
+    extensions: &'static [&'static str],
+    /// The first bytes; empty if the format has no signature.
+    start: &'static [u8],
+    what: &'static str,
+    /// Advice for users.
+    instead: &'static str,
+}
+
+/// Advice for formats of Gaussians.
+const BY_SPLATS: &str = "convert it to PLY with SuperSplat or splat-transform";
+
+/// Advice for formats of meshes.
+const BY_MESHES: &str = "convert it to PLY or OBJ, for example with Blender or with `assimp export`";
+
+const UNREAD: [Unread; 8] = [
+    Unread { extensions: &["spz"], start: b"NGSP", what: "an SPZ file of Gaussians", instead: BY_SPLATS },
+    Unread { extensions: &["splat"], start: b"", what: "a .splat file of Gaussians", instead: BY_SPLATS },
+    Unread { extensions: &["ksplat"], start: b"", what: "a .ksplat file of Gaussians", instead: BY_SPLATS },
+    Unread { extensions: &["sog"], start: b"", what: "a SOG file of Gaussians", instead: BY_SPLATS },
+    Unread { extensions: &["glb", "gltf"], start: b"glTF", what: "a glTF file", instead: BY_MESHES },
+    Unread { extensions: &["fbx"], start: b"Kaydara FBX", what: "an FBX file", instead: BY_MESHES },
+    Unread { extensions: &["3mf"], start: b"", what: "a 3MF file", instead: BY_MESHES },
+    Unread { extensions: &["dae"], start: b"", what: "a COLLADA file", instead: BY_MESHES },
+];
 
 impl Format {
     /// File extensions of the formats that this build reads.
@@ -31,11 +68,36 @@ impl Format {
         ("e57", Self::E57),
         #[cfg(feature = "pcd")]
         ("pcd", Self::Pcd),
+        ("xyz", Self::Xyz),
+        ("txt", Self::Xyz),
+        ("csv", Self::Xyz),
+        ("asc", Self::Xyz),
+        ("pts", Self::Pts),
+        ("ptx", Self::Ptx),
+        ("stl", Self::Stl),
+        ("off", Self::Off),
     ];
+
+    /// The formats that hold meshes.
+    pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off];
 
     /// The names in [`Self::READ`] as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {
-        let names: Vec<_> = Self::READ.iter().map(|(name, _)| name.to_ascii_uppercase()).collect();
+        Self::joined(Self::READ.iter().map(|(name, _)| *name))
+    }
+
+    /// File extensions of [`Self::MESHES`].
+    pub fn mesh_names() -> impl Iterator<Item = &'static str> {
+        Self::READ.iter().filter(|row| Self::MESHES.contains(&row.1)).map(|(name, _)| *name)
+    }
+
+    /// [`Self::mesh_names`] as a part of a sentence.
+    pub fn meshes_sentence() -> String {
+        Self::joined(Self::mesh_names())
+    }
+
+    fn joined<'a>(names: impl Iterator<Item = &'a str>) -> String {
+        let names: Vec<_> = names.map(str::to_ascii_uppercase).collect();
         match names.split_last() {
             Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
             _ => names.concat(),
@@ -56,17 +118,13 @@ impl Format {
     pub(super) fn unread(path: &Path, start: &[u8]) -> Option<String> {
         let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
         let named = |name: &str| extension.as_deref() == Some(name);
-        let what = match start {
-            [b'N', b'G', b'S', b'P', ..] => "an SPZ file of Gaussians",
-            [0x1f, 0x8b, ..] if named("spz") => "an SPZ file of Gaussians",
-            [0x1f, 0x8b, ..] => return Some("it is compressed by gzip: unpack it first".into()),
-            _ if named("spz") => "an SPZ file of Gaussians",
-            _ if named("splat") => "a .splat file of Gaussians",
-            _ if named("ksplat") => "a .ksplat file of Gaussians",
-            _ if named("sog") => "a SOG file of Gaussians",
-            _ => return None,
-        };
-        Some(format!("it is {what}, which is not read: convert it to PLY with SuperSplat or splat-transform"))
+        if start.starts_with(&[0x1f, 0x8b]) && !named("spz") {
+            return Some("it is compressed by gzip: unpack it first".into());
+        }
+        let starts = |row: &&Unread| !row.start.is_empty() && start.starts_with(row.start);
+        let is_named = |row: &&Unread| row.extensions.iter().any(|name| named(name));
+        let Unread { what, instead, .. } = UNREAD.iter().find(starts).or_else(|| UNREAD.iter().find(is_named))?;
+        Some(format!("it is {what}, which is not read: {instead}"))
     }
 
     /// The format that a file's first bytes identify. OBJ files have no signature.
@@ -81,6 +139,12 @@ impl Format {
         if text.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace)) {
             return Some(Self::Ply);
         }
+        let word_end = text.iter().position(|byte| !byte.is_ascii_alphabetic()).unwrap_or(text.len());
+        match &text[..word_end] {
+            b"solid" => return Some(Self::Stl),
+            b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" => return Some(Self::Off),
+            _ => {}
+        }
         let comment = text.strip_prefix(b"#").unwrap_or_default().trim_ascii_start();
         let begins = |text: &[u8], word: &[u8]| text.get(..word.len()).is_some_and(|t| t.eq_ignore_ascii_case(word));
         (begins(comment, b".PCD") || begins(text, b"VERSION ") || begins(text, b"FIELDS ")).then_some(Self::Pcd)
@@ -93,9 +157,11 @@ impl Format {
         let name = format!("{self:?}").to_ascii_uppercase();
         let fits = match self {
             Self::Ply | Self::Las | Self::E57 => Self::of_start(start) == Some(self),
+            // The header of a binary file may be zero, but not the number of triangles after it.
+            Self::Stl => start.is_empty() || start.iter().any(|byte| *byte != 0),
             // Text may begin with anything but two zero bytes; in UTF-16, every other byte may be
             // zero.
-            Self::Obj | Self::Pcd => !start.starts_with(&[0, 0]),
+            Self::Obj | Self::Pcd | Self::Xyz | Self::Pts | Self::Ptx | Self::Off => !start.starts_with(&[0, 0]),
         };
         let first = if self == Self::Ply { "line is not 'ply'" } else { "bytes do not match that format" };
         (!fits).then(|| format!("it is not a {name} file: its first {first}"))
@@ -127,6 +193,8 @@ mod tests {
             ("a.Splat", b"", ".splat"),
             ("a.ksplat", b"\0\x01", ".ksplat"),
             ("a.sog", b"PK\x03\x04", "SOG"),
+            ("a.glb", b"glTF\x02\0\0\0", "glTF"),
+            ("a.gltf", b"{", "glTF"),
             ("a.ply.gz", b"\x1f\x8b\x08", "gzip"),
         ] {
             assert!(unread(name, start).contains(word), "{name}: {}", unread(name, start));

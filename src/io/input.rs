@@ -9,8 +9,9 @@ use super::Format;
 use super::values::text_of;
 use crate::{Error, Result};
 
-/// The number of first bytes that decide the format.
-const START: u64 = 32;
+/// The number of first bytes that decide the format: all in front of the triangles of a binary STL
+/// file.
+const START: u64 = 84;
 
 /// The most bytes that are copied from a stream: 4 GiB. A pipe may have no end.
 pub const MOST_COPIED: u64 = 1 << 32;
@@ -39,7 +40,8 @@ impl Input {
     /// Opens the file at `path`, or standard input for `-`, and determines its format.
     ///
     /// The format is `format` if given, else that of the file's extension (upper or lower case),
-    /// else that of its first bytes. Pipes are copied to an unnamed temporary file, which is
+    /// else that of its first bytes. The first bytes overrule the extensions of text: a PLY file
+    /// may be called `.txt`. Pipes are copied to an unnamed temporary file, which is
     /// deleted with the input. Devices are refused.
     ///
     /// # Errors
@@ -54,9 +56,14 @@ impl Input {
         drop(looked_at);
         let standard = path == Path::new("-");
         let called = if standard { Path::new("standard input") } else { path };
-        let named = format.or_else(|| if standard { None } else { Format::of_name(path) });
+        let of_name = if standard { None } else { Format::of_name(path) };
+        // Text of any kind may have the extension of a table.
+        let (certain, likely) = match of_name {
+            Some(Format::Xyz) => (format, of_name),
+            _ => (format.or(of_name), None),
+        };
         let opened = Opened::of(path, standard).map_err(|error| Error::read(called, error))?;
-        opened.into_input(called, named)
+        opened.into_input(called, certain, likely)
     }
 
     /// Rewinds the file. If it is a copy of a stream, it is stored for the next call that opens
@@ -166,9 +173,13 @@ impl Opened {
         Ok(Self::Stream(Box::new(io::stdin().lock())))
     }
 
-    fn into_input(self, path: &Path, named: Option<Format>) -> Result<Input> {
+    fn into_input(self, path: &Path, named: Option<Format>, likely: Option<Format>) -> Result<Input> {
         let failed = |error| Error::read(path, error);
         let mut start = Vec::new();
+        let detected = |start: &[u8]| {
+            let likely = likely.filter(|_| Format::unread(path, start).is_none());
+            Format::of_start(start).or(likely).ok_or_else(|| unknown(path, start))
+        };
         let copied = matches!(self, Self::Stream(_));
         let (file, length, format) = match self {
             Self::File(mut file, length) => {
@@ -177,7 +188,7 @@ impl Opened {
                     None => {
                         (&mut file).take(START).read_to_end(&mut start).map_err(failed)?;
                         file.rewind().map_err(failed)?;
-                        Format::of_start(&start).ok_or_else(|| unknown(path, &start))?
+                        detected(&start)?
                     }
                 };
                 (file, length, format)
@@ -185,7 +196,7 @@ impl Opened {
             Self::Stream(mut stream) => {
                 // The format is checked before copying, as a stream of other data may have no end.
                 (&mut stream).take(START).read_to_end(&mut start).map_err(failed)?;
-                let format = named.or_else(|| Format::of_start(&start)).ok_or_else(|| unknown(path, &start))?;
+                let format = named.map_or_else(|| detected(&start), Ok)?;
                 if let Some(what) = format.fault_of_start(&start) {
                     return Err(Error::malformed(path, what));
                 }
@@ -261,12 +272,12 @@ mod tests {
     fn a_stream_of_another_format_is_refused_by_its_first_bytes() {
         let open = |format: Format, start: &[u8]| {
             let stream = Opened::Stream(Box::new(io::Cursor::new(start.to_vec())));
-            stream.into_input(Path::new("a"), Some(format)).map(|input| input.length)
+            stream.into_input(Path::new("a"), Some(format), None).map(|input| input.length)
         };
-        let zeros = [0; 64];
-        for format in [Format::Ply, Format::Las, Format::E57, Format::Obj, Format::Pcd] {
+        let zeros = [0; 84];
+        for (_, format) in Format::READ.iter().copied() {
             let endless = Opened::Stream(Box::new(io::repeat(0)));
-            let told = endless.into_input(Path::new("a"), Some(format)).unwrap_err().to_string();
+            let told = endless.into_input(Path::new("a"), Some(format), None).unwrap_err().to_string();
             assert!(told.starts_with("a: it is not a") && told.contains("its first"), "{told}");
             assert!(open(format, &zeros).is_err());
         }
@@ -279,6 +290,8 @@ mod tests {
             (Format::Obj, b"# a comment"),
             (Format::Obj, &utf16),
             (Format::Pcd, b"# a comment\nVERSION"),
+            (Format::Stl, b"\0\0\0\0\x01"),
+            (Format::Xyz, b"1 2 3"),
             // Too short for any format; the readers report that.
             (Format::Obj, b""),
         ] {

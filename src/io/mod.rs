@@ -15,6 +15,7 @@ mod degrees;
 pub mod dimensions;
 #[cfg(feature = "e57")]
 pub mod e57;
+mod encoding;
 #[cfg(feature = "exr")]
 pub mod exr;
 mod fault;
@@ -25,6 +26,7 @@ pub(crate) mod input;
 pub mod las;
 pub mod mesh;
 pub mod obj;
+pub mod off;
 pub mod paint;
 #[cfg(feature = "pcd")]
 pub mod pcd;
@@ -33,6 +35,8 @@ pub mod ply;
 pub mod png;
 pub mod points;
 mod polygon;
+pub mod stl;
+pub mod text;
 pub mod texture;
 pub(crate) mod textures;
 mod tree;
@@ -82,8 +86,8 @@ pub struct ReadOptions {
 
 /// Reads a file of any supported format; see [`Input::open`].
 ///
-/// The formats are PLY, LAS, LAZ (including COPC) and OBJ. E57 and PCD need the features `e57` and
-/// `pcd`. Points keep the file's order and coordinates. A file without points is not an error here.
+/// The formats are those of [`Format::READ`]. E57 and PCD need the features `e57` and `pcd`. Points
+/// keep the file's order and coordinates. A file without points is not an error here.
 ///
 /// # Errors
 ///
@@ -99,7 +103,12 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 ///
 /// As [`read`].
 pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let mut points = read_raw(path, options, progress)?;
+    read_settled(Input::open(path, options.format)?, &options, progress)
+}
+
+/// Reads an opened file, and decides what its colours mean.
+fn read_settled(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let mut points = read_opened(input, options, progress)?;
     settle_colors(std::slice::from_mut(&mut points));
     Ok(points)
 }
@@ -112,17 +121,26 @@ pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> 
 ///
 /// As [`read`].
 pub fn read_raw(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let input = Input::open(path, options.format)?;
-    let (format, name) = (input.format, fault::name(&input.path));
+    read_opened(Input::open(path, options.format)?, &options, progress)
+}
+
+/// Reads an opened file, and keeps its colours as they are in the file.
+fn read_opened(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let (format, path, name) = (input.format, input.path.clone(), fault::name(&input.path));
     let mut points = match format {
-        Format::Ply => ply::read(input, &options, progress),
-        Format::Las => las::read(input, &options, progress),
-        Format::Obj => obj::read(input, &options, progress),
-        Format::E57 => read_e57(input, &options, progress),
-        Format::Pcd => read_pcd(input, &options, progress),
+        Format::Ply => ply::read(input, options, progress),
+        Format::Las => las::read(input, options, progress),
+        Format::Obj => obj::read(input, options, progress),
+        Format::E57 => read_e57(input, options, progress),
+        Format::Pcd => read_pcd(input, options, progress),
+        Format::Xyz => text::read(input, options, progress),
+        Format::Pts => text::read_pts(input, options, progress),
+        Format::Ptx => text::read_ptx(input, options, progress),
+        Format::Stl => stl::read(input, options, progress),
+        Format::Off => off::read(input, options, progress),
     }?;
     if format == Format::Obj {
-        dimensions::of_positions(&mut points, &options.wanted).map_err(|fault| fault.of(path))?;
+        dimensions::of_positions(&mut points, &options.wanted).map_err(|fault| fault.of(&path))?;
     }
     if format != Format::Las && points.faces.is_none() {
         points.notes.extend(degrees::hint_of(&name, &points.positions, None));
@@ -152,7 +170,7 @@ fn without(path: &Path, feature: &str) -> Error {
     Error::malformed(path, format!("this build does not read {format} files: build with '--features {feature}'"))
 }
 
-/// Reads the triangles of an OBJ or PLY file; see [`Input::open`].
+/// Reads the triangles of a file of [`Format::MESHES`]; see [`Input::open`].
 ///
 /// # Errors
 ///
@@ -171,6 +189,10 @@ pub fn read_mesh_with(path: &Path, options: ReadOptions, progress: &dyn Progress
     match input.format {
         Format::Obj => obj::read_mesh(input, &options, progress),
         Format::Ply => ply::read_mesh(input, &options, progress),
-        _ => Err(Error::malformed(&input.path, "only OBJ and PLY files are read as meshes; convert it to one")),
+        format if Format::MESHES.contains(&format) => Ok(Mesh::of_points(read_settled(input, &options, progress)?)),
+        _ => {
+            let what = format!("only {} files are read as meshes; convert it to one", Format::meshes_sentence());
+            Err(Error::malformed(&input.path, what))
+        }
     }
 }

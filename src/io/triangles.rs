@@ -2,6 +2,10 @@
 
 use glam::{DVec3, Vec3};
 
+use super::closed::is_closed;
+use super::points::Faces;
+use super::{Paint, Points};
+
 /// Factor on the covering radius, because a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;
 
@@ -65,9 +69,30 @@ impl<'a> Triangles<'a> {
     }
 }
 
+/// Makes `points` the vertices of a mesh with these triangles, colours and images. Vertices without
+/// normals or radii get them from their triangles; corners have the normals that vertices have in
+/// the file.
+pub(super) fn give_faces(points: &mut Points, triangles: Vec<[u32; 3]>, paint: Option<Box<Paint>>) {
+    let mut around = Triangles::new(&points.positions);
+    triangles.iter().for_each(|corners| around.add(corners.map(|corner| corner as usize), None));
+    let (normals, radii) = around.finish();
+    let closed = is_closed(&points.positions, &triangles);
+    points.closed = closed && points.normals.as_ref().is_none_or(|given| agree(given, &normals));
+    let named = points.normals.as_ref().map(|given| corners(&triangles, given));
+    points.normals.get_or_insert(normals);
+    points.of_mesh = points.radii.is_none() && points.axes.is_none();
+    points.radii.get_or_insert(radii);
+    points.faces = Some(Faces { triangles, normals: named, paint });
+}
+
+/// The attribute of the vertex at each corner of the triangles.
+pub(super) fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
+    triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
+}
+
 /// Whether each normal of `given` points to the same side as the vertex normal in `triangles`. A
 /// zero normal agrees with both sides.
-pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
+fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
     let side = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from_array(*a).dot(Vec3::from_array(*b));
     given.iter().zip(triangles).map(side).all(|side| side >= 0.0)
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::count::{Capacities, lacks};
 use crate::error::{Error, Result};
@@ -78,6 +79,10 @@ pub struct Receipt {
     pub passes: BTreeMap<String, f64>,
 }
 
+/// The longest time from the end of a frame's commands until its counts are told to be there, if
+/// another thread polls the device.
+const LATEST_CALLBACK: Duration = Duration::from_millis(500);
+
 impl Ticket {
     pub(super) fn new(gpu: &Gpu, verdict: &wgpu::Buffer, parts: Vec<(usize, (Part, u64))>, lessons: &Lessons) -> Self {
         Self { gpu: gpu.clone(), verdict: verdict.clone(), parts, lessons: Arc::clone(lessons) }
@@ -100,11 +105,20 @@ impl Ticket {
     /// [`Error::Usage`] if the frame's commands were not submitted, and errors of the device.
     pub fn read(mut self) -> Result<Receipt> {
         self.gpu.wait()?;
-        self.receipt()?.ok_or_else(|| {
-            Error::Usage(
-                "the commands of this frame were not submitted: submit the encoder before the ticket is read".into(),
-            )
-        })
+        let start = Instant::now();
+        // Another thread that polls the device may still be about to run the callback of this read.
+        loop {
+            if let Some(receipt) = self.receipt()? {
+                return Ok(receipt);
+            }
+            if start.elapsed() > LATEST_CALLBACK {
+                return Err(Error::Usage(
+                    "the commands of this frame were not submitted: submit the encoder before the ticket is read"
+                        .into(),
+                ));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     /// Returns what the frame counted if it was drawn already, without waiting; else None. Once it

@@ -28,9 +28,10 @@ impl Files {
     /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name.
     /// Nothing is read yet.
     ///
-    /// A file of a folder is readable if its extension is a format's name. Names with a leading dot
-    /// are skipped, as they are files that programs and systems store for themselves. Subfolders
-    /// are not searched. The path `-` is standard input.
+    /// A file of a folder is readable if its extension is a format's name; `.txt` and `.csv` files
+    /// also have to start as a table. Names with a leading dot are skipped, as they are files that
+    /// programs and systems store for themselves. Subfolders are not searched. The path `-` is
+    /// standard input.
     ///
     /// # Errors
     ///
@@ -225,13 +226,14 @@ impl FormatOptions {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if the format is neither obj nor ply, or an error of reading.
+    /// [`Error::Usage`] if the format holds no meshes, or an error of reading.
     pub fn mesh(&self, path: &Path, progress: &dyn Progress) -> Result<Mesh> {
         let format = self.input_format;
-        if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
-            return Err(Error::Usage(
-                "only obj and ply files can be read as meshes: choose one of them for --input-format".into(),
-            ));
+        if format.is_some_and(|format| !Format::MESHES.contains(&format)) {
+            return Err(Error::Usage(format!(
+                "only {} files can be read as meshes: choose one of them for --input-format",
+                Format::meshes_sentence()
+            )));
         }
         let options = ReadOptions { format, ignore_alpha: self.ignore_alpha, ..ReadOptions::default() };
         io::read_mesh_with(path, options, progress)
@@ -245,7 +247,8 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
             return false;
         }
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        path.is_file() && Format::READ.iter().any(|(name, _)| name.eq_ignore_ascii_case(extension))
+        let is_known = Format::READ.iter().any(|(name, _)| name.eq_ignore_ascii_case(extension));
+        path.is_file() && is_known && !io::text::is_other_text(path)
     };
     let listed = std::fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
     let mut files: Vec<PathBuf> = listed.map_err(|error| Error::read(folder, error))?;

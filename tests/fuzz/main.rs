@@ -33,9 +33,11 @@ mod packed;
 #[cfg(feature = "pcd")]
 mod pcd;
 mod ply;
+mod polygons;
 mod random;
 mod render;
 mod session;
+mod tables;
 
 use mutate::Grammar;
 use random::Random;
@@ -95,6 +97,26 @@ fn copc() {
 #[test]
 fn materials() {
     session::run(&materials::TARGET);
+}
+
+#[test]
+fn text() {
+    session::run(&tables::TEXT);
+}
+
+#[test]
+fn ptx() {
+    session::run(&tables::PTX);
+}
+
+#[test]
+fn stl() {
+    session::run(&polygons::STL);
+}
+
+#[test]
+fn off() {
+    session::run(&polygons::OFF);
 }
 
 #[test]

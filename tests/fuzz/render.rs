@@ -6,9 +6,12 @@ use epsplat::io::{Points, ReadOptions, Wanted};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::plan::Settings;
 use epsplat::low_level::render::{Backend, render};
-use epsplat::low_level::scene::{Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian};
+use epsplat::low_level::scene::{
+    Bounds, Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian,
+};
 use epsplat::low_level::surfels::{LARGEST_COORDINATE, build};
 use epsplat::{Error, io};
+use glam::DVec3;
 use std::path::Path;
 
 /// Scenes with more points are not drawn: a small damaged file can describe very many.
@@ -38,7 +41,7 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     // Gaussians may lack attributes that cannot be estimated.
     let drawable = points.positions.iter().any(usable) && !points.encoded;
     // In narrower scenes, products of half-axes underflow f32.
-    let narrow = epsplat::low_level::surfels::bounds(&points).extent().max_element() < 1e-15;
+    let narrow = extent(&points) < 1e-15;
     let (scene, _) = match build(vec![points], &()) {
         Ok(built) => built,
         Err(error @ Error::EmptyScene(_)) if !drawable || narrow => {
@@ -62,6 +65,20 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     }
     draw(&scene, &camera, &shaded(Shading::Lambert))?;
     draw(&scene, &camera, &shaded(Shading::Unlit))
+}
+
+/// The largest side of the box of the points or, for a mesh, of its triangles that have an area.
+fn extent(points: &Points) -> f64 {
+    let Some(faces) = &points.faces else {
+        return epsplat::low_level::surfels::bounds(points).extent().max_element();
+    };
+    let place = |vertex: u32| DVec3::from_array(points.positions[vertex as usize]);
+    let corners = faces.triangles.iter().map(|triangle| triangle.map(place));
+    let has_area = |[a, b, c]: &[DVec3; 3]| {
+        let usable = [a, b, c].iter().all(|p| p.abs().max_element() <= LARGEST_COORDINATE);
+        usable && (*b - *a).cross(*c - *a).length() > 0.0
+    };
+    corners.filter(has_area).flatten().fold(Bounds::EMPTY, Bounds::with_point).extent().max_element()
 }
 
 /// Reads all attributes of a file whose `points` were read without them, and one of them for each

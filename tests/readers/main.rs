@@ -15,6 +15,7 @@ mod las_forms;
 mod las_headers;
 mod mesh;
 mod obj;
+mod off;
 #[cfg(feature = "pcd")]
 mod pcd;
 mod ply;
@@ -23,6 +24,8 @@ mod ply_damage;
 #[path = "../common/random.rs"]
 mod random;
 mod ranges;
+mod stl;
+mod text;
 
 use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};
@@ -124,20 +127,16 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
     }
     assert_eq!(folder.read("a.Obj", b"v 1 2 3").unwrap().positions.len(), 1);
     for unknown in [&b""[..], b"pl", b"plyx", b"v 1 2 3"] {
-        let said = folder.refusal("a.xyz", unknown);
-        let (e57, pcd) = (cfg!(feature = "e57"), cfg!(feature = "pcd"));
-        let formats = match (e57, pcd) {
-            (false, false) => "PLY, LAS, LAZ and OBJ",
-            (true, false) => "PLY, LAS, LAZ, OBJ and E57",
-            (false, true) => "PLY, LAS, LAZ, OBJ and PCD",
-            (true, true) => "PLY, LAS, LAZ, OBJ, E57 and PCD",
-        };
+        let said = folder.refusal("a.dat", unknown);
+        let optional = ["E57", "PCD"].into_iter().zip([cfg!(feature = "e57"), cfg!(feature = "pcd")]);
+        let optional: String = optional.filter(|(_, is_read)| *is_read).map(|(name, _)| format!("{name}, ")).collect();
+        let formats = format!("PLY, LAS, LAZ, OBJ, {optional}XYZ, TXT, CSV, ASC, PTS, PTX, STL and OFF");
         let expected =
             format!("its format is not known: {formats} files are read; if it is one, name it by --input-format");
         assert_eq!(said, expected);
     }
     let obj = ReadOptions { format: Some(Format::Obj), ..ReadOptions::default() };
-    assert_eq!(io::read_with(&folder.path("a.xyz"), obj.clone(), &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
+    assert_eq!(io::read_with(&folder.path("a.dat"), obj.clone(), &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
     // An explicit format takes precedence over the file name.
     folder.read("a.laz", &laz).unwrap();
     assert!(io::read_with(&folder.path("a.laz"), ReadOptions { format: Some(Format::Ply), ..obj }, &()).is_err());

@@ -178,7 +178,8 @@ fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
 fn the_help_names_the_formats_that_are_read() {
     for command in ["info", "render", "surfels", "simplify", "coverage"] {
         let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
-        let formats = [("ply", true), ("las", true), ("laz", true), ("obj", true)];
+        let formats =
+            [("ply", true), ("las", true), ("laz", true), ("obj", true), ("csv", true), ("ptx", true), ("stl", true)];
         let optional = [("e57", cfg!(feature = "e57")), ("pcd", cfg!(feature = "pcd"))];
         for (format, is_read) in formats.into_iter().chain(optional) {
             let words = help.split(|c: char| c.is_whitespace() || ",;]".contains(c));

@@ -5,10 +5,10 @@ use std::fs::File;
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use super::encoding;
 use super::library::{ColorMap, Definition, color_map, definitions, first_word};
 use crate::Result;
 use crate::io::beside::Beside;
+use crate::io::encoding;
 use crate::io::input::check_regular;
 use crate::io::textures::Images;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line, shown};

@@ -1,7 +1,6 @@
 //! Wavefront OBJ, read as points or as a mesh. Points are the vertices, with normals and radii from
 //! the faces.
 
-mod encoding;
 mod faces;
 mod library;
 mod lines;
@@ -9,6 +8,7 @@ mod material;
 
 use crate::io::about::About;
 use crate::io::closed::is_closed;
+use crate::io::encoding;
 use crate::io::fault::{self, Fault};
 use crate::io::points::Faces;
 use crate::io::triangles::Triangles;

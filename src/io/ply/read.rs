@@ -11,9 +11,9 @@ use crate::io::dimensions::of_positions;
 use crate::io::fault::{self, Fault};
 use crate::io::input::check_regular;
 use crate::io::textures::Images;
+use crate::io::triangles::{corners, give_faces};
 use crate::io::values::shown;
 use crate::io::{Input, Material, Mesh, Paint, Points, ReadOptions, settle_colors};
-use crate::io::{closed, triangles};
 use crate::scene::{Colors, Whole};
 use crate::{Progress, Result};
 use std::fs::File;
@@ -65,15 +65,6 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         return Ok(points);
     }
     choose_colors(&mut points, &mut faces);
-    let mut triangles = triangles::Triangles::new(&points.positions);
-    faces.triangles.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
-    let (normals, radii) = triangles.finish();
-    let closed = closed::is_closed(&points.positions, &faces.triangles);
-    points.closed = closed && points.normals.as_ref().is_none_or(|given| triangles::agree(given, &normals));
-    let named = points.normals.as_ref().map(|given| corners(&faces.triangles, given));
-    points.normals.get_or_insert(normals);
-    points.of_mesh = points.radii.is_none() && points.axes.is_none();
-    points.radii.get_or_insert(radii);
     // Triangles get the texture coordinates of vertices only if the file names images or its faces
     // have colours. Otherwise only the points have them, for any image.
     let is_painted = !textures.is_empty() || faces.texture.is_some() || faces.colors.is_some();
@@ -89,7 +80,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     }
     let paint = Paint::of(&mesh).map(Box::new);
     points.notes.append(&mut mesh.notes);
-    points.faces = Some(crate::io::points::Faces { triangles: mesh.triangles, normals: named, paint });
+    give_faces(&mut points, mesh.triangles, paint);
     Ok(points)
 }
 
@@ -133,11 +124,6 @@ pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -
     };
     paint(&mut mesh, &path, textures, faces.texture_numbers)?;
     Ok(mesh)
-}
-
-/// The attribute of the vertex at each corner of the triangles.
-fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
-    triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
 }
 
 /// Keeps either the colours of vertices or those of faces. Colours of vertices are finer, so they

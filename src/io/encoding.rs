@@ -1,4 +1,4 @@
-//! OBJ and MTL files in UTF-16, which some programs for Windows write.
+//! Text files in UTF-16, which some programs for Windows write.
 
 use std::io::{self, BufRead, Cursor, Read};
 

@@ -124,6 +124,10 @@ fn own_surfels(inputs: &[Points], scene: &scene::Scene) -> Vec<Vec<u32>> {
     own
 }
 
+/// The largest difference between the depths of a vertex and of the surface at the centre of its
+/// pixel, in widths of the pixel: that of a surface 80 degrees aslant.
+const STEEPEST: f64 = 6.0;
+
 /// A camera and what it sees.
 struct Eye<'a> {
     camera: &'a Camera,
@@ -135,16 +139,22 @@ struct Eye<'a> {
 impl Eye<'_> {
     /// Adds 1 to the count of each point that is seen; returns the number of these points.
     fn count(&self, points: &Points, (scene, own): (&scene::Scene, &[u32]), counts: &mut [u32]) -> u64 {
-        let points = points.positions.par_iter().zip(own).zip(counts);
-        let seen = points.map(|((position, own), count)| {
-            let seen = self.sees(DVec3::from_array(*position), scene.surfels.get(*own as usize));
+        let normal = |index: usize| {
+            let normal = points.normals.as_ref().and_then(|normals| normals.get(index));
+            normal.map(|normal| DVec3::from_array(normal.map(f64::from)))
+        };
+        let points = points.positions.par_iter().zip(own).zip(counts).enumerate();
+        let seen = points.map(|(index, ((position, own), count))| {
+            let seen = self.sees(DVec3::from_array(*position), scene.surfels.get(*own as usize), normal(index));
             *count += u32::from(seen);
             u64::from(seen)
         });
         seen.sum()
     }
 
-    fn sees(&self, point: DVec3, own: Option<&Surfel>) -> bool {
+    /// Whether the point is seen: its depth, or that of its own surfel or of the plane across its
+    /// `normal` at the centre of its pixel, is within epsilon of the nearest one.
+    fn sees(&self, point: DVec3, own: Option<&Surfel>, normal: Option<DVec3>) -> bool {
         let camera = self.camera;
         let at = camera.to_camera(point);
         let along = match camera.projection {
@@ -165,15 +175,21 @@ impl Eye<'_> {
             (None, Epsilon::Bounded { .. }) => f64::INFINITY,
             (None, _) => 0.0,
         };
-        let depth = own.map_or(at.z, |own| self.depth_at(point, at.z, own, (x, y)));
+        let plane = match (own, normal) {
+            (Some(own), _) => {
+                let [s, t] = [own.s, own.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+                Some((s.cross(t), s.length().max(t.length())))
+            }
+            // A vertex stands for the triangles around it, within the steepest slope that counts.
+            (None, normal) => normal.map(|normal| (normal, STEEPEST * along.abs() / camera.fx.min(camera.fy))),
+        };
+        let depth = plane.map_or(at.z, |plane| self.depth_at((point, at.z), plane, (x, y)));
         depth <= self.epsilon.farthest((*nearest).into(), radius, camera.along_axis(x, y))
     }
 
-    /// The depth of a point's disk on the ray through the centre of a pixel; at most a longer
-    /// half-axis from the point's own depth.
-    fn depth_at(&self, point: DVec3, depth: f64, own: &Surfel, (x, y): (u32, u32)) -> f64 {
-        let [s, t] = [own.s, own.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-        let (normal, longer) = (s.cross(t), s.length().max(t.length()));
+    /// The depth of the plane through a point, across `normal`, on the ray through the centre of a
+    /// pixel; at most `longer` from the point's own depth.
+    fn depth_at(&self, (point, depth): (DVec3, f64), (normal, longer): (DVec3, f64), (x, y): (u32, u32)) -> f64 {
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
         let there = normal.dot(point - self.camera.ray_start(x, y)) / normal.dot(self.camera.ray(x, y));
         if there.is_finite() { there.clamp(depth - longer, depth + longer) } else { depth }

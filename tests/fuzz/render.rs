@@ -67,7 +67,8 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     draw(&scene, &camera, &shaded(Shading::Unlit))
 }
 
-/// The largest side of the box of the points or, for a mesh, of its triangles that have an area.
+/// The largest side of the box of the points or, for a mesh, of its triangles that are no slivers:
+/// slivers may be left out.
 fn extent(points: &Points) -> f64 {
     let Some(faces) = &points.faces else {
         return epsplat::low_level::surfels::bounds(points).extent().max_element();
@@ -76,7 +77,8 @@ fn extent(points: &Points) -> f64 {
     let corners = faces.triangles.iter().map(|triangle| triangle.map(place));
     let has_area = |[a, b, c]: &[DVec3; 3]| {
         let usable = [a, b, c].iter().all(|p| p.abs().max_element() <= LARGEST_COORDINATE);
-        usable && (*b - *a).cross(*c - *a).length() > 0.0
+        let (p, q) = (*b - *a, *c - *a);
+        usable && p.cross(q).length() > 1e-12 * p.length_squared().max(q.length_squared())
     };
     corners.filter(has_area).flatten().fold(Bounds::EMPTY, Bounds::with_point).extent().max_element()
 }

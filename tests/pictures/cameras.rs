@@ -218,7 +218,7 @@ fn sets_that_cannot_be_rendered_end_in_a_sentence() {
     std::fs::create_dir(&empty).unwrap();
     render(&empty, &[], 1, &["cameras.txt"]);
     std::fs::write(empty.join("cameras.bin"), "").unwrap();
-    render(&empty, &[], 1, &["text", "model_converter"]);
+    render(&empty, &[], 1, &["cameras.bin", "it ends before"]);
     assert!(!output.exists());
 
     // `--ignore-distortion` leaves distortion out, and a note says so.

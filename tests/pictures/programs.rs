@@ -201,7 +201,7 @@ fn a_damaged_binary_model_ends_in_one_sentence() {
     let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 1, "0 0 0 0 0 1 1\n"));
     let (views, project) = (folder.path("views"), folder.path(""));
     let line = ["render", text(&cloud), "-o", text(&views), "--cameras", text(&project)];
-    fails(&line, 1, &["images.bin", "image 1 of 2: "]);
+    fails(&line, 1, &["images.bin", "it announces 2 images, but 91 bytes follow"]);
 }
 
 /// The same camera in the files of four programs.

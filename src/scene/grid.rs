@@ -53,8 +53,8 @@ pub struct Grid {
 
 impl Grid {
     /// Returns the grid of pixels of the size `pixel` over `bounds` (xmin, ymin, xmax, ymax; by
-    /// default those of `data`, or else of the scene's body), extended to whole pixels. `data` is the
-    /// box of all points if `scene` is an overview of them, world units.
+    /// default those of `data`, or else of the scene's body), extended to whole pixels. `data` is
+    /// the box of all points if `scene` is an overview of them, world units.
     ///
     /// # Errors
     ///

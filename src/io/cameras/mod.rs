@@ -58,10 +58,13 @@ impl fmt::Display for Distortion {
     }
 }
 
+/// Reads the cameras of a JSON file, given the default size of pictures.
+type ReadJson = fn(&Value, (u32, u32)) -> Result<Vec<NamedCamera>, String>;
+
 /// A kind of JSON file: a test of its content, and its reader, which gets the default size.
 struct Kind {
     is: fn(&Value) -> bool,
-    read: fn(&Value, (u32, u32)) -> Result<Vec<NamedCamera>, String>,
+    read: ReadJson,
 }
 
 /// All kinds of JSON files. The first one that fits is taken.

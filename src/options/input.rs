@@ -24,6 +24,8 @@ pub struct FormatOptions {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
 #[cfg_attr(feature = "cli", command(next_help_heading = "Input"))]
+// Brackets in help texts hold ranges, not links.
+#[allow(rustdoc::broken_intra_doc_links)]
 pub struct InputOptions {
     /// The format of the files, and attributes to ignore.
     #[cfg_attr(feature = "cli", command(flatten))]

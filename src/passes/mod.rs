@@ -23,7 +23,8 @@
 //! | [`resolve`], [`join`] | sums, shaded triangles | [`Frame`] |
 //! | [`layers`], [`sorted`] | fragment lists | [`Frame`] |
 //!
-//! [`eye_dome`] filters the finished frame. [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
+//! [`eye_dome`] filters the finished frame.
+//! [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the
 //! [`lowpass`] that [`project`] prepared and the [`attributes`] to blend. It also chooses the file

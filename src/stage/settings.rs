@@ -82,7 +82,9 @@ impl Request<'_> {
         // With layers, meshes of the inputs are drawn as surfels.
         let turns_to_surfels = self.triangles().mesh.is_none() && self.triangles().meshes.is_empty();
         let can = (!scene.triangles.is_empty() && turns_to_surfels) || layers_can_be_drawn();
-        !chosen && (settings.opacity < 1.0 || scene.color_range().0[3] < 1.0) && can
+        let of_triangles = scene.triangles.colors().as_flattened().iter().any(|[.., alpha]| *alpha < 1.0);
+        let of_surfels = !scene.surfels.is_empty() && scene.color_range().0[3] < 1.0;
+        !chosen && (settings.opacity < 1.0 || of_surfels || of_triangles) && can
     }
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {

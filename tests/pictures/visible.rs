@@ -41,10 +41,11 @@ fn truth(camera: &Camera, cast: Cast, point: DVec3, normal: DVec3) -> Option<boo
     {
         return None;
     }
-    // Surfaces that are apart by more than 3 % of the depth hide each other.
+    // The default tolerance is 1 % of the depth, or a radius of about 0.7 % of it: surfaces that are
+    // about so far apart decide nothing.
     let hides = |dx: f64, dy: f64| {
-        let hit = cast(camera.eye, camera.ray(x + dx, y + dy))?;
-        Some(hit < 0.97 * depth)
+        let hit = cast(camera.eye, camera.ray(x + dx, y + dy))? / depth;
+        (!(0.985..0.995).contains(&hit)).then_some(hit < 0.985)
     };
     let seen = hides(0.0, 0.0)?;
     let around = [(-2.0, 0.0), (2.0, 0.0), (0.0, -2.0), (0.0, 2.0), (-1.4, -1.4), (1.4, 1.4), (-1.4, 1.4), (1.4, -1.4)];

@@ -98,8 +98,8 @@ const READ: &str = "its kind is not known; cameras are a transforms.json, a list
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) if the system cannot read,
-/// [`Error::Malformed`](crate::Error::Malformed) if a file violates its format, a lens is not a
+/// [`Error::Read`] if the system cannot read,
+/// [`Error::Malformed`] if a file violates its format, a lens is not a
 /// pinhole even without its distortion, there is no camera, or two have the same name.
 pub fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
     let (path, cameras) = if path.is_dir() { colmap::read(path)? } else { (path.to_owned(), of_file(path, size)?) };

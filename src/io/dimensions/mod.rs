@@ -2,7 +2,7 @@
 //! them or to select points. PDAL calls them dimensions.
 //!
 //! A reader lists the attributes that its file has and passes the numbers of each point to a
-//! [`Collector`], which stores one attribute, tests the conditions, and finds ranges. A file that
+//! `Collector`, which stores one attribute, tests the conditions, and finds ranges. A file that
 //! is read without such options has no collector.
 
 mod class_list;

@@ -89,7 +89,7 @@ fn check(name: &str, inputs: &[Points], cast: Cast, cameras: &[Camera]) {
     let aside = (cameras[0].eye - cameras[1].eye) * 0.5;
     let [shifted, found] = measured(inputs, cast, cameras, None, aside);
     eprintln!("{name}: controls {through:.4}, {shifted:.4} and {found:.4}");
-    assert!(through < 0.9 && shifted.min(found) < 0.97, "{name}: {through} {shifted} {found}");
+    assert!(through < 0.9 && shifted.min(found) < 0.98, "{name}: {through} {shifted} {found}");
 }
 
 #[test]

@@ -50,8 +50,8 @@ fn unit_or_less(long: vec3<f32>) -> vec3<f32> {
 }
 
 // The normal by which a triangle is lit. An interpolated normal may point away from the viewer
-// although its facet, seen aslant, shows the viewer the same side; then it is turned to the horizon,
-// where a headlight is dark. Otherwise it would be lit as if the other side were seen.
+// although its facet, seen aslant, shows the viewer the same side; then it is turned to the
+// horizon, where a headlight is dark. Otherwise it would be lit as if the other side were seen.
 fn within_horizon(normal: vec3<f32>, facet: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {
     let facing = dot3(normal, toward_eye);
     if (facing * dot3(facet, toward_eye) * dot3(facet, normal) >= 0.0) {

@@ -41,8 +41,8 @@ fn truth(camera: &Camera, cast: Cast, point: DVec3, normal: DVec3) -> Option<boo
     {
         return None;
     }
-    // The default tolerance is 1 % of the depth, or a radius of about 0.7 % of it: surfaces that are
-    // about so far apart decide nothing.
+    // The default tolerance is 1 % of the depth, or a radius of about 0.7 % of it: surfaces that
+    // are about so far apart decide nothing.
     let hides = |dx: f64, dy: f64| {
         let hit = cast(camera.eye, camera.ray(x + dx, y + dy))? / depth;
         (!(0.985..0.995).contains(&hit)).then_some(hit < 0.985)

@@ -123,7 +123,11 @@ fn a_pipe_that_ends_early_or_holds_no_cloud_is_one_sentence() {
     #[cfg(target_os = "linux")]
     only_line(&epsplat(&["info", "/dev/zero"]), 1);
     fails(&["info", "a.ply", "--input-format", "png"], 2, &["--input-format", "ply"]);
-    fails(&["sample", "a.obj", "--input-format", "las", "--count", "1", "-o", "a.ply"], 2, &["only PLY, OBJ, STL and OFF files"]);
+    fails(
+        &["sample", "a.obj", "--input-format", "las", "--count", "1", "-o", "a.ply"],
+        2,
+        &["only PLY, OBJ, STL and OFF files"],
+    );
 }
 
 #[test]

@@ -148,14 +148,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let about = points.about.take().map(|about| *about).unwrap_or_default();
     let beside = points.beside.clone();
     if let Some(triangles) = beside.clone().filter(|_| points.positions.is_empty()) {
-        return match &arguments.json {
-            Some(path) => write_json(path, &TrianglesAlone { points: 0, triangles }),
-            None => print(&format!(
-                "{}\n  points    none: `epsplat render` draws only the triangles of {}\n",
-                arguments.input.display(),
-                triangles.display()
-            )),
-        };
+        return tell_triangles(arguments, triangles);
     }
     let attributes = std::mem::take(&mut points.spans);
     let bounds = surfels::bounds(&points);
@@ -210,6 +203,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.json {
         Some(path) => write_json(path, &info),
         None => print(&table(&arguments.input, &info)),
+    }
+}
+
+/// Writes that the input has no points, but names a mesh.
+fn tell_triangles(arguments: &Arguments, triangles: PathBuf) -> Result<()> {
+    match &arguments.json {
+        Some(path) => write_json(path, &TrianglesAlone { points: 0, triangles }),
+        None => print(&format!(
+            "{}\n  points    none: `epsplat render` draws only the triangles of {}\n",
+            arguments.input.display(),
+            triangles.display()
+        )),
     }
 }
 

@@ -1,18 +1,21 @@
 //! E57 (ASTM E2807), the format of terrestrial laser scanners, read by the `e57` crate.
 
+mod records;
+
 use std::fs::File;
 use std::io::{self, BufReader};
 
-use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
-use glam::{DQuat, DVec3};
+use ::e57::{E57Reader, PointCloud, RecordDataType, RecordName};
+use glam::DVec3;
 
 use crate::io::about::{About, Attribute, Role};
-use crate::io::color_range::{Kind, Number, Numbers, RawColors, Run, Shades, Values};
+use crate::io::color_range::{Numbers, RawColors, Run, Shades, Values};
 use crate::io::dimensions::Collector;
 use crate::io::fault::{self, Fault, Unread, reserve, surviving};
 use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
+use records::{Place, color, index, kind, normal, number, pose};
 
 /// The most attributes of a scan that is read.
 const MOST_ATTRIBUTES: usize = 64;
@@ -204,46 +207,6 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// Indices of a scan's coordinate attributes, and of the attribute that marks invalid points.
-#[derive(Clone, Copy)]
-struct Place {
-    spherical: bool,
-    axes: [usize; 3],
-    invalid: Option<usize>,
-}
-
-impl Place {
-    fn of(scan: &PointCloud) -> Option<Self> {
-        let cartesian = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
-        let spherical = [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
-        if let Some(axes) = triple(scan, &cartesian) {
-            let invalid = index(scan, &RecordName::CartesianInvalidState);
-            return Some(Self { spherical: false, axes, invalid });
-        }
-        let axes = triple(scan, &spherical)?;
-        Some(Self { spherical: true, axes, invalid: index(scan, &RecordName::SphericalInvalidState) })
-    }
-}
-
-fn index(scan: &PointCloud, name: &RecordName) -> Option<usize> {
-    scan.prototype.iter().position(|record| record.name == *name)
-}
-
-/// Indices of the normal attributes of the extension `nor` (E57_EXT_surface_normals), under any
-/// namespace prefix.
-fn normal(scan: &PointCloud) -> Option<[usize; 3]> {
-    let named = |wanted: &str| {
-        let is = |name: &RecordName| matches!(name, RecordName::Unknown { name, .. } if name == wanted);
-        scan.prototype.iter().position(|record| is(&record.name))
-    };
-    Some([named("normalX")?, named("normalY")?, named("normalZ")?])
-}
-
-fn triple(scan: &PointCloud, names: &[RecordName; 3]) -> Option<[usize; 3]> {
-    let [a, b, c] = names.each_ref().map(|name| index(scan, name));
-    Some([a?, b?, c?])
-}
-
 /// The points of a file while it is being read.
 #[derive(Default)]
 struct Reading {
@@ -313,13 +276,8 @@ impl Reading {
                 self.left_out.push((self.positions.len() + self.left_out.len()) as u64);
                 continue;
             }
-            let [a, b, c] = [number(place.axes[0])?, number(place.axes[1])?, number(place.axes[2])?];
-            let local = if place.spherical {
-                let (range, azimuth, elevation) = (a, b, c);
-                range * DVec3::new(elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin())
-            } else {
-                DVec3::new(a, b, c)
-            };
+            let [a, b, c] = place.axes;
+            let local = place.local([number(a)?, number(b)?, number(c)?]);
             let position = (rotation * local + translation).to_array();
             if let Some(collector) = &mut self.collector {
                 // A scan without the attribute gives none.
@@ -400,67 +358,5 @@ impl Looks {
             Shades::Floats { values: self.intensities, integer }
         });
         Run { count, colors, shades }
-    }
-}
-
-/// Indices of a scan's red, green and blue.
-fn color(scan: &PointCloud) -> Option<[usize; 3]> {
-    triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue])
-}
-
-/// The kind of a scan's colour numbers.
-fn kind(scan: &PointCloud, color: [usize; 3]) -> Kind {
-    let of_record = |at: usize| match scan.prototype.get(at).map(|record| &record.data_type) {
-        Some(RecordDataType::Integer { min, max }) => Number::Integer(max.abs_diff(*min)),
-        _ => Number::Float,
-    };
-    let number = if color.map(of_record).contains(&Number::Float) { Number::Float } else { of_record(color[0]) };
-    Kind { limits: limits(scan, color), ..Kind::of(number) }
-}
-
-/// The rotation and translation from a scan's coordinates to the file's.
-fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
-    let Some(pose) = &scan.transform else { return Ok((DQuat::IDENTITY, DVec3::ZERO)) };
-    let (q, t) = (&pose.rotation, &pose.translation);
-    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
-    let length = rotation.length();
-    if !(0.99..=1.01).contains(&length) {
-        return Err(Fault::Malformed(format!("the quaternion of a scan's pose has the length {length}, not 1")));
-    }
-    Ok((rotation.normalize(), DVec3::new(t.x, t.y, t.z)))
-}
-
-/// The smallest and largest value of each colour channel: those that the scan states, or else those
-/// of its integer type. None if a channel has neither.
-fn limits(scan: &PointCloud, color: [usize; 3]) -> Option<[(f64, f64); 3]> {
-    let limits = scan.color_limits.as_ref();
-    let given = [
-        limits.map(|limits| (&limits.red_min, &limits.red_max)),
-        limits.map(|limits| (&limits.green_min, &limits.green_max)),
-        limits.map(|limits| (&limits.blue_min, &limits.blue_max)),
-    ];
-    let of_channel = |channel: usize| {
-        let Record { data_type, .. } = scan.prototype.get(color[channel])?;
-        if let Some((Some(low), Some(high))) = given[channel]
-            && let (Ok(low), Ok(high)) = (low.to_f64(data_type), high.to_f64(data_type))
-            && low < high
-        {
-            return Some((low, high));
-        }
-        match *data_type {
-            RecordDataType::Integer { min, max } if min < max => Some((min as f64, max as f64)),
-            RecordDataType::ScaledInteger { min, max, scale, offset } if min < max && scale > 0.0 => {
-                Some((min as f64 * scale + offset, max as f64 * scale + offset))
-            }
-            _ => None,
-        }
-    };
-    Some([of_channel(0)?, of_channel(1)?, of_channel(2)?])
-}
-
-fn number(values: &[RecordValue], prototype: &[Record], at: usize) -> Result<f64, Fault> {
-    match (values.get(at), prototype.get(at)) {
-        (Some(value), Some(record)) => value.to_f64(&record.data_type).map_err(of_e57),
-        _ => Err(Fault::Malformed("a point lacks an attribute that its scan has".into())),
     }
 }

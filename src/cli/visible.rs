@@ -1,6 +1,6 @@
 //! `epsplat visible`: writes the points that cameras see.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::io::cameras;
@@ -101,9 +101,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let views = names.into_iter().zip(visible.points).map(|(name, points)| Seen { name, points }).collect();
         write_json(path, &Report { points: all, written, views })?;
     }
-    let by = if arguments.least == 1 { String::new() } else { format!(" in at least {} views", arguments.least) };
     let (count, output) = (views.len(), arguments.output.display());
-    note(&format!("{output}: {written} of {all} points are seen{by}, of {count} views"));
+    let of = if count == 1 { "1 view".into() } else { format!("{count} views") };
+    note(&format!("{output}: {written} of {all} points are seen by at least {} of {of}", arguments.least));
     Ok(())
 }
 
@@ -112,7 +112,8 @@ fn views(arguments: &Arguments) -> Result<(Vec<String>, Vec<View>)> {
     let options = CameraOptions { size: arguments.size, ..CameraOptions::default() };
     let cameras = arguments.lens.read(&arguments.cameras, arguments.size)?;
     let view = |camera: cameras::NamedCamera| {
-        let view = View::of_file(&options, camera.camera, &arguments.cameras, arguments.lens.scale)?;
+        let view = View::of_file(&options, camera.camera, &arguments.cameras, arguments.lens.scale)
+            .map_err(|error| error.of_view(Path::new(&camera.name)))?;
         Ok((camera.name, view))
     };
     let views: Vec<(String, View)> = cameras.into_iter().map(view).collect::<Result<_>>()?;

@@ -1,7 +1,8 @@
 //! Names of point attributes that programs write in PLY and PCD files.
 //!
 //! These programs write the names, or recognise them when reading: PDAL (`normalx`, `intensity`,
-//! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field), the Point Cloud
+//! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field, `Rf` for the red of
+//! colours that are fractions), ParaView (`Normals:0`, `RGB_0`), the Point Cloud
 //! Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D (`normal_x` and `rgb` in PCD), MeshLab
 //! (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
 //! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`) and 3D Gaussian splatting
@@ -34,6 +35,9 @@ pub(super) const COLOR: [&[&str]; 3] = [
         "col_r",
         "col.r",
         "ambient_red",
+        "Rf",
+        "RGB:0",
+        "RGB_0",
     ],
     &[
         "green",
@@ -57,6 +61,9 @@ pub(super) const COLOR: [&[&str]; 3] = [
         "col_g",
         "col.g",
         "ambient_green",
+        "Gf",
+        "RGB:1",
+        "RGB_1",
     ],
     &[
         "blue",
@@ -80,12 +87,15 @@ pub(super) const COLOR: [&[&str]; 3] = [
         "col_b",
         "col.b",
         "ambient_blue",
+        "Bf",
+        "RGB:2",
+        "RGB_2",
     ],
 ];
 
 /// Names of the opacity beside a colour.
 pub(super) const ALPHA: &[&str] =
-    &["alpha", "a", "diffuse_alpha", "color_alpha", "color_a", "rgba_a", "col_a", "vertex_alpha"];
+    &["alpha", "a", "diffuse_alpha", "color_alpha", "color_a", "rgba_a", "col_a", "vertex_alpha", "Af"];
 
 /// Names of the components of a normal.
 pub(super) const NORMAL: [&[&str]; 3] = [
@@ -104,6 +114,8 @@ pub(super) const NORMAL: [&[&str]; 3] = [
         "N.x",
         "N[0]",
         "Nx",
+        "Normals:0",
+        "Normals_0",
     ],
     &[
         "ny",
@@ -120,6 +132,8 @@ pub(super) const NORMAL: [&[&str]; 3] = [
         "N.y",
         "N[1]",
         "Ny",
+        "Normals:1",
+        "Normals_1",
     ],
     &[
         "nz",
@@ -136,6 +150,8 @@ pub(super) const NORMAL: [&[&str]; 3] = [
         "N.z",
         "N[2]",
         "Nz",
+        "Normals:2",
+        "Normals_2",
     ],
 ];
 
@@ -179,14 +195,25 @@ pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Cl
 pub(super) fn find_triple<'a>(names: [&[&str]; 3], given: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
     // Three names of one spelling take precedence: a file with `nx ny nz` may also have a
     // `normal_x` that means something else.
-    let alike = (0..names[0].len()).find_map(|k| {
-        let one = |channel: usize| find(names[channel].get(k..=k)?, given.clone());
-        Some([one(0)?, one(1)?, one(2)?])
-    });
+    let spelling = |k: usize| [0, 1, 2].map(|channel| names[channel].get(k).copied().unwrap_or_default());
+    let alike = (0..names[0].len()).find_map(|k| find_spelling(spelling(k), given.clone()));
     alike.or_else(|| {
         let one = |channel: usize| find(names[channel], given.clone());
         Some([one(0)?, one(1)?, one(2)?])
     })
+}
+
+/// The indices of three attributes with these names. Names of one case take precedence, which is
+/// that of `names`, capitals or small letters.
+pub(super) fn find_spelling<'a>(names: [&str; 3], given: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
+    let one = |name: String| given.clone().position(|given| given == name);
+    let of_case = |case: fn(&str) -> String| {
+        let [a, b, c] = names.map(|name| one(case(name)));
+        Some([a?, b?, c?])
+    };
+    let any = |name: &str| find(&[name], given.clone());
+    let cases: [fn(&str) -> String; 3] = [str::to_owned, str::to_ascii_uppercase, str::to_ascii_lowercase];
+    cases.into_iter().find_map(of_case).or_else(|| Some([any(names[0])?, any(names[1])?, any(names[2])?]))
 }
 
 #[cfg(test)]
@@ -219,6 +246,10 @@ mod tests {
         }
         assert_eq!(triple(NORMAL, &["normal_x", "nx", "ny", "nz"]), Some([1, 2, 3]));
         assert_eq!(triple(COLOR, &["red", "green"]), None);
+        assert_eq!(triple(COLOR, &["Rf", "Gf", "Bf", "Af"]), Some([0, 1, 2]));
+        // One spelling for all three.
+        assert_eq!(triple(COLOR, &["R", "G", "B", "r", "g"]), Some([0, 1, 2]));
+        assert_eq!(triple(COLOR, &["R", "g", "B"]), Some([0, 1, 2]));
         assert_eq!(find(INTENSITY, ["Intensity", "intensity"].into_iter()), Some(1));
         assert_eq!(find(INTENSITY, ["scalar_Intensity_(mW)"].into_iter()), None);
     }

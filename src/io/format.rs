@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
+use super::off;
 use super::values::BYTE_ORDER_MARK;
 
 /// A format of points or meshes.
@@ -142,7 +143,7 @@ impl Format {
         let word_end = text.iter().position(|byte| !byte.is_ascii_alphabetic()).unwrap_or(text.len());
         match &text[..word_end] {
             b"solid" => return Some(Self::Stl),
-            b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" => return Some(Self::Off),
+            word if off::is_first_word(word) => return Some(Self::Off),
             _ => {}
         }
         let comment = text.strip_prefix(b"#").unwrap_or_default().trim_ascii_start();

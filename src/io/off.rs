@@ -1,5 +1,6 @@
 //! OFF, the format of Geomview: vertices, polygons, and colours of either.
 
+use std::fmt;
 use std::io::BufReader;
 
 use glam::DVec3;
@@ -17,9 +18,11 @@ use crate::{Progress, Result};
 /// Reads the vertices and polygons of an OFF file in text.
 ///
 /// The first word says what vertices have beside their coordinates: `N` normals, `C` colours and
-/// `ST` texture coordinates, as in `CNOFF`. Three or four numbers after the corners of a polygon
-/// are its colour, which counts where vertices have none. Colours are sRGB codes of 255 if all are
-/// whole, else shares of 1. Polygons are cut into triangles. Comments start with `#`.
+/// `ST` texture coordinates, as in `CNOFF`, in any order. Normals precede colours, but MeshLab's
+/// library writes `NCOFF` with colours first; the order that leaves normals of unit length is
+/// taken. Three or four numbers after the corners of a polygon are its colour, which counts where
+/// vertices have none. Colours are sRGB codes of 255 if all are whole and one is above 1, else
+/// shares of 1. Polygons are cut into triangles. Comments start with `#`.
 ///
 /// # Errors
 ///
@@ -64,6 +67,8 @@ struct Header {
     texture: bool,
     color: bool,
     normal: bool,
+    /// Colours precede normals.
+    color_first: bool,
 }
 
 /// Reads all lines.
@@ -85,44 +90,82 @@ impl Header {
     fn of(line: &[u8]) -> Result<(Self, &[u8]), Fault> {
         let end = line.iter().position(|byte| !byte.is_ascii_alphabetic()).unwrap_or(line.len());
         let (word, rest) = line.split_at(end);
-        let mut header = Self::default();
-        let Some(mut marks) = word.strip_suffix(b"OFF") else {
+        let Some(marks) = word.strip_suffix(b"OFF") else {
             return match word.is_empty() && rest.first().is_some_and(u8::is_ascii_digit) && !line.contains(&b'O') {
-                true => Ok((header, line)),
+                true => Ok((Self::default(), line)),
                 false => Err(Fault::Malformed(format!("it is no OFF file of three dimensions: '{}'", shown(line)))),
             };
         };
-        for (mark, has) in [(&b"ST"[..], &mut header.texture), (b"C", &mut header.color), (b"N", &mut header.normal)] {
-            if let Some(rest) = marks.strip_prefix(mark) {
-                (*has, marks) = (true, rest);
-            }
+        if rest.trim_ascii().starts_with(b"BINARY") {
+            return Err(Fault::Malformed("binary OFF is not read: write it as text, or as PLY".into()));
         }
-        let is_binary = rest.trim_ascii().starts_with(b"BINARY");
-        match (marks.is_empty(), is_binary) {
-            (true, false) => Ok((header, rest)),
-            (_, true) => Err(Fault::Malformed("binary OFF is not read: write it as text, or as PLY".into())),
-            _ => Err(Fault::Malformed(format!(
-                "vertices of '{}' are not read: OFF, COFF, NOFF and STOFF are",
+        match Self::of_marks(marks) {
+            Some(header) => Ok((header, rest)),
+            None => Err(Fault::Malformed(format!(
+                "vertices of '{}' are not read: the marks in front of OFF may be ST, C and N, as in COFF",
                 shown(word)
             ))),
         }
     }
 
+    /// The meaning of the marks in front of `OFF`; None if one is not known, or occurs twice.
+    fn of_marks(mut marks: &[u8]) -> Option<Self> {
+        let place = |mark: u8| marks.iter().position(|own| *own == mark);
+        let color_first = place(b'N').zip(place(b'C')).is_some_and(|(normal, color)| normal < color);
+        let mut header = Self { color_first, ..Self::default() };
+        while !marks.is_empty() {
+            let of_mark = [(&b"ST"[..], &mut header.texture), (b"C", &mut header.color), (b"N", &mut header.normal)];
+            let found = of_mark.into_iter().find_map(|(mark, has)| Some((marks.strip_prefix(mark)?, has)));
+            let (rest, has) = found.filter(|(_, has)| !**has)?;
+            (*has, marks) = (true, rest);
+        }
+        Some(header)
+    }
+
     /// The names of the numbers of a vertex that has `width` of them.
     fn names(self, width: usize) -> Result<Vec<String>, Fault> {
-        let mut names = vec!["x", "y", "z"];
-        names.extend(["nx", "ny", "nz"].into_iter().filter(|_| self.normal));
+        let normal: &[&str] = if self.normal { &["nx", "ny", "nz"] } else { &[] };
         let texture: &[&str] = if self.texture { &["texture_u", "texture_v"] } else { &[] };
-        let left = width.saturating_sub(names.len() + texture.len());
-        if self.color {
-            names.extend(["red", "green", "blue", "alpha"].into_iter().take(left.min(4)));
+        let fixed = 3 + normal.len() + texture.len();
+        let least = fixed + if self.color { 3 } else { 0 };
+        if width < least {
+            return Err(Fault::Malformed(format!(
+                "a vertex of {self} needs {least} numbers or more, but this line has {width}"
+            )));
         }
-        names.extend(texture);
-        if names.len() > width || self.color && left < 3 {
-            return Err(Fault::Malformed(format!("a vertex of this file has more than {width} numbers")));
-        }
+        let color = &["red", "green", "blue", "alpha"][..if self.color { (width - fixed).min(4) } else { 0 }];
+        let [first, second] = if self.color_first { [color, normal] } else { [normal, color] };
+        let names = [&["x", "y", "z"][..], first, second, texture].concat();
         Ok(names.into_iter().map(str::to_owned).collect())
     }
+
+    /// The same header with colours and normals in the order that leaves normals of unit length, or
+    /// zeros, in `vertices` of `width` numbers.
+    fn fitted(self, vertices: &[f64], width: usize) -> Self {
+        let has_normals = |header: &Self| {
+            let names = header.names(width).unwrap_or_default();
+            let Some(at) = names.iter().position(|name| name == "nx") else { return true };
+            let length = |row: &[f64]| DVec3::from_slice(&row[at..]).length();
+            vertices.chunks_exact(names.len()).map(length).all(|length| length == 0.0 || (length - 1.0).abs() < 0.01)
+        };
+        let other = Self { color_first: !self.color_first, ..self };
+        if self.color && self.normal && !has_normals(&self) && has_normals(&other) { other } else { self }
+    }
+}
+
+impl fmt::Display for Header {
+    /// The kind of file, with marks in the order of Geomview.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let marks = [(self.texture, "ST"), (self.color, "C"), (self.normal, "N")];
+        let marks: String = marks.into_iter().filter(|(has, _)| *has).map(|(_, mark)| mark).collect();
+        let article = if marks.starts_with('C') { "a" } else { "an" };
+        write!(formatter, "{article} {marks}OFF file")
+    }
+}
+
+/// Whether a word is the first one of an OFF file in text.
+pub(super) fn is_first_word(word: &[u8]) -> bool {
+    word.strip_suffix(b"OFF").is_some_and(|marks| Header::of_marks(marks).is_some())
 }
 
 impl Contents {
@@ -213,7 +256,10 @@ impl Contents {
             let read = self.polygons;
             return Err(Fault::Malformed(format!("it promises {polygons} faces, and ends after {read}")));
         }
-        let names = if read == 0 { Header::default().names(3)? } else { self.names };
+        let header = self.header.unwrap_or_default();
+        let width = self.names.len();
+        let names =
+            if read == 0 { Header::default().names(3)? } else { header.fitted(&self.vertices, width).names(width)? };
         let table = Table::of(names, options)?;
         let mut rows = table.with_capacity(read)?;
         rows.extend_all(&self.vertices);

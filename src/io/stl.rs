@@ -6,7 +6,7 @@ use crate::io::about::{About, Attribute, Role};
 use crate::io::closed::distinct;
 use crate::io::fault::{self, Fault, reserve};
 use crate::io::triangles::give_faces;
-use crate::io::values::{parse_number, shown};
+use crate::io::values::{line_end, parse_number, shown};
 use crate::io::{Input, Paint, Points, ReadOptions, dimensions};
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 use crate::{Progress, Result};
@@ -14,6 +14,9 @@ use crate::{Progress, Result};
 /// Bytes in front of the triangles of a binary file, and bytes of a triangle.
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
+
+/// The first bytes of a text, in which none is zero. Headers and coordinates have such bytes.
+const SURELY_TEXT: usize = 1 << 9;
 
 /// Triangles that are decoded at once.
 const TOGETHER: u64 = 1 << 14;
@@ -24,9 +27,9 @@ const LONGEST_WORD: usize = 1 << 10;
 /// Reads the triangles of an STL file. Corners at the same position become one vertex.
 ///
 /// The normals of facets are ignored, as the order of the corners says the same. Colours of 15 bits
-/// in binary files are read as VisCAM and SolidView write them, or as Magics if the header has its
-/// `COLOR=`. A file is binary if its length is that of the triangles that it promises, or if it
-/// does not start with `solid`.
+/// in binary files are read as VisCAM and SolidView write them, or as Magics or MeshLab if the
+/// header has their `COLOR=`. A file is binary if its length is that of the triangles that it
+/// promises, if it does not start with `solid`, or if there is a zero byte near its start.
 ///
 /// # Errors
 ///
@@ -65,7 +68,9 @@ fn soup(reader: &mut BufReader<std::fs::File>, length: u64, progress: &dyn Progr
     let promised = start.get(HEADER - 4..HEADER).and_then(|bytes| bytes.first_chunk().copied());
     let promised = promised.map(|bytes| u64::from(u32::from_le_bytes(bytes)));
     let fits = promised.is_some_and(|count| HEADER as u64 + count * TRIANGLE as u64 == length);
-    let is_text = !fits && start.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let is_solid = start.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    // Binary headers may say `solid` too, and bytes may follow the triangles.
+    let is_text = !fits && is_solid && !start.iter().take(SURELY_TEXT).any(|byte| *byte == 0);
     match (is_text, promised) {
         (true, _) => Ok((text(reader, progress)?, true)),
         (false, Some(count)) => Ok((binary(reader, (count, length), progress)?, false)),
@@ -83,7 +88,6 @@ fn binary(reader: &mut impl Read, (count, length): (u64, u64), progress: &dyn Pr
     }
     let mut header = [0; HEADER];
     reader.read_exact(&mut header)?;
-    let default = magics_color(&header);
     let mut soup = Soup::default();
     reserve(&mut soup.corners, 3 * count)?;
     let mut codes: Vec<u16> = Vec::new();
@@ -104,20 +108,49 @@ fn binary(reader: &mut impl Read, (count, length): (u64, u64), progress: &dyn Pr
         left -= left.min(TOGETHER);
     }
     progress.advance(length - HEADER as u64 - count * TRIANGLE as u64);
-    // VisCAM marks triangles that have a colour, Magics those that have none of their own.
-    let is_colored = |code: &u16| (code & 0x8000 != 0) != default.is_some();
-    if default.is_some() || codes.iter().any(is_colored) {
-        let other = default.unwrap_or(DEFAULT_COLOR);
-        let color = |code: &u16| if is_colored(code) { color(*code, default.is_some()) } else { other };
-        soup.colors = codes.iter().map(color).collect();
-    }
+    soup.colors = colors(&codes, &header);
     Ok(soup)
 }
 
-/// The colour of all triangles in a header that Magics wrote.
+/// The colours of triangles from their attribute words; empty if none has one.
+///
+/// VisCAM marks triangles that have a colour, Magics those that have none of their own. MeshLab
+/// writes the order and the header of Magics with the mark of VisCAM, and zeros without colours.
+fn colors(codes: &[u16], header: &[u8]) -> Vec<[f32; 4]> {
+    let default = magics_color(header);
+    let mut others = codes.iter().filter(|code| **code != 0);
+    let first = others.clone().next();
+    let all_marked = others.clone().all(|code| code & 0x8000 != 0);
+    let vary = others.any(|code| Some(code) != first);
+    let is_magics = default.is_some();
+    let marks_own = !is_magics || all_marked && (vary || first.is_none() || is_of_meshlab(header));
+    let is_colored = |code: &u16| (code & 0x8000 != 0) == marks_own;
+    if !is_magics && !codes.iter().any(is_colored) {
+        return Vec::new();
+    }
+    let other = default.unwrap_or(DEFAULT_COLOR);
+    codes.iter().map(|code| if is_colored(code) { color(*code, is_magics) } else { other }).collect()
+}
+
+/// The place of a header's colour, behind `COLOR=`.
+fn place_of_color(header: &[u8]) -> Option<usize> {
+    Some(header.windows(6).position(|window| window == b"COLOR=")? + 6)
+}
+
+/// Whether MeshLab wrote a header with a colour: a space takes the place of its alpha.
+fn is_of_meshlab(header: &[u8]) -> bool {
+    place_of_color(header).is_some_and(|at| header[at..].get(3..13).is_some_and(|rest| rest == b" MATERIAL="))
+}
+
+/// The colour of all triangles in a header that Magics wrote; None if only padding follows.
 fn magics_color(header: &[u8]) -> Option<[f32; 4]> {
-    let at = header.windows(6).position(|window| window == b"COLOR=")?;
-    let [r, g, b, a] = *header.get(at + 6..at + 10)?.first_chunk()?;
+    let at = place_of_color(header)?;
+    let given: [u8; 4] = *header.get(at..at + 4)?.first_chunk()?;
+    if given == [0; 4] || given == [b' '; 4] {
+        return None;
+    }
+    let [r, g, b, a] = given;
+    let a = if is_of_meshlab(header) { 255 } else { a };
     let [r, g, b] = [r, g, b].map(|code| srgb_to_linear(f64::from(code) / 255.0) as f32);
     Some([r, g, b, f32::from(a) / 255.0])
 }
@@ -132,7 +165,8 @@ fn color(code: u16, is_magics: bool) -> [f32; 4] {
 
 /// Reads the facets of a text; names of solids may have any words.
 fn text(reader: &mut impl BufRead, progress: &dyn Progress) -> Result<Soup, Fault> {
-    let mut words = Words { reader, line: 1, word: Vec::new(), passed: 0 };
+    let line_end = line_end(reader)?;
+    let mut words = Words { reader, line: 1, line_end, word: Vec::new(), passed: 0 };
     let mut soup = Soup::default();
     let (mut inside, mut reported) = (false, 0);
     while words.next()? {
@@ -165,6 +199,8 @@ fn text(reader: &mut impl BufRead, progress: &dyn Progress) -> Result<Soup, Faul
 struct Words<'a, R> {
     reader: &'a mut R,
     line: u64,
+    /// The byte that ends a line: `\n` or `\r`.
+    line_end: u8,
     word: Vec<u8>,
     /// Bytes so far.
     passed: u64,
@@ -181,7 +217,7 @@ impl<R: BufRead> Words<'_, R> {
             }
             let is_within = !self.word.is_empty();
             let start = if is_within { 0 } else { buffer.iter().take_while(|byte| byte.is_ascii_whitespace()).count() };
-            self.line += buffer[..start].iter().filter(|byte| **byte == b'\n').count() as u64;
+            self.line += buffer[..start].iter().filter(|byte| **byte == self.line_end).count() as u64;
             let length = buffer[start..].iter().position(u8::is_ascii_whitespace);
             let end = length.map_or(buffer.len(), |length| start + length);
             let left = LONGEST_WORD.saturating_sub(self.word.len());
@@ -202,7 +238,7 @@ impl<R: BufRead> Words<'_, R> {
     fn skip_line(&mut self) -> Result<(), Fault> {
         loop {
             let buffer = self.reader.fill_buf()?;
-            let end = buffer.iter().position(|byte| *byte == b'\n');
+            let end = buffer.iter().position(|byte| *byte == self.line_end);
             let length = end.unwrap_or(buffer.len());
             let is_over = end.is_some() || buffer.is_empty();
             self.reader.consume(length);

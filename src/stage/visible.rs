@@ -6,12 +6,13 @@ use glam::DVec3;
 
 use super::{Renderer, Scene, View};
 use crate::error::{Error, Result};
-use crate::io::Points;
+use crate::io::{Points, settle_colors};
 use crate::options::{DeviceOptions, RenderOptions};
 use crate::progress::Progress;
 use crate::scene::camera::Projection;
 use crate::scene::{self, Camera, Epsilon, Map, Samples, Surfel};
 use crate::surfels::gather::gather;
+use crate::surfels::mesh::vertex_colors;
 
 /// The number of views that see each point of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,22 +77,26 @@ impl Scene {
 
 impl Visible {
     /// Returns the points that at least `least` views see, as one cloud in the order of the inputs,
-    /// and the number of views of each. There are no triangles and no levels of detail.
+    /// and the number of views of each. There are no triangles and no levels of detail; the vertices
+    /// of a mesh have the mean colours of the triangles around them, as in a cloud.
     ///
     /// # Errors
     ///
     /// The errors of joining inputs, such as more than 2^32 - 1 points.
     pub fn of_points(&self, inputs: &[Points], least: u32) -> Result<(Points, Vec<u32>)> {
         let mut views: Vec<Vec<u32>> = Vec::new();
-        let part = |(points, counts): (&Points, &Vec<u32>)| {
+        let mut copies = inputs.to_vec();
+        settle_colors(&mut copies);
+        let part = |(mut points, counts): (Points, &Vec<u32>)| {
             let keep: Vec<bool> = counts.iter().map(|count| *count >= least).collect();
-            let mut points = Points { faces: None, beside: None, tree: None, whole: None, ..points.clone() };
+            points.colors = vertex_colors(&points).or(points.colors);
+            (points.faces, points.beside, points.tree, points.whole) = (None, None, None, None);
             points.retain(&keep);
             (points.left_out, points.numbers) = (Vec::new(), None);
             views.push(counts.iter().copied().filter(|count| *count >= least).collect());
             points
         };
-        let parts: Vec<Points> = inputs.iter().zip(&self.views).map(part).collect();
+        let parts: Vec<Points> = copies.into_iter().zip(&self.views).map(part).collect();
         if parts.iter().all(|points| points.positions.is_empty()) {
             return Ok((Points::default(), Vec::new()));
         }
@@ -193,5 +198,35 @@ impl Eye<'_> {
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
         let there = normal.dot(point - self.camera.ray_start(x, y)) / normal.dot(self.camera.ray(x, y));
         if there.is_finite() { there.clamp(depth - longer, depth + longer) } else { depth }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::io::Paint;
+    use crate::io::points::Faces;
+    use crate::scene::Colors;
+
+    #[test]
+    fn vertices_keep_the_colours_of_their_triangles() {
+        let (red, blue) = ([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]);
+        let paint = Paint { colors: vec![red, blue], ..Paint::default() };
+        let triangles = vec![[0, 1, 2], [1, 3, 2]];
+        let mesh = Points {
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
+            faces: Some(Faces { triangles, normals: None, paint: Some(Box::new(paint)) }),
+            ..Points::default()
+        };
+        let visible = Visible { views: vec![vec![1, 0, 2, 3]], points: vec![3] };
+        let (seen, counts) = visible.of_points(std::slice::from_ref(&mesh), 1).unwrap();
+        assert_eq!((seen.positions.len(), counts), (3, vec![1, 2, 3]));
+        assert_eq!(seen.colors, Some(Colors::Linear(vec![red, [0.5, 0.0, 0.5, 1.0], blue])));
+        // The colours of vertices take precedence.
+        let own = vec![[0.25, 0.5, 0.75, 1.0]; 4];
+        let colored = Points { colors: Some(Colors::Linear(own.clone())), ..mesh };
+        let (seen, _) = visible.of_points(&[colored], 1).unwrap();
+        assert_eq!(seen.colors, Some(Colors::Linear(own[..3].to_vec())));
     }
 }

@@ -26,6 +26,7 @@ mod random;
 mod ranges;
 mod stl;
 mod text;
+mod text_colors;
 
 use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};

@@ -51,6 +51,30 @@ fn vertices_and_faces_have_colours_and_normals() {
         assert_eq!(codes(&points), expected, "{text}");
         assert_eq!(points.texture.is_some(), text.starts_with("ST"));
     }
+    // MeshLab's order of marks; and its library's order of numbers, which follows no mark.
+    let square = ["0 0 0", "1 0 0", "0 1 0"];
+    let all = ["255 0 51 255", "0 255 0 255", "0 0 255 255"];
+    let row = |k: usize, parts: &[&str]| format!("{} {}\n", square[k], parts.join(" ")).replace("RGBA", all[k]);
+    for (word, parts) in [
+        ("CSTOFF", &["RGBA", "0.25 0.5"][..]),
+        ("NCOFF", &["RGBA", "0 0.6 0.8"]),
+        ("NCOFF", &["0 0.6 0.8", "RGBA"]),
+        ("CNOFF", &["0 0.6 0.8", "RGBA"]),
+        ("CNOFF", &["RGBA", "0 0.6 0.8"]),
+        ("NCSTOFF", &["RGBA", "0 0.6 0.8", "0.25 0.5"]),
+        ("NSTCOFF", &["0 0.6 0.8", "RGBA", "0.25 0.5"]),
+    ] {
+        let rows: String = (0..3).map(|k| row(k, parts)).collect();
+        let text = format!("{word}\n3 1 0\n{rows}3 0 1 2\n");
+        let points = read(&text);
+        assert_eq!(codes(&points), expected, "{text}");
+        assert_eq!(points.texture.is_some_and(|places| places == [[0.25, 0.5]; 3]), word.contains("ST"), "{text}");
+        if word.contains('N') {
+            assert_eq!(points.normals.unwrap(), [[0.0, 0.6, 0.8]; 3], "{text}");
+        }
+        // The first bytes tell the format without an extension.
+        assert_eq!(folder.read("mesh", text.as_bytes()).unwrap().positions.len(), 3);
+    }
     let normals = read("NOFF\n3 1 0\n0 0 0 0 0.6 0.8\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n");
     assert_eq!(normals.normals.unwrap()[0], [0.0, 0.6, 0.8]);
     assert_eq!(normals.faces.unwrap().normals.unwrap()[0][0], [0.0, 0.6, 0.8]);
@@ -80,9 +104,19 @@ fn damaged_files_are_refused_in_a_sentence() {
         ("0 1 0\n", "0 1\n", "line 5: 3 numbers are needed for a vertex, not 2"),
         ("0 1 0\n", "0 a 0\n", "line 5: 'a' is not a number"),
         ("OFF", "4OFF", "line 1: it is no OFF file of three dimensions: '4OFF'"),
-        ("OFF", "nOFF", "line 1: vertices of 'nOFF' are not read: OFF, COFF, NOFF and STOFF are"),
+        (
+            "OFF",
+            "nOFF",
+            "line 1: vertices of 'nOFF' are not read: the marks in front of OFF may be ST, C and N, as in COFF",
+        ),
         ("OFF", "OFF BINARY", "line 1: binary OFF is not read: write it as text, or as PLY"),
-        ("OFF", "COFF", "line 3: a vertex of this file has more than 3 numbers"),
+        ("OFF", "COFF", "line 3: a vertex of a COFF file needs 6 numbers or more, but this line has 3"),
+        ("OFF", "NSTOFF", "line 3: a vertex of an STNOFF file needs 8 numbers or more, but this line has 3"),
+        (
+            "OFF",
+            "CCOFF",
+            "line 1: vertices of 'CCOFF' are not read: the marks in front of OFF may be ST, C and N, as in COFF",
+        ),
     ] {
         let refused = folder.refusal("a.off", good.replacen(from, to, 1).as_bytes());
         assert!(refused == said || said.is_empty() && refused.starts_with("line 6: "), "{refused}");

@@ -83,6 +83,48 @@ fn colours_of_15_bits_are_read() {
     assert!(colors(&binary(b"", [0, 1, 2, 3])).is_empty());
 }
 
+/// MeshLab's header of Magics, with grey and without an alpha.
+const MESHLAB: &[u8] = b"COLOR=\x7f\x7f\x7f MATERIAL=\x7f\x7f\x7f \x7f\x7f\x7f \x7f\x7f\x7f ";
+
+#[test]
+fn colours_of_meshlab_are_read() {
+    let folder = Folder::new();
+    let colors = |header: &[u8], codes: [u16; 4]| {
+        let faces = folder.read("a.stl", &binary(header, codes)).unwrap().faces.unwrap();
+        faces.paint.map(|paint| paint.colors).unwrap_or_default()
+    };
+    // The linear light of the sRGB code 0x7f, computed apart.
+    let is_grey = |color: &[f32; 4]| color[..3].iter().all(|c| (c - 0.212_230_76).abs() < 1e-6) && color[3] == 1.0;
+    // Without colours of faces, words are zero.
+    assert!(colors(MESHLAB, [0; 4]).iter().all(is_grey));
+    // Bit 15 marks colours of faces, in the order of Magics.
+    let [red, green, blue] = [0x8000 | 31, 0x8000 | 31 << 5, 0x8000 | 31 << 10];
+    let primaries = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]];
+    assert_eq!(colors(MESHLAB, [red, green, blue, 0x8000]), primaries);
+    assert_eq!(colors(MESHLAB, [red; 4]), [[1.0, 0.0, 0.0, 1.0]; 4]);
+    // So do other programs with the mark of VisCAM; one colour for all is that of the header.
+    let header = b"COLOR=\x00\xff\x00\xff";
+    assert_eq!(colors(header, [red, green, blue, 0x8000]), primaries);
+    assert_eq!(colors(header, [0xffff; 4]), [[0.0, 1.0, 0.0, 1.0]; 4]);
+    assert_eq!(colors(header, [0; 4]), [[0.0, 1.0, 0.0, 1.0]; 4]);
+    // A header without a colour behind its word.
+    assert!(colors(b"COLOR=    ", [0; 4]).is_empty() && colors(b"COLOR=", [0; 4]).is_empty());
+}
+
+#[test]
+fn binary_files_may_start_as_text() {
+    let folder = Folder::new();
+    let whole = binary(b"solid of another kind", [0; 4]);
+    let expected = folder.read("a.stl", &whole).unwrap();
+    assert_eq!(folder.read("a.stl", &[&whole[..], b"\0\0 trailing"].concat()).unwrap(), expected);
+    let refused = folder.refusal("a.stl", &whole[..whole.len() - 1]);
+    assert_eq!(refused, "its header promises 4 triangles, the file ends after 3");
+    // Lines may end with carriage returns alone.
+    assert_eq!(folder.read("a.stl", text().replace('\n', "\r").as_bytes()).unwrap().positions.len(), 4);
+    let damaged = text().replacen("vertex 0 1 0", "vertex 0 one 0", 1).replace('\n', "\r");
+    assert_eq!(folder.refusal("a.stl", damaged.as_bytes()), "line 5: a number is needed, not 'one'");
+}
+
 #[test]
 fn damaged_files_are_refused_in_a_sentence() {
     let folder = Folder::new();

@@ -199,10 +199,10 @@ fn ptx_scans_are_put_in_their_places() {
         (
             "2\n2\n",
             "1099511627776\n1099511627776\n",
-            "line 15: its scan still lacks 1208925819614629174706172 points, but it has 1 numbers",
+            "line 15: its scan still lacks 1208925819614629174706172 points, but it has 1 number",
         ),
         ("2\n2\n", "2.5\n2\n", "line 1: a whole number is needed here, the number of columns of a scan, not 2.5"),
-        ("2\n2\n", "2\n", "line 2: 1 numbers are needed here, the number of rows of a scan; it has 3"),
+        ("2\n2\n", "2\n", "line 2: a row of 1 number is needed here, the number of rows of a scan; it has 3 numbers"),
         ("0.25 0 255 0", "0.25 0 x 0", "line 13: 'x' is not a number"),
     ] {
         let said = said.replace("1208925819614629174706172", &(u64::MAX - 4).to_string());

@@ -87,7 +87,8 @@ const READ: &str = "its kind is not known; cameras are a transforms.json, a list
 ///   radians); a frame's own values take precedence over those for all frames. `file_path` is the
 ///   name. A list of camera files may stand in place of the frames.
 /// - `cameras.json` of 3D Gaussian Splatting: a list of objects with `img_name`, `width`, `height`,
-///   `position`, `rotation` (camera-to-world with x right, y down, z forward), `fx` and `fy`.
+///   `position`, `rotation` (camera-to-world with x right, y down, z forward), `fx` and `fy`, and
+///   in some programs `cx` and `cy`. Names that occur again get a number, as in `r_0-2`.
 /// - `camera_path.json` of nerfstudio: `camera_to_world` with the axes of OpenGL, `fov` (vertical,
 ///   degrees), `render_width` and `render_height`.
 /// - A folder with COLMAP's `cameras.bin` and `images.bin`, or the same as `.txt`, in the folder

@@ -2,7 +2,9 @@
 //! `height`, `position`, `rotation`, `fx` and `fy`.
 //!
 //! `rotation` has the rows of the camera-to-world rotation, with x right, y down, z forward. The
-//! principal point is the centre of the image.
+//! principal point is `cx` and `cy`, in pixels, or else the centre of the image.
+
+use std::collections::{HashMap, HashSet};
 
 use glam::{DMat3, DVec3};
 use serde::Deserialize;
@@ -15,13 +17,15 @@ use crate::scene::Lens;
 
 #[derive(Deserialize)]
 struct Raw {
-    img_name: Option<String>,
+    img_name: Option<Value>,
     width: u32,
     height: u32,
     position: [f64; 3],
     rotation: [[f64; 3]; 3],
     fx: f64,
     fy: f64,
+    cx: Option<f64>,
+    cy: Option<f64>,
 }
 
 /// Whether a file is of this kind: a list whose first entry has a position and a rotation.
@@ -34,20 +38,42 @@ pub(super) fn read(file: &Value, _: (u32, u32)) -> Result<Vec<NamedCamera>, Stri
     let of_entry = |(index, entry): (usize, &Value)| {
         camera(index, entry).map_err(|what| format!("camera {} of the list: {what}", index + 1))
     };
-    all.iter().enumerate().map(of_entry).collect()
+    let mut cameras: Vec<NamedCamera> = all.iter().enumerate().map(of_entry).collect::<Result<_, _>>()?;
+    name_apart(&mut cameras);
+    Ok(cameras)
+}
+
+/// Appends `-2`, `-3` and so on to names that occur several times: the trainer writes names without
+/// folders, so pictures to train with and to test with may have the same ones.
+fn name_apart(cameras: &mut [NamedCamera]) {
+    let mut taken: HashSet<String> = cameras.iter().map(|camera| camera.name.clone()).collect();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for camera in cameras {
+        let count = counts.entry(camera.name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            let mut name = format!("{}-{count}", camera.name);
+            while !taken.insert(name.clone()) {
+                *count += 1;
+                name = format!("{}-{count}", camera.name);
+            }
+            camera.name = name;
+        }
+    }
 }
 
 fn camera(index: usize, entry: &Value) -> Result<NamedCamera, String> {
     let raw = Raw::deserialize(entry).map_err(|error| one_line(&error.to_string()))?;
     let name = match &raw.img_name {
         None => format!("{index:04}"),
-        Some(name) => name_of(name).ok_or("its img_name is not a valid file name")?,
+        Some(Value::Number(name)) => name.to_string(),
+        Some(name) => name.as_str().and_then(name_of).ok_or("its img_name is not a valid file name")?,
     };
     let [width, height] = [raw.width, raw.height].map(f64::from);
     let to_camera = DMat3::from_cols_array_2d(&raw.rotation);
     let camera = CameraFile {
         size: Some((raw.width, raw.height)),
-        lens: Lens::Intrinsics([raw.fx, raw.fy, 0.5 * width, 0.5 * height]),
+        lens: Lens::Intrinsics([raw.fx, raw.fy, raw.cx.unwrap_or(0.5 * width), raw.cy.unwrap_or(0.5 * height)]),
         pose: Pose::Rigid(to_camera, DVec3::from_array(raw.position)),
         near: None,
     };
@@ -80,6 +106,22 @@ mod tests {
         // forward its x.
         assert_eq!((rotation * DVec3::Y, rotation * DVec3::Z, rotation * DVec3::X), (DVec3::X, DVec3::Y, DVec3::Z));
         assert_eq!(one("").unwrap().name, "0000");
+    }
+
+    #[test]
+    fn names_that_occur_twice_are_made_unique() {
+        let entry = |name: &str| {
+            format!(
+                r#"{{"img_name": {name}, "width": 8, "height": 8, "position": [0, 0, 0],
+                    "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "fx": 5, "fy": 5, "cx": 3.5, "cy": 4.5}}"#
+            )
+        };
+        let names = [r#""r_0""#, r#""r_1""#, r#""r_0""#, r#""r_0-2""#, r#""r_0.png""#, "17", "17"];
+        let text = format!("[{}]", names.map(entry).join(","));
+        let cameras = read(&serde_json::from_str(&text).unwrap(), (8, 8)).unwrap();
+        let names: Vec<&str> = cameras.iter().map(|camera| camera.name.as_str()).collect();
+        assert_eq!(names, ["r_0", "r_1", "r_0-3", "r_0-2", "r_0-4", "17", "17-2"]);
+        assert_eq!(cameras[0].camera.lens, Lens::Intrinsics([5.0, 5.0, 3.5, 4.5]));
     }
 
     #[test]

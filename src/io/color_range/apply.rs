@@ -29,7 +29,8 @@ pub(super) fn colors(numbers: Numbers, rule: Rule, alpha: Option<AlphaRule>) -> 
                 if r.is_nan() {
                     return default;
                 }
-                [byte(*r), byte(*g), byte(*b), if alpha.is_some() { *a as u8 } else { 255 }]
+                // A point without an alpha is opaque.
+                [byte(*r), byte(*g), byte(*b), if alpha.is_some() && !a.is_nan() { *a as u8 } else { 255 }]
             };
             Colors::Srgb8(colors.par_iter().map(code).collect())
         }
@@ -43,7 +44,8 @@ pub(super) fn colors(numbers: Numbers, rule: Rule, alpha: Option<AlphaRule>) -> 
                 for (channel, value) in color.iter_mut().take(3).enumerate() {
                     *value = light(channel, (*value).into());
                 }
-                color[3] = alpha.map_or(1.0, |alpha| finite(f64::from(color[3]) / alpha.full));
+                let given = alpha.filter(|_| !color[3].is_nan());
+                color[3] = given.map_or(1.0, |alpha| finite(f64::from(color[3]) / alpha.full));
             };
             colors.par_iter_mut().for_each(color);
             Colors::Linear(colors)
@@ -92,7 +94,7 @@ fn light(rule: Rule, kind: Kind) -> impl Fn(usize, f64) -> f32 {
 }
 
 /// The default colour as 8-bit sRGB codes.
-fn default_code() -> [u8; 4] {
+pub(super) fn default_code() -> [u8; 4] {
     let code = |light: f32| (linear_to_srgb(light.into()) * 255.0).round() as u8;
     let [r, g, b, _] = DEFAULT_COLOR;
     [code(r), code(g), code(b), 255]

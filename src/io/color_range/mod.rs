@@ -11,6 +11,7 @@
 //! - Integers are 8-bit sRGB codes if most of them are at most 255; the few larger ones become 255.
 //! - 16-bit integers are the 8-bit sRGB codes `v` if most of them are `257 v`, or most are `256 v`.
 //! - Other integers are 16-bit sRGB codes if most are at most 65535, else sRGB codes of their type.
+//! - Whole numbers of a text are integers, or fractions of white (sRGB) if none is above 1.
 //! - Numbers with limits in the header are sRGB codes between these. Limits are ignored, and the
 //!   rule for the type holds, in three cases: more than 1 of 100 numbers lies outside; the limits
 //!   reach from 0 to 4095 or more, but most numbers are at most 255; the limits reach from 0 to 255
@@ -42,6 +43,8 @@ pub(super) enum Number {
     Byte,
     /// An integer of more than 8 bits, with the largest value of its type.
     Integer(u64),
+    /// A number of a text, which has no types, where all numbers of a colour are whole.
+    Whole,
     /// A float, or an integer that the file scales.
     Float,
 }
@@ -152,6 +155,14 @@ impl RawColors {
     /// Leaves out the points whose flag is not set, once the range of colours is decided.
     pub(super) fn leave_out(&mut self, flags: Vec<bool>) {
         self.keep = Some(flags);
+    }
+
+    /// Forgets the colours, or the intensities, of a file that turns out to have none of them.
+    pub(super) fn leave_out_columns(&mut self, [has_colors, has_shades]: [bool; 2]) {
+        for run in &mut self.runs {
+            run.colors = run.colors.take().filter(|_| has_colors);
+            run.shades = run.shades.take().filter(|_| has_shades);
+        }
     }
 
     /// Whether there is at most one run, all its colours are equal, and no intensities are stored.

@@ -34,6 +34,8 @@ impl Rule {
         by_limits.unwrap_or_else(|| match kind.number {
             Number::Byte => Self::Bytes,
             Number::Integer(largest) => Self::of_integers(largest, evidence),
+            Number::Whole if evidence.nonzero > 0 && evidence.above[0] == 0 => Self::Codes([(0.0, 1.0); 3]),
+            Number::Whole => Self::of_integers(u32::MAX.into(), evidence),
             Number::Float => Self::of_floats(kind.light, evidence),
         })
     }
@@ -92,7 +94,7 @@ impl Rule {
     pub fn describe(&self, kind: &Kind) -> String {
         let of = match kind.number {
             Number::Byte => "",
-            Number::Integer(_) => " in wider integers",
+            Number::Integer(_) | Number::Whole => " in wider integers",
             Number::Float => " in floats",
         };
         match self {
@@ -147,7 +149,7 @@ impl AlphaRule {
             Number::Integer(_) if few(above[1], nonzero) => 255.0,
             Number::Integer(_) if few(above[2], nonzero) => 65535.0,
             Number::Integer(full) => full as f64,
-            Number::Float => full_of_floats(evidence),
+            Number::Whole | Number::Float => full_of_floats(evidence),
         };
         Self { full, bytes: full == 255.0 && fractions == 0, largest }
     }

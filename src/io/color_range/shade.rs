@@ -1,6 +1,7 @@
 //! Conversion of intensities to grey.
 
 use super::Shades;
+use super::apply::default_code;
 use rayon::prelude::*;
 
 /// The intensities that become black and white.
@@ -28,11 +29,15 @@ impl Shades {
         }
     }
 
-    /// Grey codes with alpha 255.
+    /// Grey codes with alpha 255; the default colour for points without an intensity.
     pub(super) fn grey(&self, shading: Shading) -> Vec<[u8; 4]> {
         let Shading { black, white } = shading;
+        let default = default_code();
         let code = |value: f64| {
-            // The cast maps NaN to 0 and saturates values outside 0 to 255.
+            if value.is_nan() {
+                return default;
+            }
+            // The cast saturates values outside 0 to 255.
             let code = ((value - black) / (white - black) * 255.0).round() as u8;
             [code, code, code, 255]
         };

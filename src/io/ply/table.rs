@@ -65,7 +65,7 @@ impl Table {
 pub(in crate::io) struct Rows<'a> {
     table: &'a Table,
     vertices: Vertices<'a>,
-    /// For each needed column, whether all its numbers are whole.
+    /// For each needed column, whether all its numbers are whole; missing ones do not count.
     whole: Vec<bool>,
 }
 
@@ -79,7 +79,8 @@ impl Rows<'_> {
     pub fn extend(&mut self, values: &[f64]) {
         let stride = self.whole.len().max(1);
         for (column, whole) in self.whole.iter_mut().enumerate() {
-            *whole = *whole && values.iter().skip(column).step_by(stride).all(|value| value.fract() == 0.0);
+            let is_whole = |value: &f64| value.is_nan() || value.fract() == 0.0;
+            *whole = *whole && values.iter().skip(column).step_by(stride).all(is_whole);
         }
         let places = &self.table.places;
         self.vertices.extend(values.len() / stride, |column, row| values[row * stride + places[column]]);
@@ -96,7 +97,7 @@ impl Rows<'_> {
     }
 
     /// Returns the points, which may be the vertices of a mesh. Text has no types: numbers of
-    /// colours and intensities are integers if all of the file are whole.
+    /// intensities are integers if all of the file are whole, and those of colours may be.
     pub fn finish(self, is_mesh: bool) -> Result<Points, Fault> {
         let Table { layout, flatten, places, .. } = self.table;
         let is_whole = |column: usize| self.whole[places[column]];
@@ -105,7 +106,7 @@ impl Rows<'_> {
             if let Some(colors) = &mut run.colors {
                 colors.kind.light = false;
                 if layout.color.is_some_and(|color| color.into_iter().all(is_whole)) {
-                    colors.kind.number = Number::Integer(u32::MAX.into());
+                    colors.kind.number = Number::Whole;
                 }
             }
             if let Some(Shades::Floats { integer, .. }) = &mut run.shades {

@@ -49,10 +49,11 @@ pub(super) fn code(value: f64) -> u8 {
     if value < 0.0 { (value as i8).cast_unsigned() } else { value as u8 }
 }
 
-/// Converts a colour number whose range is not known yet. Negative numbers of signed bytes and
-/// 16-bit integers are codes that were stored as signed.
+/// Converts a colour number whose range is not known yet; NaN, which means that there is none,
+/// stays. Negative numbers of signed bytes and 16-bit integers are codes that were stored as signed.
 pub(super) fn number(value: f64, scalar: Scalar) -> f32 {
     match scalar {
+        _ if value.is_nan() => f32::NAN,
         Scalar::I8 if value < 0.0 => (value + 256.0) as f32,
         Scalar::I16 if value < 0.0 => (value + 65536.0) as f32,
         _ => finite(value),

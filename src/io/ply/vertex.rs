@@ -8,6 +8,7 @@ use crate::io::attributes::{self, find, find_triple};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::dimensions::{self, Collector};
 use crate::io::fault::{Fault, reserve};
+use crate::io::values::finite;
 use crate::io::{Points, TreeRow};
 use crate::scene::{Cap, Clip, Colors};
 
@@ -379,16 +380,25 @@ impl<'a> Vertices<'a> {
                     let [r, g, b] = color.map(|column| code(value(column, row)));
                     [r, g, b, layout.alpha.map_or(255, |column| code(value(column, row)))]
                 })),
-                Tint::Light | Tint::Numbers(..) => self.floats.extend((0..rows).map(|row| {
+                Tint::Light => self.floats.extend((0..rows).map(|row| {
+                    let [r, g, b] = color.map(|column| finite(value(column, row)));
+                    [r, g, b, layout.alpha.map_or(1.0, |column| finite(value(column, row)))]
+                })),
+                Tint::Numbers(..) => self.floats.extend((0..rows).map(|row| {
                     let number = |column: usize| number(value(column, row), layout.columns[column].scalar);
                     let [r, g, b] = color.map(number);
+                    // A point that lacks a channel has no colour, which red says.
+                    let r = if g.is_nan() || b.is_nan() { f32::NAN } else { r };
                     [r, g, b, layout.alpha.map_or(1.0, number)]
                 })),
             }
         }
         let Some(intensity) = layout.intensity.filter(|_| !self.colored) else { return };
-        let nonzero = |column: usize| (0..rows).any(|row| value(column, row) != 0.0);
-        if layout.color.is_some_and(|color| color.into_iter().any(nonzero)) {
+        let is_colored = |color: [usize; 3]| {
+            let own = |row: usize| color.map(|column| value(column, row));
+            (0..rows).map(own).any(|own| own.iter().all(|c| !c.is_nan()) && own.iter().any(|c| *c != 0.0))
+        };
+        if layout.color.is_some_and(is_colored) {
             self.colored = true;
             self.shades = Vec::new();
         } else {

@@ -19,6 +19,13 @@ impl Separator {
     ///
     /// [`Fault::Malformed`], without a line number, if commas are decimal points.
     pub(in crate::io) fn of(line: &[u8]) -> Result<Self, Fault> {
+        // The marks of a comment behind numbers separate nothing.
+        if let Some(before) = before_comment(line) {
+            let own = Self::of(before)?;
+            if own.cells(before).all(|cell| number(cell).is_some()) {
+                return Ok(own);
+            }
+        }
         if line.contains(&b';') {
             return Ok(Self::Mark(b';'));
         }
@@ -39,6 +46,25 @@ impl Separator {
     /// Whether a line ends with an empty cell, which [`cells`](Self::cells) does not count.
     pub(super) fn ends_empty(self, line: &[u8]) -> bool {
         matches!(self, Self::Mark(mark) if line.last() == Some(&mark))
+    }
+
+    /// The cells of a row of numbers, of which there are `wanted`, without a comment behind them.
+    /// If their number is not known, a cell that starts as a comment is one.
+    pub(super) fn row(self, line: &[u8], wanted: Option<usize>) -> impl Iterator<Item = &[u8]> {
+        let (mut count, mut is_over) = (0, false);
+        self.cells(line).map_while(move |cell| {
+            let may_end = wanted.is_none_or(|wanted| count >= wanted);
+            if is_over || may_end && starts_comment(cell) {
+                return None;
+            }
+            count += 1;
+            // Cells between marks may have spaces.
+            let may_hold = self != Self::Space && wanted.is_none_or(|wanted| count >= wanted);
+            let before = may_hold.then(|| before_comment(cell)).flatten();
+            let before = before.filter(|before| number(before).is_some());
+            is_over = before.is_some();
+            Some(before.unwrap_or(cell))
+        })
     }
 
     /// Its name as a part of a sentence.
@@ -131,15 +157,36 @@ pub(in crate::io) fn no_number(cell: &[u8]) -> Fault {
     })
 }
 
-/// A content line without comments: None for a blank line and for a comment, which starts with `#`
-/// or `//`.
+/// Marks with which comments start.
+const COMMENTS: [&[u8]; 3] = [b"#", b"//", b"%"];
+
+fn starts_comment(text: &[u8]) -> bool {
+    COMMENTS.iter().any(|mark| text.starts_with(mark))
+}
+
+/// The text after the mark of a comment.
+pub(super) fn comment_of(line: &[u8]) -> Option<&[u8]> {
+    let line = line.trim_ascii();
+    let text = COMMENTS.iter().find_map(|mark| line.strip_prefix(*mark))?;
+    Some(text.trim_ascii_start()).filter(|text| !text.is_empty())
+}
+
+/// The text before a comment that follows white space; None without a comment or such a text.
+fn before_comment(line: &[u8]) -> Option<&[u8]> {
+    let is_start = |at: usize| line[at].is_ascii_whitespace() && starts_comment(&line[at + 1..]);
+    let at = (0..line.len()).find(|at| is_start(*at))?;
+    Some(line[..at].trim_ascii()).filter(|before| !before.is_empty())
+}
+
+/// A content line without comments: None for a blank line and for a comment, which starts with `#`,
+/// `//` or `%`.
 pub(in crate::io) fn content(line: &[u8]) -> Option<&[u8]> {
     // Tabs at the ends are empty cells.
     let is_blank = |byte: &u8| matches!(byte, b' ' | b'\r' | b'\n');
     let start = line.iter().position(|byte| !is_blank(byte))?;
     let end = line.iter().rposition(|byte| !is_blank(byte))?;
     let line = &line[start..=end];
-    (!line.starts_with(b"#") && !line.starts_with(b"//") && !line.trim_ascii().is_empty()).then_some(line)
+    (!starts_comment(line) && !line.trim_ascii().is_empty()).then_some(line)
 }
 
 #[cfg(test)]
@@ -180,7 +227,7 @@ mod tests {
 
     #[test]
     fn comments_and_blank_lines_have_no_content() {
-        for line in ["", "  ", "# 1 2 3", "//X Y Z", " \r", "\t\t"] {
+        for line in ["", "  ", "# 1 2 3", "//X Y Z", "% x y z", " \r", "\t\t"] {
             assert_eq!(content(line.as_bytes()), None, "{line:?}");
         }
         assert_eq!(content(b" 1 2\r"), Some(&b"1 2"[..]));

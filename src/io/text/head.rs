@@ -1,8 +1,8 @@
 //! The first lines of a table: the separator, the names of the columns, and where the rows start.
 
-use super::cells::{Separator, content, has_decimal_comma, no_number, number};
-use super::guess;
-use crate::io::attributes::find;
+use super::cells::{Separator, comment_of, content, has_decimal_comma, no_number, number};
+use super::guess::{self, Guess, Sample};
+use super::names::names_in;
 use crate::io::fault::Fault;
 use crate::io::values::shown;
 
@@ -10,11 +10,7 @@ use crate::io::values::shown;
 const SAMPLE: usize = 1000;
 
 /// The most columns of a table.
-const MOST_COLUMNS: usize = 256;
-
-/// Names of coordinates in headers.
-const COORDINATES: [&[&str]; 3] =
-    [&["x", "easting", "east"], &["y", "northing", "north"], &["z", "elevation", "height", "altitude"]];
+pub(super) const MOST_COLUMNS: usize = 256;
 
 /// The meaning of the first lines of a table.
 #[derive(Debug)]
@@ -24,6 +20,12 @@ pub(super) struct Head {
     pub(super) names: Vec<String>,
     /// Whether the names are a guess.
     pub(super) is_guess: bool,
+    /// A reason why the guess may be wrong, as a clause.
+    pub(super) doubt: Option<String>,
+    /// There is neither a row nor a name of a column.
+    pub(super) is_empty: bool,
+    /// Rows have more cells than columns, in any number.
+    pub(super) is_open: bool,
     /// For each column, whether its cells are words, which are not read.
     pub(super) is_text: Vec<bool>,
     /// The number of points that a line in front of the rows promises.
@@ -54,42 +56,51 @@ struct Front {
     comment: Option<Header>,
     /// The number of points.
     promised: Option<u64>,
+    /// The names are those of COLMAP's `points3D.txt`, whose rows end with a track.
+    is_open: bool,
 }
 
 impl Head {
-    /// Finds the columns from the first block of a text.
+    /// Finds the columns from the first block of a text. In a `pts` file, intensities precede
+    /// colours.
     ///
     /// # Errors
     ///
     /// [`Fault::Malformed`] with the number of the line that is neither a header nor a row.
-    pub(super) fn of(block: &[u8], line_end: u8) -> Result<Self, Fault> {
+    pub(super) fn of(block: &[u8], line_end: u8, is_pts: bool) -> Result<Self, Fault> {
         let (mut front, mut offset, mut lines) = (Front::default(), 0, 0);
         for line in block.split_inclusive(|byte| *byte == line_end) {
             if let Some(own) = content(line) {
                 if !front.take(own, lines + 1).map_err(in_line(lines + 1))? {
                     break;
                 }
-            } else if let Some(names) = comment_of(line).and_then(names_in) {
+            } else if let Some(names) = comment_of(line).and_then(names_in).filter(|_| !front.is_open) {
+                let has_track = names.get(TRACKED.len()).is_some_and(|name| name.starts_with("TRACK"));
+                front.is_open = has_track && names[0] == TRACKED[0];
+                let names = if front.is_open { TRACKED.map(str::to_owned).to_vec() } else { names };
                 front.comment = Some((lines + 1, names));
             }
             offset += line.len();
             lines += 1;
         }
-        front.head((&block[offset..], line_end), (offset, lines))
+        front.head((&block[offset..], line_end), (offset, lines), is_pts)
     }
 }
+
+/// The columns of COLMAP's `points3D.txt`, after which each row has a track of any length.
+const TRACKED: [&str; 8] = ["POINT3D_ID", "x", "y", "z", "R", "G", "B", "ERROR"];
 
 impl Front {
     /// Takes a line that is no comment; returns false if it is the first row.
     fn take(&mut self, line: &[u8], number: u64) -> Result<bool, Fault> {
         let separator = Separator::of(line)?;
-        let numbers = separator.cells(line).map(self::number);
-        let is_row = numbers.clone().all(|number| number.is_some());
-        let count = numbers.clone().flatten().next().filter(|count| *count >= 0.0 && count.fract() == 0.0);
+        let numbers: Vec<Option<f64>> = separator.row(line, None).map(self::number).collect();
+        let is_row = numbers.iter().all(Option::is_some);
+        let count = numbers.iter().flatten().next().filter(|count| **count >= 0.0 && count.fract() == 0.0);
         match (is_row, count) {
-            (true, Some(count)) if numbers.clone().count() == 1 && self.promised.is_none() => {
+            (true, Some(count)) if numbers.len() == 1 && self.promised.is_none() => {
                 // The cast saturates.
-                self.promised = Some(count as u64);
+                self.promised = Some(*count as u64);
                 Ok(true)
             }
             (true, _) => Ok(false),
@@ -103,46 +114,74 @@ impl Front {
 
     /// Finds the columns from the rows that `text` starts with, which lie behind `start` bytes and
     /// lines.
-    fn head(self, (text, line_end): (&[u8], u8), start: (usize, u64)) -> Result<Head, Fault> {
-        let Self { header, comment, promised } = self;
-        let (mut rows, mut length): (Vec<Vec<Option<f64>>>, usize) = (Vec::new(), 0);
-        let mut separator = None;
-        for (line, own) in (start.1 + 1..).zip(text.split_inclusive(|byte| *byte == line_end)) {
-            length += own.len();
-            let Some(own) = content(own) else { continue };
-            let separator = match separator {
-                Some(known) => known,
-                None => *separator.insert(Separator::of(own).map_err(in_line(line))?),
-            };
-            let mut cells: Vec<_> = separator.cells(own).map(number).collect();
-            let wanted = rows.first().map(Vec::len).or(header.as_ref().map(|(_, names)| names.len()));
-            if wanted == Some(cells.len() + 1) && separator.ends_empty(own) {
-                cells.push(Some(f64::NAN));
-            }
-            if rows.is_empty() {
-                check_count(cells.len(), header.as_ref()).map_err(in_line(line))?;
-            }
-            // Rows of other lengths are refused where they are read.
-            if rows.len() == SAMPLE || rows.first().is_some_and(|first| first.len() != cells.len()) {
-                break;
-            }
-            rows.push(cells);
-        }
+    fn head(self, text: (&[u8], u8), start: (usize, u64), is_pts: bool) -> Result<Head, Fault> {
+        let Rows { rows, separator, mut sample, length } = self.rows(text, start.1)?;
+        let Self { header, comment, promised, is_open } = self;
         let count = rows.first().map_or(3, Vec::len);
         let named = header.or(comment.filter(|(_, names)| names.len() == count || rows.is_empty()));
+        let is_empty = named.is_none() && rows.is_empty();
         let is_guess = named.is_none() && count > 3;
         let values = |row: &Vec<Option<f64>>| row.iter().map(|cell| cell.unwrap_or(f64::NAN)).collect();
-        let guessed = || guess::names(&rows.iter().map(values).collect::<Vec<_>>());
-        let names = named.map_or_else(guessed, |(_, names)| names);
+        sample.rows = rows.iter().map(values).collect();
+        (sample.is_pts, sample.is_counted) = (is_pts, promised.is_some());
+        let Guess { names, doubt } = match named {
+            Some((_, names)) => Guess { names, doubt: None },
+            None => guess::names(&sample),
+        };
         let is_text = |(column, name): (usize, &String)| {
             let is_axis = ["x", "y", "z"].contains(&name.as_str());
             !is_axis && !rows.is_empty() && rows.iter().all(|row| row[column].is_none())
         };
         let is_text = names.iter().enumerate().map(is_text).collect();
         let row_length = (length / rows.len().max(1)) as u64;
-        let separator = separator.unwrap_or(Separator::Space);
-        Ok(Head { separator, names, is_guess, is_text, promised, start, row_length })
+        Ok(Head { separator, names, is_guess, doubt, is_empty, is_open, is_text, promised, start, row_length })
     }
+
+    /// Reads the first rows of a text with this end of lines, behind `before` lines.
+    fn rows(&self, (text, line_end): (&[u8], u8), before: u64) -> Result<Rows, Fault> {
+        let (mut rows, mut length): (Vec<Vec<Option<f64>>>, usize) = (Vec::new(), 0);
+        let (mut separator, mut sample) = (None, Sample::default());
+        let tracked = self.comment.as_ref().filter(|_| self.is_open);
+        let header = self.header.as_ref().or(tracked);
+        for (line, own) in (before + 1..).zip(text.split_inclusive(|byte| *byte == line_end)) {
+            length += own.len();
+            let Some(own) = content(own) else { continue };
+            let separator = match separator {
+                Some(known) => known,
+                None => *separator.insert(Separator::of(own).map_err(in_line(line))?),
+            };
+            let wanted = rows.first().map(Vec::len).or(header.map(|(_, names)| names.len()));
+            let most = wanted.filter(|_| self.is_open).unwrap_or(usize::MAX);
+            let words: Vec<&[u8]> = separator.row(own, wanted).take(most).collect();
+            let mut cells: Vec<_> = words.iter().map(|word| number(word)).collect();
+            if wanted == Some(cells.len() + 1) && separator.ends_empty(own) {
+                cells.push(Some(f64::NAN));
+            }
+            if rows.is_empty() {
+                check_count(cells.len(), header).map_err(in_line(line))?;
+            }
+            // Rows of other lengths are refused where they are read.
+            if rows.len() == SAMPLE || rows.first().is_some_and(|first| first.len() != cells.len()) {
+                break;
+            }
+            sample.fractional.resize(cells.len(), false);
+            let has_point = |word: &&[u8]| word.iter().any(|byte| matches!(byte, b'.' | b'e' | b'E'));
+            sample.fractional.iter_mut().zip(&words).for_each(|(is, word)| *is |= has_point(word));
+            rows.push(cells);
+        }
+        Ok(Rows { rows, separator: separator.unwrap_or(Separator::Space), sample, length })
+    }
+}
+
+/// The first rows of a text.
+struct Rows {
+    /// Their numbers; None for words.
+    rows: Vec<Vec<Option<f64>>>,
+    separator: Separator,
+    /// The forms of their numbers.
+    sample: Sample,
+    /// The bytes of their lines.
+    length: usize,
 }
 
 /// Checks the number of cells of a row.
@@ -160,29 +199,6 @@ fn check_count(count: usize, header: Option<&Header>) -> Result<(), Fault> {
 /// The number of columns of a row as a part of a sentence.
 pub(super) fn columns(count: usize) -> String {
     if count == 1 { "it has 1 column".into() } else { format!("it has {count} columns") }
-}
-
-/// The text after the mark of a comment.
-fn comment_of(line: &[u8]) -> Option<&[u8]> {
-    let line = line.trim_ascii();
-    let text = line.strip_prefix(b"//").or_else(|| line.strip_prefix(b"#"))?;
-    Some(text.trim_ascii_start()).filter(|text| !text.is_empty())
-}
-
-/// The names of the columns in a header; None if x, y and z are not among them. Coordinates get the
-/// names `x`, `y` and `z`.
-fn names_in(line: &[u8]) -> Option<Vec<String>> {
-    let separator = Separator::of(line).ok()?;
-    let name = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
-    let mut names: Vec<String> = separator.cells(line).take(MOST_COLUMNS).map(name).collect();
-    // A unit may follow the name of a coordinate: `X [m]`.
-    let plain: Vec<String> =
-        names.iter().map(|name| name.split(['[', '(']).next().unwrap_or_default().trim().to_owned()).collect();
-    let places = COORDINATES.map(|known| find(known, plain.iter().map(String::as_str)));
-    for (axis, place) in ["x", "y", "z"].into_iter().zip(places) {
-        *names.get_mut(place?)? = axis.to_owned();
-    }
-    Some(names)
 }
 
 /// The fault of a first line that is neither a row nor a header.

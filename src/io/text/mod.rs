@@ -4,6 +4,7 @@ mod blocks;
 mod cells;
 mod guess;
 mod head;
+mod names;
 mod ptx;
 mod rows;
 
@@ -29,10 +30,12 @@ use rows::{Parsed, Shape, located};
 /// Reads the points of a text with a point per line.
 ///
 /// - Separators are spaces, tabs, commas or semicolons, found from the first row. Blank lines and
-///   comments, which start with `#` or `//`, are skipped. Text may be in UTF-8 or UTF-16.
+///   comments, which start with `#`, `//` or `%`, are skipped; a comment may follow the numbers of
+///   a row. Text may be in UTF-8 or UTF-16.
 /// - A first line with the names x, y and z, also as a comment, names the columns: attributes have
 ///   the names that PLY vertices have, and other columns of numbers can be asked for by their
 ///   names. An empty cell, or `NA`, is a number that is missing.
+/// - The comments of COLMAP's `points3D.txt` name its columns; its tracks are not read.
 /// - Without names, columns are taken as x, y, z, and what their number and their values suggest;
 ///   [`Points::notes`] says so.
 /// - A first line of one number, as in PTS files, is the number of points.
@@ -71,7 +74,7 @@ pub fn read_ptx(input: Input, options: &ReadOptions, progress: &dyn Progress) ->
 }
 
 /// Whether the file at `path` has an extension of text of any kind, `.txt` or `.csv`, and does not
-/// start as a table. Such files often lie beside point clouds.
+/// start as a table, with the names of columns or a row. Such files often lie beside point clouds.
 pub(crate) fn is_other_text(path: &Path) -> bool {
     /// The bytes that decide.
     const START: u64 = 1 << 16;
@@ -88,7 +91,7 @@ pub(crate) fn is_other_text(path: &Path) -> bool {
         }
         let mut blocks = Blocks::new(encoding::decoded(Cursor::new(start), length)?.0)?;
         let first = blocks.next()?.unwrap_or_default();
-        Head::of(&first, blocks.line_end).map(|_| true)
+        Head::of(&first, blocks.line_end, false).map(|head| !head.is_empty)
     };
     !is_table().unwrap_or(false)
 }
@@ -132,7 +135,8 @@ fn read_with(
 /// Reads a table, whose rows all have the same columns.
 fn table(mut text: Text<'_>) -> Result<Points, Fault> {
     let mut first = text.blocks.next()?.unwrap_or_default();
-    let head = Head::of(&first, text.blocks.line_end)?;
+    let has_counts = text.format == "PTS";
+    let head = Head::of(&first, text.blocks.line_end, has_counts)?;
     let (start, mut lines) = head.start;
     first.drain(..start);
     text.progress.advance(start as u64);
@@ -149,8 +153,8 @@ fn table(mut text: Text<'_>) -> Result<Points, Fault> {
         is_needed
     };
     let (is_read, is_strict) = (is_needed(&table), is_needed(&Table::of(names, &picture)?));
-    let has_counts = text.format == "PTS";
-    let shape = Shape { separator: head.separator, line_end: text.blocks.line_end, is_read, is_strict, has_counts };
+    let Head { separator, is_open, .. } = head;
+    let shape = Shape { separator, line_end: text.blocks.line_end, is_read, is_strict, has_counts, is_open };
     let mut rows = table.with_capacity(text.length / head.row_length.max(2) + 1)?;
     let mut promised = head.promised;
     text.each(&shape, |parsed| {
@@ -164,6 +168,10 @@ fn table(mut text: Text<'_>) -> Result<Points, Fault> {
     if head.is_guess {
         let names = head.names.join(" ");
         points.notes.push(format!("{}: columns are taken as {names}; a first line with names would decide", text.name));
+    }
+    if let Some(doubt) = head.doubt {
+        let what = "a first line with names, such as x y z red green blue, would decide";
+        points.notes.push(format!("warning: {}: {doubt}: {what}", text.name));
     }
     if let Some(promised) = promised.filter(|promised| *promised > read) {
         text.lacks(&mut points, format!("it promises {promised} points, and ends after {read}"))?;
@@ -179,15 +187,12 @@ fn table(mut text: Text<'_>) -> Result<Points, Fault> {
 /// Reads the scans of a PTX file.
 fn scans(mut text: Text<'_>) -> Result<Points, Fault> {
     let line_end = text.blocks.line_end;
-    let shape =
-        Shape { separator: Separator::Space, line_end, is_read: Vec::new(), is_strict: Vec::new(), has_counts: false };
-    let first = text.blocks.next()?.unwrap_or_default();
-    let (head, _) = located(shape.parse(&first), &mut 0)?;
-    text.blocks.put_back(first);
-    let mut scans = Scans::new(&head);
-    let table = Table::of(scans.names().iter().map(|name| (*name).to_owned()).collect(), text.options)?;
-    let mut rows = table.with_capacity(head.ends.len() as u64)?;
-    let mut lines = 0;
+    let (is_read, is_strict) = (Vec::new(), Vec::new());
+    let shape = Shape { separator: Separator::Space, line_end, is_read, is_strict, has_counts: false, is_open: false };
+    let names = |width: usize| ptx::NAMES[..width].iter().map(|name| (*name).to_owned()).collect();
+    let table = Table::of(names(ptx::NAMES.len()), text.options)?;
+    let (mut scans, mut lines) = (Scans::default(), 0);
+    let mut rows = table.with_capacity(0)?;
     text.each(&shape, |parsed| {
         let (parsed, first) = located(parsed, &mut lines)?;
         let points = scans.take(&parsed).map_err(|(line, fault)| in_line(first + line)(fault))?;
@@ -195,6 +200,10 @@ fn scans(mut text: Text<'_>) -> Result<Points, Fault> {
         Ok(())
     })?;
     let mut points = rows.finish(false)?;
+    // Whether scans have intensities and colours is known only now.
+    let table = Table::of(names(scans.width()), text.options)?;
+    points.raw.iter_mut().for_each(|raw| raw.leave_out_columns([scans.width() > 4, scans.width() > 3]));
+    points.spans.retain(|span| !ptx::NAMES[scans.width()..].contains(&span.name.to_ascii_lowercase().as_str()));
     let kept = points.positions.len() as u64;
     points.left_out = ptx::in_file(&points.left_out, std::mem::take(&mut scans.missing), kept);
     if scans.lacks() > 0 {
@@ -257,6 +266,7 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             is_other_text(&path)
         };
+        assert!(is_other("empty.txt", "") && is_other("note.txt", "# by hand\n\n") && is_other("count.txt", "3\n"));
         assert!(is_other("readme.txt", "tiles\n") && is_other("Report.CSV", "name,value\nwidth,3\n"));
         assert!(!is_other("a.txt", "1 2 3\n") && !is_other("a.csv", "x,y,z\n1,2,3\n"));
         assert!(!is_other("b.txt", "ply\nformat ascii 1.0\n"));

@@ -13,8 +13,8 @@ const MATRIX: usize = 6;
 /// Finds the points of the scans among the rows of a file.
 #[derive(Debug, Default)]
 pub(super) struct Scans {
-    /// The numbers of a point that are used: three, or seven with an intensity and a colour.
-    width: usize,
+    /// The most numbers of a point so far.
+    widest: usize,
     /// The lines of the current scan's header so far.
     header: Vec<Vec<f64>>,
     /// The points that the current scan still has.
@@ -31,21 +31,14 @@ pub(super) struct Scans {
 pub(super) const NAMES: [&str; 7] = ["x", "y", "z", "intensity", "red", "green", "blue"];
 
 impl Scans {
-    /// Starts a file whose first rows are `parsed`; its first point shows how many numbers the
-    /// others have.
-    pub(super) fn new(parsed: &Parsed) -> Self {
-        let end = |row: usize| parsed.ends.get(row).map_or(0, |(end, _)| *end);
-        let width = match end(HEADER).saturating_sub(end(HEADER - 1)) {
+    /// The number of [`NAMES`] that points have: three, four with an intensity, or seven with a
+    /// colour too.
+    pub(super) fn width(&self) -> usize {
+        match self.widest {
             7.. => 7,
             4.. => 4,
             _ => 3,
-        };
-        Self { width, ..Self::default() }
-    }
-
-    /// The names of the numbers that [`take`](Self::take) returns.
-    pub(super) fn names(&self) -> &'static [&'static str] {
-        &NAMES[..self.width]
+        }
     }
 
     /// The points that the last scan lacks.
@@ -53,7 +46,8 @@ impl Scans {
         self.left
     }
 
-    /// Returns the numbers of the points in the rows of a block, in the coordinates of the file.
+    /// Returns the numbers of the points in the rows of a block, in the coordinates of the file: one
+    /// for each of [`NAMES`], NaN where a point has none.
     ///
     /// # Errors
     ///
@@ -82,7 +76,9 @@ impl Scans {
             _ => (4, "a line of the matrix of a scan"),
         };
         if row.len() != wanted || row.iter().any(|number| !number.is_finite()) {
-            return Err(format!("{wanted} numbers are needed here, {what}; it has {}", row.len()));
+            let [needs, has] = [wanted, row.len()]
+                .map(|count| if count == 1 { "1 number".into() } else { format!("{count} numbers") });
+            return Err(format!("a row of {needs} is needed here, {what}; it has {has}"));
         }
         if place < 2 && (row[0] < 0.0 || row[0].fract() != 0.0) {
             return Err(format!("a whole number is needed here, {what}, not {}", row[0]));
@@ -98,7 +94,8 @@ impl Scans {
 
     fn point(&mut self, row: &[f64], points: &mut Vec<f64>) -> Result<(), String> {
         if row.len() < 3 {
-            return Err(format!("its scan still lacks {} points, but it has {} numbers", self.left, row.len()));
+            let has = if row.len() == 1 { "1 number".into() } else { format!("{} numbers", row.len()) };
+            return Err(format!("its scan still lacks {} points, but it has {has}", self.left));
         }
         self.left -= 1;
         self.next += 1;
@@ -110,8 +107,10 @@ impl Scans {
         let line = |k: usize, axis: usize| self.header.get(MATRIX + k).map_or(0.0, |line| line[axis]);
         let place = |axis: usize| x * line(0, axis) + y * line(1, axis) + z * line(2, axis) + line(3, axis);
         points.extend([0, 1, 2].map(place));
-        // A scan without colours among others has none.
-        points.extend((3..self.width).map(|k| row.get(k).copied().unwrap_or(f64::NAN)));
+        self.widest = self.widest.max(row.len());
+        // A colour is whole or none.
+        let own = if row.len() < NAMES.len() { &row[..row.len().min(4)] } else { row };
+        points.extend((3..NAMES.len()).map(|k| own.get(k).copied().unwrap_or(f64::NAN)));
         Ok(())
     }
 }

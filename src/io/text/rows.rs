@@ -15,6 +15,8 @@ pub(super) struct Shape {
     pub(super) is_strict: Vec<bool>,
     /// A row of a single number says how many rows follow.
     pub(super) has_counts: bool,
+    /// Rows may have more cells than columns, which are not read.
+    pub(super) is_open: bool,
 }
 
 /// The rows of a block.
@@ -52,9 +54,8 @@ impl Shape {
     fn row(&self, line: &[u8], parsed: &mut Parsed) -> Result<(), Fault> {
         let (before, mut count) = (parsed.values.len(), 0);
         let is_ragged = self.is_read.is_empty();
-        for cell in self.separator.cells(line) {
-            // A comment may follow the numbers.
-            if cell.starts_with(b"#") || cell.starts_with(b"//") {
+        for cell in self.separator.row(line, (!is_ragged).then_some(self.is_read.len())) {
+            if self.is_open && count == self.is_read.len() {
                 break;
             }
             if is_ragged || self.is_read.get(count).copied().unwrap_or_default() {

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use self::cover::Facet;
 pub(super) use self::fans::TOLERANCE;
 use self::fans::{Around, Fan};
+pub(crate) use self::skin::vertex_colors;
 use self::skin::{Look, Skin};
 pub(super) use self::skin::{Painting, color_vertices};
 use crate::io::Points;

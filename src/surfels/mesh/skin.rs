@@ -222,17 +222,22 @@ fn times(color: [f32; 4], factor: Option<[f32; 4]>) -> [f32; 4] {
     factor.map_or(color, |factor| std::array::from_fn(|k| color[k] * factor[k]))
 }
 
-/// Sets the colour of each vertex of a mesh to the mean colour of the triangles there, because the
-/// triangles are not drawn.
+/// Sets the colour of each vertex of a mesh to its [`vertex_colors`], because the triangles are not
+/// drawn.
 pub(in crate::low_level::surfels) fn color_vertices(points: &mut Points) {
-    let Some((paint, triangles)) =
-        points.faces.as_mut().and_then(|faces| Some((faces.paint.take()?, &faces.triangles)))
-    else {
-        return;
-    };
+    if let Some(colors) = vertex_colors(points) {
+        points.colors = Some(colors);
+    }
+    points.faces.iter_mut().for_each(|faces| faces.paint = None);
+}
+
+/// The mean colour of the triangles at each vertex of a mesh; None if no triangle has a colour
+/// besides those of its vertices.
+pub(crate) fn vertex_colors(points: &Points) -> Option<Colors> {
+    let faces = points.faces.as_ref()?;
+    let (paint, triangles) = (faces.paint.as_deref()?, &faces.triangles);
     let of_vertices = points.colors.is_some();
-    let skin =
-        Skin { paint: &paint, triangles, facets: &[], painting: Painting::Given, of_vertices, means: Vec::new() };
+    let skin = Skin { paint, triangles, facets: &[], painting: Painting::Given, of_vertices, means: Vec::new() };
     let mut sums = vec![[0.0f64; 5]; points.positions.len()];
     for (index, corners) in triangles.iter().enumerate() {
         let image = skin.image(index);
@@ -251,14 +256,14 @@ pub(in crate::low_level::surfels) fn color_vertices(points: &mut Points) {
         }
     }
     if sums.iter().all(|sum| sum[4] == 0.0) {
-        return;
+        return None;
     }
     let own = |index: usize| points.colors.as_ref().map_or(DEFAULT_COLOR, |colors| colors.linear(index));
     let color = |(index, [r, g, b, a, count]): (usize, &[f64; 5])| match *count > 0.0 {
         true => straight([r / count, g / count, b / count, a / count]),
         false => own(index),
     };
-    points.colors = Some(Colors::Linear(sums.iter().enumerate().map(color).collect()));
+    Some(Colors::Linear(sums.iter().enumerate().map(color).collect()))
 }
 
 #[cfg(test)]

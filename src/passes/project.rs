@@ -52,12 +52,20 @@ pub(super) fn projected(
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
     let [s, t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
-    let seen = cap.map(|cap| Seen { p, s, t, cap });
+    let own = match camera.optics {
+        Some(_) => Some(homography::own(camera, p, s, t).ok_or(Missed::Behind)?),
+        None => None,
+    };
+    let (p, s, t) = own.as_ref().map_or((p, s, t), |own| (DVec3::Z * own.depth, own.s, own.t));
+    let seen = cap.filter(|_| own.is_none()).map(|cap| Seen { p, s, t, cap });
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
         return Err(Missed::Behind);
     }
-    let mut projected = homography::projected(camera, p, s, t);
+    let mut projected = match &own {
+        Some(own) => homography::lens(camera, own),
+        None => homography::projected(camera, p, s, t),
+    };
     let near = depths[0].max(camera.near);
     let depths = [near, depths[1].max(near)];
     let curve = seen.as_ref().map(|seen| {

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
+    Blend, Camera, Composite, Cull, Epsilon, Form, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
     Shading,
 };
 
@@ -18,6 +18,8 @@ pub struct SceneNeeds {
     pub surface: Surface,
     /// The camera model.
     pub projection: Projection,
+    /// The form of a lens that is no pinhole.
+    pub lens: Option<Form>,
     /// The format of sums on the device.
     pub accumulator: Accumulator,
     /// The accumulator is `fixed` and terms may be small. Either alphas differ, so that means may
@@ -200,6 +202,7 @@ impl SceneNeeds {
         Self {
             surface,
             projection: camera.projection,
+            lens: camera.optics.map(|optics| optics.form),
             accumulator: options.accumulator,
             wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || order_free),
             atomics_u64: false,
@@ -233,7 +236,7 @@ impl SceneNeeds {
             cull_back: culls_back(facts, camera, options),
             clips: (facts.clips || options.outline.is_some()) && options.facing.is_none(),
             outline: options.outline.is_some(),
-            curved: node_caps || (facts.caps && options.draws_caps()),
+            curved: node_caps || (facts.caps && options.draws_caps() && camera.optics.is_none()),
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
@@ -330,9 +333,10 @@ impl SceneNeeds {
 
     /// Returns the names of the needs, for people and JSON.
     pub fn names(&self) -> Vec<&'static str> {
-        let projection = match self.projection {
-            Projection::Pinhole => "pinhole",
-            Projection::Orthographic => "orthographic",
+        let projection = match (self.lens, self.projection) {
+            (Some(form), _) => form.need(),
+            (None, Projection::Pinhole) => "pinhole",
+            (None, Projection::Orthographic) => "orthographic",
         };
         let color = match self.color {
             ColorNeed::Constant => "color-constant",

@@ -135,6 +135,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// [`Error::Limit`] if a limit of the adapter is too small, and any error of the device.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
         let start = Instant::now();
+        self.check_lens(camera)?;
         let detail = self.sized(camera);
         let spent = start.elapsed().as_secs_f64() * 1e3;
         let Self { source, backend, sources, faults, kept, of_maps, .. } = self;
@@ -158,6 +159,13 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             encoded::decode(&mut frame);
         }
         Ok((self.filtered(frame, camera), report))
+    }
+
+    /// Rejects what a camera whose lens is no pinhole does not show.
+    fn check_lens(&self, camera: &Camera) -> Result<()> {
+        let reference = matches!(self.backend.borrow(), Backend::Reference);
+        let options = Settings { detail: self.detail, ..self.kept.options.clone() };
+        check::lens(&self.kept.facts, camera, &options, reference)
     }
 
     /// Applies the filters of finished pictures, and removes a map that only they need.

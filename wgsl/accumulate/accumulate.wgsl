@@ -7,7 +7,7 @@
 // #import *::{front_at}
 // #import blend|winner::{attributes_of}
 // #import blend|winner_second::{blend}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import cull::{surfel_in}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{Rectangle, TILE, footprint, large_splat, pixel_index, reach}

@@ -8,7 +8,7 @@
 // #import accumulator_raster|visibility::{nearest}
 // #import blend::{fragment_weight}
 // #import blend|winner::{Attributes, attributes_of}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import cull::{slot_of, surfel_in}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{TILE, band_pixels, footprint, is_large, large_splat, pixel_index, reach}

@@ -5,8 +5,8 @@
 // (src/passes/curved.rs).
 // Same interface as flat.wgsl. Twins: src/scene/cap.rs, src/passes/curved.rs.
 // #import attributes::{attribute_word}
-// #import camera_*::{Fragment, holds_center, image_step, shear, spread_of, third_row, toward}
-// #import camera_*::{widening}
+// #import camera_orthographic|perspective::{Fragment, holds_center, image_step, shear, spread_of}
+// #import camera_orthographic|perspective::{third_row, toward, widening}
 // #import clip::{CLIP_ROWS, cuts}
 // #import double::{Double}
 // #import filter|lowpass_none::{FILTERED, FILTER_ROWS, Filter}

@@ -6,7 +6,7 @@
 // Twin: src/passes/project.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xcef1f98530961466
 // #import axes_*::{half_axes}
-// #import camera_*::{homography}
+// #import camera_orthographic|perspective::{homography}
 // #import center|center_doubled::{relative_center}
 // #import clip::{clip_of}
 // #import copies::{copies_of}

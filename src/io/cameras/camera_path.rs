@@ -49,7 +49,7 @@ pub(super) fn read(file: &Value, _: (u32, u32)) -> Result<Vec<NamedCamera>, Stri
     };
     let of_entry = |(index, entry): (usize, &Value)| {
         let camera = camera(entry, size).map_err(|what| format!("camera {} of camera_path: {what}", index + 1))?;
-        Ok(NamedCamera { name: format!("{index:04}"), camera, distortion: None })
+        Ok(NamedCamera { name: format!("{index:04}"), camera, undrawn: None })
     };
     raw.camera_path.iter().enumerate().map(of_entry).collect()
 }

@@ -69,6 +69,21 @@ pub(super) struct Own {
     pub(super) depth: f64,
     pub(super) s: DVec3,
     pub(super) t: DVec3,
+    /// The rows of the change to these axes.
+    rows: [DVec3; 3],
+}
+
+impl Own {
+    /// A vector of camera space in these axes.
+    pub(super) fn axes(&self, v: DVec3) -> DVec3 {
+        DVec3::from_array(self.rows.map(|row| row.dot(v)))
+    }
+
+    /// The own pinhole, with the size and the near depth of `camera`.
+    pub(super) fn camera(&self, camera: &Camera) -> Camera {
+        let DVec2 { x: cx, y: cy } = self.image;
+        Camera { fx: 1.0, fy: 1.0, cx, cy, optics: None, ..camera.clone() }
+    }
 }
 
 /// The own pinhole of a splat with centre `p` and half-axes `s` and `t` (camera space); `None` if
@@ -78,15 +93,16 @@ pub(super) fn own(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Option<Own> 
     let focal = DVec2::new(camera.fx, camera.fy);
     let image = focal * sight.plane + DVec2::new(camera.cx, camera.cy);
     let [across, down] = [sight.steps[0] * focal.x, sight.steps[1] * focal.y];
-    let of = |v: DVec3| DVec3::new(across.dot(v), down.dot(v), sight.axis.dot(v));
-    (image.abs().max_element() < FARTHEST_ANCHOR).then(|| Own { image, depth: sight.depth, s: of(s), t: of(t) })
+    let rows = [across, down, sight.axis];
+    let of = |v: DVec3| DVec3::from_array(rows.map(|row| row.dot(v)));
+    (image.abs().max_element() < FARTHEST_ANCHOR).then(|| Own { image, depth: sight.depth, s: of(s), t: of(t), rows })
 }
 
 /// Projects a disk by a pinhole of its own: one with focal lengths of a pixel, whose axis is the ray
 /// through the disk's centre, and whose image agrees with that of the lens at the centre, in place
 /// and in first derivatives.
-pub(super) fn lens(camera: &Camera, own: &Own) -> Projected {
-    let Own { image, depth, s, t } = *own;
+pub(super) fn lens(near: f64, own: &Own) -> Projected {
+    let Own { image, depth, s, t, .. } = *own;
     let away = depth * (s.x * t.y - s.y * t.x);
     let edge_on = away == 0.0;
     let scale = if edge_on { 0.0 } else { 1.0 / away };
@@ -96,15 +112,15 @@ pub(super) fn lens(camera: &Camera, own: &Own) -> Projected {
     let pixel = image.floor();
     let offset = image - pixel - 0.5;
     let slope = slope(s, t);
-    let is_whole = depth - slope >= camera.near;
+    let is_whole = depth - slope >= near;
     let (across, down, border) = match is_whole {
         true => {
             let along = |s: f64, t: f64| tangents([s, own.s.z], [t, own.t.z], [0.0, depth]);
             (along(s.x, t.x), along(s.y, t.y), 0.0)
         }
         false => {
-            let ends = chord(s, t, depth, slope, camera.near);
-            let along = |s: f64, t: f64| clipped_extent([s, own.s.z], [t, own.t.z], [0.0, depth], ends, camera.near);
+            let ends = chord(s, t, depth, slope, near);
+            let along = |s: f64, t: f64| clipped_extent([s, own.s.z], [t, own.t.z], [0.0, depth], ends, near);
             (along(s.x, t.x), along(s.y, t.y), 1.0)
         }
     };

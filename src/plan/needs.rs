@@ -236,7 +236,7 @@ impl SceneNeeds {
             cull_back: culls_back(facts, camera, options),
             clips: (facts.clips || options.outline.is_some()) && options.facing.is_none(),
             outline: options.outline.is_some(),
-            curved: node_caps || (facts.caps && options.draws_caps() && camera.optics.is_none()),
+            curved: node_caps || (facts.caps && options.draws_caps()),
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
@@ -318,6 +318,11 @@ impl SceneNeeds {
     /// Whether surfaces are compared by their blended depths.
     pub fn compares_depth(&self) -> bool {
         self.surface.separate() || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
+    }
+
+    /// Whether each surfel has two splats: a whole sphere shows those at its border on both sides.
+    pub fn twice(&self) -> bool {
+        self.lens == Some(Form::Equirectangular)
     }
 
     /// Whether depths are summed.

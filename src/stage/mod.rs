@@ -12,6 +12,7 @@ mod encode;
 mod files;
 mod heights;
 mod in_part;
+mod lens;
 mod levels;
 mod map;
 mod memory;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::in_part::{Part, Parts};
-use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, levels, memory};
+use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -258,6 +258,8 @@ impl Renderer {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
+                let bent = is_told.then(|| lens::note(scene, &camera)).flatten();
+                bent.iter().for_each(|line| progress.note(line));
                 let rendered = renderer.frame(&camera, progress)?;
                 Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
             }

@@ -1,7 +1,7 @@
 // What a pinhole (camera_pinhole.wgsl) and other lenses (camera_lens.wgsl) share: rays that start at
 // the eye, and rows that are (u/z, v/z, 1/z). Same interface as camera_orthographic.wgsl.
 // Twins: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd1e7c77a8867fbeb
+// All loops end, by 1 of src/gpu/loops.rs: 0x502c4730b0840c34
 // #import camera_*::{scaled_homography}
 // #import curved|facing|flat::{Spot}
 // #import double::{Double}
@@ -201,8 +201,8 @@ fn shear(p: vec3<f32>) -> vec2<f32> {
 }
 
 // The image, pixels, of displacements `x` perpendicular to the camera's axis, at the given depths.
-fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
-    return x / depths * held.intrinsics.xy;
+fn image_step(x: vec2<f32>, depths: vec2<f32>, focal: vec2<f32>) -> vec2<f32> {
+    return x / depths * focal;
 }
 
 // The value of a homography's third row at a depth.

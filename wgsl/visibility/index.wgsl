@@ -5,7 +5,7 @@
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
 // #import *::{front_at}
 // #import blend::{fragment_weight}
-// #import cull::{slot_of, surfel_in}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{TILE, footprint, is_large, large_splat, pixel_index, reach}

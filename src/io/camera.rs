@@ -142,7 +142,10 @@ fn of_raw(raw: Raw) -> std::result::Result<CameraFile, String> {
         (Model::Fisheye, None, fov, None) => Lens::Fisheye(fov.unwrap_or(DEFAULT_FISHEYE)),
         (Model::Equirectangular, None, None, None) => Lens::Equirectangular,
         (Model::Equirectangular, ..) => {
-            return Err("an equirectangular camera shows the whole sphere: leave fx, fy, cx, cy, fov and height_world out".into());
+            return Err(
+                "an equirectangular camera shows the whole sphere: leave fx, fy, cx, cy, fov and height_world out"
+                    .into(),
+            );
         }
         (Model::Orthographic, None, None, None) => {
             return Err("an orthographic camera needs height_world, or fx, cx and cy".into());

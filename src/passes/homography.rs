@@ -87,9 +87,11 @@ impl Own {
 }
 
 /// The own pinhole of a splat with centre `p` and half-axes `s` and `t` (camera space); `None` if
-/// the lens does not see the centre, or the centre lies before the near depth.
+/// the lens does not see the centre, or the centre lies before the near depth or far outside the
+/// image.
 pub(super) fn own(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Option<Own> {
-    let sight = camera.sight(p).filter(|sight| sight.depth >= camera.near)?;
+    let reach = camera.optics.as_ref()?.reach();
+    let sight = camera.sight(p).filter(|sight| sight.depth >= camera.near && sight.radius <= reach)?;
     let focal = DVec2::new(camera.fx, camera.fy);
     let image = focal * sight.plane + DVec2::new(camera.cx, camera.cy);
     let [across, down] = [sight.steps[0] * focal.x, sight.steps[1] * focal.y];

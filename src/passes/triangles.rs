@@ -341,14 +341,8 @@ pub const PASS: Pass = Pass {
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
-        let all = [
-            "corners.wgsl",
-            vertex,
-            "triangles.wgsl",
-            "triangles_tiles.wgsl",
-            "triangles_attributes.wgsl",
-            texture,
-        ];
+        let all =
+            ["corners.wgsl", vertex, "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", texture];
         all.into_iter().chain(corner.iter().copied()).chain(visibility.iter().copied()).chain(own).collect()
     },
     kernels: |needs| match needs.mesh {

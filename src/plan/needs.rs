@@ -6,8 +6,8 @@ use super::{
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Form, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
-    Shading,
+    Blend, Camera, Composite, Cull, Epsilon, Form, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection,
+    Samples, Shading,
 };
 
 /// The needs of a render. They select the WGSL files that are joined, and with them the bindings,

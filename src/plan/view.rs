@@ -113,7 +113,8 @@ fn lens(camera: &Camera) -> [[f32; 4]; 7] {
         for (row, coefficients) in optics.coefficients().into_iter().enumerate() {
             (rows[row], rows[row + 3]) = split_all(coefficients);
         }
-        rows[6][0] = optics.limit().min(f64::from(f32::MAX)) as f32;
+        let [limit, reach] = [optics.limit(), optics.reach()].map(|radius| radius.min(1e18) as f32);
+        [rows[6][0], rows[6][1]] = [limit, reach];
     }
     rows
 }

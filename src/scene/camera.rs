@@ -113,7 +113,9 @@ impl Lens {
             Self::OrthographicScale(values) => (Projection::Orthographic, values),
             Self::Curved(optics, values) if optics.is_usable() => (Projection::Pinhole, values),
             Self::Curved(..) => {
-                return Err(Error::Usage("the lens shows nothing: its distortion folds the image at its centre".into()));
+                return Err(Error::Usage(
+                    "the lens shows nothing: its distortion folds the image at its centre".into(),
+                ));
             }
             Self::Fisheye(degrees) => {
                 if !(degrees > 0.0 && degrees <= 360.0) {
@@ -275,7 +277,10 @@ impl Camera {
         let forward = rotation.row(2).normalize();
         let right = rotation.row(0).reject_from_normalized(forward).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-        let optics = lens.optics();
+        let corners = [(0.0, 0.0), (width.into(), 0.0), (0.0, height.into()), (width.into(), height.into())];
+        let radius = |(x, y): (f64, f64)| ((x - cx) / fx).hypot((y - cy) / fy);
+        let farthest = corners.map(radius).into_iter().fold(0.0, f64::max);
+        let optics = lens.optics().map(|optics| optics.within(farthest));
         Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near, optics })
     }
 

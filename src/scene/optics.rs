@@ -75,6 +75,7 @@ pub struct Optics {
     /// A factor on X and Y before a fisheye's angle is taken: 1, but for the FOV model.
     wide: f64,
     limit: f64,
+    reach: f64,
 }
 
 /// A point as a lens sees it, with the first derivatives at it.
@@ -84,12 +85,17 @@ pub struct Sight {
     pub plane: DVec2,
     /// The depth of the point, the unit of its coordinates.
     pub depth: f64,
+    /// The radius before the distortion, in focal lengths; 0 for a whole sphere.
+    pub radius: f64,
     /// The depth times the change of [`Self::plane`] per unit of length along each axis of camera
     /// space.
     pub steps: [DVec3; 2],
     /// The change of the depth per unit of length along each axis.
     pub axis: DVec3,
 }
+
+/// How far beyond the corners of the image, in radii of the farthest one, splats are drawn.
+const BEYOND: f64 = 1.1;
 
 /// Steps of the search for the limit of a lens.
 const STEPS: usize = 4096;
@@ -104,7 +110,7 @@ impl Optics {
     /// A lens without distortion.
     pub fn of(form: Form) -> Self {
         let (radial, under, tangential, prism) = ([0.0; 4], [0.0; 3], [0.0; 2], [0.0; 2]);
-        Self { form, radial, under, tangential, prism, wide: 1.0, limit: 0.0 }.limited()
+        Self { form, radial, under, tangential, prism, wide: 1.0, limit: 0.0, reach: 0.0 }.limited()
     }
 
     /// This lens with the radial numerator's coefficients k1 to k4.
@@ -164,7 +170,7 @@ impl Optics {
 
     fn limited(self) -> Self {
         let end = match self.form {
-            Form::Equirectangular => return Self { limit: f64::INFINITY, ..self },
+            Form::Equirectangular => return Self { limit: f64::INFINITY, reach: f64::INFINITY, ..self },
             Form::Fisheye => PI,
             Form::Perspective => WIDEST,
         };
@@ -190,7 +196,36 @@ impl Optics {
                 radius(low)
             }
         };
-        Self { limit, ..self }
+        Self { limit, reach: limit, ..self }
+    }
+
+    /// This lens in a camera whose image ends at `radius` of the plane, in focal lengths: splats are
+    /// drawn up to a tenth farther out ([`Self::reach`]).
+    #[must_use]
+    pub fn within(self, radius: f64) -> Self {
+        if self.form == Form::Equirectangular {
+            return self;
+        }
+        let reach = self.radius_of(BEYOND * radius);
+        Self { reach, ..self }
+    }
+
+    /// The largest radius before the distortion at which the centre of a splat is drawn. Beyond the
+    /// image a lens may be bent so much that the straight image of a splat has nothing in common
+    /// with it.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// The radius, at most [`Self::limit`], that the radial part maps to `wanted`.
+    fn radius_of(&self, wanted: f64) -> f64 {
+        let reached = |r: f64| r * self.radial_at(r * r).0;
+        let (mut low, mut high) = (0.0, self.limit);
+        for _ in 0..64 {
+            let middle = 0.5 * (low + high);
+            if reached(middle) < wanted { low = middle } else { high = middle }
+        }
+        high
     }
 
     /// The factor of the radial part at a squared radius, and its change per unit of that.
@@ -243,7 +278,13 @@ impl Optics {
         }
         let (plane, slope) = self.distorted(e);
         let rows = [slope.row(0), slope.row(1)].map(|row| steps[0] * row.x + steps[1] * row.y);
-        (slope.determinant() > 0.0 && plane.is_finite()).then_some(Sight { plane, depth, steps: rows, axis })
+        (slope.determinant() > 0.0 && plane.is_finite()).then_some(Sight {
+            plane,
+            depth,
+            radius: e.length(),
+            steps: rows,
+            axis,
+        })
     }
 
     /// The ray through a point of the plane: a point of depth 1 in camera space; `None` where the
@@ -269,13 +310,7 @@ impl Optics {
     /// The point that the second step maps to `plane`.
     fn undistorted(&self, plane: DVec2) -> Option<DVec2> {
         let wanted = plane.length();
-        let reached = |r: f64| r * self.radial_at(r * r).0;
-        let (mut low, mut high) = (0.0, self.limit);
-        for _ in 0..64 {
-            let middle = 0.5 * (low + high);
-            if reached(middle) < wanted { low = middle } else { high = middle }
-        }
-        let mut e = if wanted > 0.0 { plane * (high / wanted) } else { plane };
+        let mut e = if wanted > 0.0 { plane * (self.radius_of(wanted) / wanted) } else { plane };
         for _ in 0..ROUNDS {
             let (value, slope) = self.distorted(e);
             let step = slope.inverse() * (plane - value);
@@ -316,6 +351,6 @@ fn sphere(p: DVec3) -> Option<Sight> {
     let plane = DVec2::new(p.x.atan2(p.z), p.y.atan2(level));
     let east = DVec3::new(p.z, 0.0, -p.x) * (depth / (level * level));
     let down = DVec3::new(-p.y * p.x / level, level, -p.y * p.z / level) / depth;
-    let seen = Sight { plane, depth, steps: [east, down], axis: p / depth };
+    let seen = Sight { plane, depth, radius: 0.0, steps: [east, down], axis: p / depth };
     (level > 0.0).then_some(seen)
 }

@@ -71,7 +71,8 @@ fn of_disk(camera: &Camera, p: DVec3, axes: [DVec3; 2]) -> f64 {
     let Some(sight) = camera.sight(p) else { return 0.0 };
     let focal = DVec2::new(camera.fx, camera.fy);
     let end = |v: DVec3| {
-        let own = image + focal * DVec2::new(sight.steps[0].dot(v), sight.steps[1].dot(v)) / (sight.depth + sight.axis.dot(v));
+        let own = image
+            + focal * DVec2::new(sight.steps[0].dot(v), sight.steps[1].dot(v)) / (sight.depth + sight.axis.dot(v));
         let exact = camera.image(p + v).map(|(image, _)| image);
         exact.map_or(0.0, |exact| off(camera, exact, own))
     };

@@ -88,7 +88,9 @@ impl View {
         let default = if lens == Lens::Equirectangular { Self::SPHERE_SIZE } else { Self::DEFAULT_SIZE };
         let size = options.size.unwrap_or(default);
         if lens == Lens::Equirectangular && (options.fov.is_some() || options.intrinsics.is_some()) {
-            return Err(Error::Usage("--projection equirectangular shows the whole sphere: leave --fov and --intrinsics out".into()));
+            return Err(Error::Usage(
+                "--projection equirectangular shows the whole sphere: leave --fov and --intrinsics out".into(),
+            ));
         }
         if lens.optics().is_some() && options.eye.is_none() {
             return Err(Error::Usage("--projection sees all around a point: give it by --eye".into()));

@@ -18,6 +18,8 @@ struct Sight {
     x: Double,
     y: Double,
     depth: Double,
+    // The squared radius before the distortion, in focal lengths; 0 for a whole sphere.
+    radius_2: f32,
     // The depth times the change of x and of y per unit of length along each axis of camera space.
     across: vec3<f32>,
     down: vec3<f32>,
@@ -93,9 +95,10 @@ fn scaled_homography(
     let sight = see(center);
     let depth = sight.depth.high;
     let image = vec2<f32>(sight.x.high, sight.y.high);
-    // A splat whose centre has no image shows nothing. Beyond 2^22 the anchor's arithmetic is no
+    // A splat whose centre has no image, or one far outside, shows nothing. Beyond 2^22 the anchor's arithmetic is no
     // longer exact, and the splat is far outside the image.
-    if (!(sight.seen && depth >= near && all(abs(image) < vec2<f32>(4194304.0)))) {
+    let is_near = sight.radius_2 <= held.lens[6].y * held.lens[6].y;
+    if (!(sight.seen && is_near && depth >= near && all(abs(image) < vec2<f32>(4194304.0)))) {
         return h;
     }
     let s = own_axes(sight, s_camera);

@@ -2,7 +2,7 @@
 // src/scene/optics.rs has the formula; lens_perspective.wgsl and lens_fisheye.wgsl make the first
 // step.
 // Twin: src/scene/optics.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x0772a6298c48a86f
+// All loops end, by 1 of src/gpu/loops.rs: 0x5be0b698cdf3d916
 // #import camera_lens::{Sight}
 // #import double::{Double, product, quotient, sum}
 // #import layout::{held}
@@ -74,6 +74,7 @@ fn distorted(first: Sight) -> Sight {
     let slope = distortion_slope(vec2<f32>(first.x.high, first.y.high));
     sight.across = slope.x * first.across + slope.y * first.down;
     sight.down = slope.z * first.across + slope.w * first.down;
+    sight.radius_2 = r_2.high;
     let limit = lens_limit();
     sight.seen = first.seen && r_2.high <= limit * limit && slope.x * slope.w - slope.y * slope.z > 0.0;
     return sight;

@@ -20,7 +20,9 @@ struct Frame {
 
 fn frame_of(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Frame {
     let sight = see(center);
-    let p = vec3<f32>(0.0, 0.0, select(-1e30, sight.depth.high, sight.seen && sight.depth.high >= held.near));
+    let is_near = sight.radius_2 <= held.lens[6].y * held.lens[6].y;
+    let shows = sight.seen && is_near && sight.depth.high >= held.near;
+    let p = vec3<f32>(0.0, 0.0, select(-1e30, sight.depth.high, shows));
     let radius = max(norm3(s), norm3(t));
     let normal = own_axes(sight, unit3(cross3(s / radius, t / radius)));
     let image = vec2<f32>(sight.x.high, sight.y.high);

@@ -51,7 +51,8 @@ pub(super) fn read(file: &Value, _: (u32, u32)) -> Result<Vec<NamedCamera>, Stri
         _ => return Err("a size is both render_width and render_height".into()),
     };
     let of_entry = |(index, entry): (usize, &Value)| {
-        let camera = camera(entry, size, form).map_err(|what| format!("camera {} of camera_path: {what}", index + 1))?;
+        let camera =
+            camera(entry, size, form).map_err(|what| format!("camera {} of camera_path: {what}", index + 1))?;
         Ok(NamedCamera { name: format!("{index:04}"), camera, undrawn: None })
     };
     raw.camera_path.iter().enumerate().map(of_entry).collect()

@@ -71,12 +71,7 @@ impl Frame<'_> {
         };
         let (width, height) = given.unwrap_or(size);
         let (lens, undrawn) = self.bent_lens(f64::from(width), f64::from(height), given.is_some())?;
-        let camera = CameraFile {
-            size: given,
-            lens,
-            pose: self.pose()?,
-            near: None,
-        };
+        let camera = CameraFile { size: given, lens, pose: self.pose()?, near: None };
         Ok(NamedCamera { name, camera, undrawn })
     }
 
@@ -103,7 +98,8 @@ impl Frame<'_> {
             *value = self.number(key)?.unwrap_or(0.0);
         }
         let [k1, k2, k3, k4, k5, k6, p1, p2] = values;
-        let form = if is_fisheye || model.is_some_and(|model| model.fisheye) { Form::Fisheye } else { Form::Perspective };
+        let form =
+            if is_fisheye || model.is_some_and(|model| model.fisheye) { Form::Fisheye } else { Form::Perspective };
         let plain = Optics::of(form).with_tangential([p1, p2]);
         // OpenCV's model with eight coefficients has a denominator.
         let is_rational = model.is_some_and(|model| model.name == RATIONAL) || k5 != 0.0 || k6 != 0.0;
@@ -249,7 +245,10 @@ mod tests {
         }
         assert_eq!(lens(r#""camera_model": "EQUIRECTANGULAR","#).lens, Lens::Equirectangular);
         let undrawn = one(shared, r#""camera_model": "RAD_TAN_THIN_PRISM_FISHEYE","#).unwrap();
-        assert_eq!((undrawn.camera.lens, undrawn.undrawn), (Lens::Intrinsics(intrinsics), Some("RAD_TAN_THIN_PRISM_FISHEYE")));
+        assert_eq!(
+            (undrawn.camera.lens, undrawn.undrawn),
+            (Lens::Intrinsics(intrinsics), Some("RAD_TAN_THIN_PRISM_FISHEYE"))
+        );
     }
 
     #[test]

@@ -117,12 +117,8 @@ impl Lenses {
         }
         let rotation = DMat3::from_quat(quaternion.normalize());
         let eye = -(rotation.transpose() * DVec3::new(tx, ty, tz));
-        let camera = CameraFile {
-            size: Some(lens.size),
-            lens: lens.lens,
-            pose: Pose::Rigid(rotation, eye),
-            near: None,
-        };
+        let camera =
+            CameraFile { size: Some(lens.size), lens: lens.lens, pose: Pose::Rigid(rotation, eye), near: None };
         Ok(NamedCamera { name, camera, undrawn: lens.undrawn })
     }
 }

@@ -86,7 +86,7 @@ pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
     let corner = |vertex: usize| {
         let p = camera.rotation * (scene.triangles.place(vertex) - eye);
         if camera.optics.is_some() {
-            return match camera.image(p) {
+            return match camera.corner(p) {
                 Some((place, depth)) => Corner { place, w: 1.0, depth, share: 1.0 / depth },
                 None => Corner { place: DVec2::ZERO, w: 0.0, depth: 0.0, share: 0.0 },
             };

@@ -314,6 +314,16 @@ impl Camera {
         (depth >= self.near).then(|| (focal * plane + principal, depth))
     }
 
+    /// As [`Camera::image`], for what is drawn straight around the point: `None` far outside the image
+    /// of a lens ([`Optics::reach`]).
+    pub fn corner(&self, p: DVec3) -> Option<(DVec2, f64)> {
+        let is_near = self.optics.as_ref().is_none_or(|optics| {
+            let sight = optics.see(p);
+            sight.is_some_and(|sight| sight.radius <= optics.reach())
+        });
+        self.image(p).filter(|_| is_near)
+    }
+
     /// Whether depth is the distance from the eye instead of camera-space z.
     pub fn depth_is_distance(&self) -> bool {
         self.optics.is_some_and(|optics| optics.form != Form::Perspective)

@@ -71,14 +71,40 @@ impl Triangles {
 
     /// As [`Self::new`], with textures, which triangles refer to by their indices.
     pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
+        let made = Self::numbered(triangles, textures.len());
+        let is_painted = !made.painted.is_empty();
+        let textures = textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect();
+        Self { textures, ..made }
+    }
+
+    /// Other triangles with the textures of these.
+    pub(crate) fn with(&self, triangles: &[Triangle]) -> Self {
+        let made = Self::numbered(triangles, self.textures.len());
+        let textures = if made.painted.is_empty() { Vec::new() } else { self.textures.clone() };
+        Self { textures, ..made }
+    }
+
+    /// A triangle as it was given, with its corners rounded as they are stored.
+    pub(crate) fn triangle(&self, index: usize) -> Triangle {
+        let painted = self.painted.get(index).filter(|painted| painted.texture != UNPAINTED);
+        Triangle {
+            corners: self.corners[index].map(|vertex| self.place(vertex as usize).to_array()),
+            normals: self.normals.get(index).copied(),
+            colors: *self.colors.get(index).unwrap_or(&self.colors[0]),
+            texture: painted.map(|painted| (painted.texture, painted.places)),
+        }
+    }
+
+    /// As [`Self::textured`], for a number of textures, without them.
+    fn numbered(triangles: &[Triangle], textures: usize) -> Self {
         match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
             true => Self::kept(triangles, textures, doubled),
             false => Self::kept(triangles, textures, single),
         }
     }
 
-    /// As [`Self::textured`], with positions rounded by `stored`.
-    fn kept<P: Place>(triangles: &[Triangle], textures: &[Arc<Texture>], stored: fn([f64; 3]) -> P) -> Self {
+    /// As [`Self::numbered`], with positions rounded by `stored`.
+    fn kept<P: Place>(triangles: &[Triangle], textures: usize, stored: fn([f64; 3]) -> P) -> Self {
         let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
         let bounds = Bounds::of(places.clone().map(Place::exact));
@@ -99,10 +125,8 @@ impl Triangles {
                 let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
                 let normals =
                     if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
-                let (texture, places) = triangle
-                    .texture
-                    .filter(|(of, _)| textures.len() > *of as usize)
-                    .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
+                let (texture, places) =
+                    triangle.texture.filter(|(of, _)| textures > *of as usize).unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
                 let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
                 has_area(placed(triangle).map(Place::exact)).then(|| record.turned())
@@ -129,7 +153,7 @@ impl Triangles {
             normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
             painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
-            textures: textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect(),
+            textures: Vec::new(),
         }
     }
 

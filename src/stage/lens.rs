@@ -1,18 +1,20 @@
 //! How much a lens bends what is drawn straight.
 //!
-//! A splat is projected by a pinhole of its own, and the edges of triangles are straight between the
-//! images of their corners. Both err by half the curvature of the lens times the square of their
-//! size in the image (`src/passes/homography.rs`), so only large ones err visibly.
+//! A splat is projected by a pinhole of its own, whose image errs by half the curvature of the lens
+//! times the square of its size (`src/passes/homography.rs`), so only large splats err visibly.
+//! Triangles are split until their edges are straight (`refined.rs`).
+
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::scene::{Camera, Scene, Surfel};
+use crate::scene::{Camera, Form, Scene, Surfel};
 
 /// The error of an image, pixels, from which on it counts.
 const VISIBLE: f64 = 1.0;
 
-/// The number of surfels or triangles that err by more than [`VISIBLE`], and the largest error,
+/// The number of surfels that err by more than [`VISIBLE`], and the largest error,
 /// pixels.
 #[derive(Clone, Copy, Default)]
 struct Bent {
@@ -30,8 +32,7 @@ impl Bent {
     }
 }
 
-/// Returns a note for users if a lens bends the images of surfels or triangles in view by more than
-/// a pixel, where they are drawn straight.
+/// Returns a note for users if a lens bends the images of surfels in view by more than a pixel.
 pub(super) fn note(scene: &Scene, camera: &Camera) -> Option<String> {
     camera.optics?;
     let eye = camera.eye - scene.origin;
@@ -41,22 +42,13 @@ pub(super) fn note(scene: &Scene, camera: &Camera) -> Option<String> {
         Bent::of(of_disk(camera, seen(scene.center(index)), axes))
     };
     let surfels = scene.surfels.par_iter().enumerate().map(of_surfel).reduce(Bent::default, Bent::and);
-    let place = |vertex: u32| seen(scene.triangles.place(vertex as usize));
-    let of_triangle = |numbers: &[u32; 3]| Bent::of(of_edges(camera, numbers.map(place)));
-    let triangles = scene.triangles.corners().par_iter().map(of_triangle).reduce(Bent::default, Bent::and);
-    let sentence = |what: &str, bent: Bent, all: usize, remedy: &str| {
-        let Bent { count, most } = bent;
-        (count > 0).then(|| {
-            format!(
-                "this lens bends {count} of {all} {what} by more than a pixel, at most by {most:.1}, and they are drawn straight: \
-                 {remedy} bend less"
-            )
-        })
-    };
-    let of_surfels = sentence("surfels", surfels, scene.surfels.len(), "smaller ones");
-    let of_triangles = sentence("triangles", triangles, scene.triangles.len(), "shorter edges");
-    let all: Vec<String> = of_surfels.into_iter().chain(of_triangles).collect();
-    (!all.is_empty()).then(|| all.join("; "))
+    let (Bent { count, most }, all) = (surfels, scene.surfels.len());
+    (count > 0).then(|| {
+        format!(
+            "this lens bends {count} of {all} surfels by more than a pixel, at most by {most:.1}, and they are drawn straight: \
+             smaller ones bend less"
+        )
+    })
 }
 
 /// Whether an image point lies in the image.
@@ -64,11 +56,19 @@ fn is_inside(camera: &Camera, image: DVec2) -> bool {
     image.cmpge(DVec2::ZERO).all() && image.x <= camera.width.into() && image.y <= camera.height.into()
 }
 
-/// The error at the ends of a disk's half-axes; 0 for a disk whose centre is out of view. Ends that
-/// the lens does not see, or sees beyond the border of a whole sphere, do not count.
+/// The latitude from which on a whole sphere is stretched so much that errors do not count, radians.
+const POLAR: f64 = 80.0 * PI / 180.0;
+
+/// The error at the ends of a disk's half-axes; 0 for a disk whose centre is out of view or near a
+/// pole of a sphere. Ends that the lens does not see, or sees beyond the border of a sphere, do not
+/// count.
 fn of_disk(camera: &Camera, p: DVec3, axes: [DVec3; 2]) -> f64 {
     let Some((image, _)) = camera.image(p).filter(|(image, _)| is_inside(camera, *image)) else { return 0.0 };
     let Some(sight) = camera.sight(p) else { return 0.0 };
+    let is_sphere = camera.optics.is_some_and(|optics| optics.form == Form::Equirectangular);
+    if is_sphere && sight.plane.y.abs() > POLAR {
+        return 0.0;
+    }
     let focal = DVec2::new(camera.fx, camera.fy);
     let end = |v: DVec3| {
         let own = image
@@ -77,27 +77,6 @@ fn of_disk(camera: &Camera, p: DVec3, axes: [DVec3; 2]) -> f64 {
         exact.map_or(0.0, |exact| off(camera, exact, own))
     };
     axes.into_iter().flat_map(|axis| [end(axis), end(-axis)]).fold(0.0, f64::max)
-}
-
-/// The largest distance of the middle of an edge from the straight image of the edge; 0 for a
-/// triangle of which a corner is out of view.
-fn of_edges(camera: &Camera, corners: [DVec3; 3]) -> f64 {
-    let Some(images) = all_of(corners.map(|corner| camera.image(corner))) else { return 0.0 };
-    if !images.iter().any(|(image, _)| is_inside(camera, *image)) {
-        return 0.0;
-    }
-    let edge = |k: usize| {
-        let (a, b) = (images[k].0, images[(k + 1) % 3].0);
-        let Some((middle, _)) = camera.image(0.5 * (corners[k] + corners[(k + 1) % 3])) else { return 0.0 };
-        let along = b - a;
-        if along == DVec2::ZERO { 0.0 } else { (middle - a).perp_dot(along).abs() / along.length() }
-    };
-    (0..3).map(edge).fold(0.0, f64::max)
-}
-
-fn all_of<T: Copy>(three: [Option<T>; 3]) -> Option<[T; 3]> {
-    let [a, b, c] = three;
-    Some([a?, b?, c?])
 }
 
 /// The distance of two image points, 0 if a border of the image lies between them.

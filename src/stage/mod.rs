@@ -18,6 +18,7 @@ mod map;
 mod memory;
 mod meshes;
 mod octrees;
+mod refined;
 mod renderer;
 mod settings;
 mod tree;

@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::common::{self, Random, bits};
-use common::command::Folder;
+use common::command::{Folder, succeeds, text};
 use epsplat::Lens;
 use epsplat::io::camera::Pose;
 use epsplat::io::cameras;
@@ -16,7 +16,11 @@ use epsplat::low_level::inspect::stages;
 use epsplat::low_level::passes::project::reference_all;
 use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
-use epsplat::low_level::scene::{Camera, Colors, Form, Map, Maps, Optics, Samples, Scene, Shading, Surfel};
+use epsplat::low_level::scene::{
+    Camera, Colors, Detail, Facing, Form, Map, Maps, Optics, PointShape, Samples, Scene, Shading, Surfel, Triangle,
+    Triangles,
+};
+use epsplat::low_level::surfels::hierarchy;
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 /// The models of COLMAP with parameters of real lenses, scaled up so that distortion matters: name
@@ -393,5 +397,69 @@ fn images_of_disks_err_as_the_guide_says() {
         eprintln!("{name}: C is at most {near:.3} times what the guide says, {far:.3} times at 4 pixels");
         assert!(near > 0.5 && near <= 1.0, "{name}: {near}");
         assert!(far <= 2.0, "{name}: {far}");
+    }
+}
+
+/// What a lens does not show is refused with a sentence; the same with a pinhole is drawn.
+#[test]
+fn what_a_lens_does_not_show_is_refused() {
+    let scene = disks(20, 0.1, 1.0, 11);
+    let plain = posed((32, 32), Lens::Fov(90.0));
+    let refusal = |scene: &Scene, lens: Lens, settings: &Settings| {
+        let of = |camera: &Camera| {
+            render(scene, camera, settings, &Backend::Reference, &()).err().map(|error| error.to_string())
+        };
+        assert_eq!(of(&plain), None);
+        of(&posed((32, 32), lens)).unwrap_or_default()
+    };
+    let facing = Facing { shape: PointShape::Circle, pixels: Facing::LIMITS };
+    let said = refusal(&scene, Lens::Fisheye(180.0), &Settings { facing: Some(facing), ..Settings::default() });
+    assert!(said.contains("leave --facing out with a lens"), "{said}");
+    let leveled = hierarchy::build(scene.clone(), &()).unwrap().0;
+    let settings = Settings { detail: Detail::Pixels(4.0), ..Settings::default() };
+    let said = refusal(&leveled, Lens::Fisheye(180.0), &settings);
+    assert!(said.contains("levels of detail are chosen by pinholes"), "{said}");
+    let corners = [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [0.0, 1.0, 3.0]];
+    let triangle = Triangle { corners, normals: None, colors: [[1.0; 4]; 3], texture: None };
+    let meshed = Scene { triangles: Triangles::new(&[triangle]), ..scene };
+    let said = refusal(&meshed, Lens::Equirectangular, &Settings::default());
+    assert!(said.contains("take --mesh surfels"), "{said}");
+    assert_eq!(refusal(&meshed, Lens::Fisheye(180.0), &Settings::default()), "");
+}
+
+/// A wall of two triangles in a fisheye: each pixel's ray meets it where the depth says, because the
+/// triangles are split; drawn whole, they are far off.
+#[test]
+fn large_triangles_bend_with_the_lens() {
+    let wall = "v -2 -2 1\nv 2 -2 1\nv 2 2 1\nv -2 2 1\nf 1 3 2\nf 1 4 3\n";
+    let folder = Folder::new();
+    let mesh = folder.file("wall.obj", wall);
+    let output = folder.path("wall.npy");
+    let (width, fov) = (128u32, 140f64.to_radians());
+    let line = ["render", text(&mesh), "-o", text(&output), "--projection", "fisheye", "--fov", "140"];
+    let pose = ["--eye", "0,0,0", "--target", "0,0,1", "--up=-y", "--size", "128", "--aov", "depth", "--samples", "1"];
+    for backend in ["reference", "gpu"] {
+        if backend == "gpu" && common::gpu().is_none() {
+            continue;
+        }
+        succeeds(&[&line[..], &pose, &["--backend", backend]].concat());
+        let bytes = std::fs::read(&output).unwrap();
+        let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        let depths: Vec<f32> = bytes[start..].as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
+        assert_eq!(depths.len(), (width * width) as usize);
+        let (mut wrong, mut covered) = (0, 0);
+        for (index, depth) in depths.iter().enumerate() {
+            let at = DVec2::new((index as u32 % width) as f64 + 0.5, (index as u32 / width) as f64 + 0.5) - 64.0;
+            let angle = at.length() * fov / f64::from(width);
+            // Distance along the ray to the plane z = 1, inside the square of 4 units.
+            let side = angle.tan() * (at / at.length()).abs().max_element();
+            if angle > 1.5 || (side - 2.0).abs() < 0.1 {
+                continue;
+            }
+            let expected = if side < 2.0 { 1.0 / angle.cos() } else { f64::INFINITY };
+            let fits = (f64::from(*depth) - expected).abs() <= 0.01 * expected || f64::from(*depth) == expected;
+            (wrong, covered) = (wrong + u32::from(!fits), covered + u32::from(expected.is_finite()));
+        }
+        assert!(wrong == 0 && covered > 3000, "{backend}: {wrong} of {covered}");
     }
 }

@@ -1,7 +1,7 @@
 // The normals of caps, which change along the surfel. Same interface as normal_flat.wgsl.
 // Twin: src/passes/splat.rs.
 // #import blend|winner::{Attributes}
-// #import curved::{world_heights}
+// #import curved::{inverse_of, world_heights}
 // #import curved|facing|flat::{Bend, Spot}
 // #import layout::{Splat, held}
 // #import normal::{TURNS}

@@ -9,11 +9,12 @@
 // #import rows::{single}
 // #import triangles::{Triangle}
 
-// A corner that the lens does not see is all 0: its edges have no sides, so its triangles cover
+// A corner that the lens does not see, or far outside the image, is all 0: its edges have no sides, so its triangles cover
 // nothing.
 fn corner_of(p: array<Double, 3>) -> Corner {
     let sight = see(p);
-    if (!sight.seen || !(sight.depth.high >= held.near)) {
+    let is_near = sight.radius_2 <= held.lens[6].y * held.lens[6].y;
+    if (!sight.seen || !is_near || !(sight.depth.high >= held.near)) {
         return Corner(single(0.0), single(0.0), single(0.0), single(0.0), 0.0);
     }
     return Corner(sight.x, sight.y, single(1.0), sight.depth, 1.0 / sight.depth.high);

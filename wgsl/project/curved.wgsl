@@ -16,7 +16,7 @@
 // #import project::{CULL_BACK}
 // #import records::{SplatRecord}
 // #import rows::{Homography}
-// #import vectors::{dot2, dot3, norm2, norm3}
+// #import vectors::{cross3, dot2, dot3, norm2, norm3}
 // #import words|words_long::{each_word, words}
 
 // The first of the three words of a surfel's attributes that hold its heights, world units.
@@ -65,6 +65,14 @@ fn extremes(heights: vec3<f32>) -> vec2<f32> {
     let mean = 0.25 * (heights.x + heights.z);
     let spread = norm2(vec2<f32>(0.25 * (heights.x - heights.z), 0.5 * heights.y));
     return vec2<f32>(min(mean - spread, 0.0), max(mean + spread, 0.0));
+}
+
+// The rows of the inverse of [s t n], n the unit normal of s and t.
+fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
+    let across = cross3(s, t);
+    let size = norm3(across);
+    let n = across / size;
+    return array<vec3<f32>, 3>(cross3(t, n) / size, cross3(n, s) / size, n);
 }
 
 // Returns the cap of the surfel whose disk has the homography h, and replaces rows, extent and

@@ -2,10 +2,11 @@
 // frame_lens.wgsl.
 // Twin: src/passes/curved.rs.
 // #import camera_orthographic|perspective::{holds_center}
+// #import curved::{inverse_of}
 // #import double::{Double}
 // #import layout::{held}
 // #import rows::{Homography}
-// #import vectors::{cross3, norm3}
+// #import vectors::{norm3}
 
 struct Frame {
     // The centre and the half-axes.
@@ -26,10 +27,7 @@ fn frame_of(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Frame {
 
 // The rows of the inverse of [s t n], n the unit normal of s and t.
 fn frame_rows(frame: Frame, s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
-    let across = cross3(s, t);
-    let size = norm3(across);
-    let n = across / size;
-    return array<vec3<f32>, 3>(cross3(t, n) / size, cross3(n, s) / size, n);
+    return inverse_of(s, t);
 }
 
 // The unit normal, from these rows.

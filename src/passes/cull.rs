@@ -89,7 +89,7 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
 pub const PASS: Pass = Pass {
     name: "cull",
     files: |needs| match (needs.cull, needs.levels) {
-        _ if needs.twice() => vec!["cull_twice.wgsl"],
+        _ if needs.twice() => vec!["cull_twice.wgsl", "around.wgsl"],
         (true, true) => vec!["ball.wgsl", "cull.wgsl", "around_absent.wgsl"],
         (true, false) => vec!["ball.wgsl", "cull.wgsl", "balls_own.wgsl", "around_absent.wgsl"],
         (false, true) => vec!["ball.wgsl", "cull_absent.wgsl", "around_absent.wgsl"],

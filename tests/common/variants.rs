@@ -10,7 +10,7 @@ use epsplat::low_level::plan::{
     ACCUMULATORS, Accumulator, BlendFormat, ColorNeed, Facts, Known, Organisation, Plan, Raster, RasterDepth,
     SceneNeeds, Settings, Splats, Surface, check,
 };
-use epsplat::low_level::scene::{Camera, Detail, KernelShape, LevelFacts, Scene};
+use epsplat::low_level::scene::{Camera, Detail, Form, KernelShape, LevelFacts, Optics, Projection, Scene};
 
 use super::any_options::{self, pick};
 use super::any_scene::{self, Sampled};
@@ -100,7 +100,17 @@ fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random
     change(&mut facts, &mut options, random);
     check::options(&options, false).ok()?;
     check::scene(&facts, &options, false).ok()?;
-    Plan::of(&facts, &adapter(random), camera, &options, &sizes(random)).ok().map(|plan| plan.needs)
+    let (adapter, sizes, camera) = (adapter(random), sizes(random), lensed(camera, random));
+    check::lens(&facts, &camera, &options, false).ok()?;
+    Plan::of(&facts, &adapter, &camera, &options, &sizes).ok().map(|plan| plan.needs)
+}
+
+/// The camera, or one with a lens in its place.
+fn lensed(camera: &Camera, random: &mut Random) -> Camera {
+    let forms = [Form::Perspective, Form::Fisheye, Form::Equirectangular];
+    let is_lensed = random.one_in(4) && camera.projection == Projection::Pinhole;
+    let optics = is_lensed.then(|| Optics::of(pick(random, &forms)).with_radial([-0.1, 0.0, 0.0, 0.0]));
+    Camera { optics, ..camera.clone() }
 }
 
 /// Gives the facts what small scenes do not have: many surfels, levels of detail, fades, and low

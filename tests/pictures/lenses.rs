@@ -319,8 +319,8 @@ fn a_whole_sphere_has_no_seam() {
         };
         count(quarter).min(count(width - quarter))
     };
-    let sources = Sources::default().replace("cull_twice.wgsl", "(*h).anchor.x += turn;", "").unwrap();
-    let sources = sources.replace("cull_twice.wgsl", "(*h).low.x += f32(turn);", "(*h).low.x = 1e9;").unwrap();
+    let sources = Sources::default().replace("around.wgsl", "(*h).anchor.x += turn;", "").unwrap();
+    let sources = sources.replace("around.wgsl", "(*h).low.x += f32(turn);", "(*h).low.x = 1e9;").unwrap();
     let seams = off(&Backend::Gpu { gpu: Box::new(gpu.clone()), sources });
     let counts = [off(&Backend::gpu(gpu)), off(&Backend::Reference), seams];
     eprintln!("pixels that differ: device, twin, without the other side {counts:?}");

@@ -1,4 +1,4 @@
-// The image has no border that splats reach across. Same interface as cull_twice.wgsl.
+// The image has no border that splats reach across. Same interface as around.wgsl.
 // #import rows::{Homography}
 
 fn is_again(slot: u32) -> bool {

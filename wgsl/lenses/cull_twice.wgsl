@@ -2,9 +2,8 @@
 // the slots has the splats at their places, the second half those that reach across the border.
 // Same interface as cull_absent.wgsl.
 // Twin: src/passes/project.rs.
-// #import layout::{Splat, held, linear_index}
+// #import layout::{Splat, linear_index}
 // #import records::{SplatRecord}
-// #import rows::{Homography}
 // #import select::{places_held, surfel_of}
 
 fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
@@ -25,22 +24,4 @@ fn anchor_of(words: vec2<u32>) -> vec2<i32> {
 
 fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
     return surfel_of(place_for(slot));
-}
-
-// Whether the slot is for the part of a splat beyond the border.
-fn is_again(slot: u32) -> bool {
-    return slot >= places_held();
-}
-
-// Moves the splat of such a slot by the image's width: a splat near the right border is drawn beyond
-// the left one, and the other way round.
-fn around(h: ptr<function, Homography>, slot: u32) {
-    if (!is_again(slot)) {
-        return;
-    }
-    let width = i32(held.width);
-    let turn = select(width, -width, 2 * (*h).anchor.x >= width);
-    (*h).anchor.x += turn;
-    (*h).low.x += f32(turn);
-    (*h).high.x += f32(turn);
 }

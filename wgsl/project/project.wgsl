@@ -5,7 +5,7 @@
 // splat's nearest depths, which is stage 2.
 // Twin: src/passes/project.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xcc477997dbdd9eb1
-// #import around_absent|cull_twice::{around, is_again}
+// #import around::{around, is_again}
 // #import axes_*::{half_axes}
 // #import camera_orthographic|perspective::{homography}
 // #import center|center_doubled::{relative_center}

@@ -13,12 +13,12 @@
 //! of 2^-24, divided by the cosine of the angle between view ray and normal.
 //!
 //! **Lenses.** A lens that is no pinhole ([`Optics`](crate::scene::Optics)) is replaced, for each
-//! splat, by a pinhole that agrees with it at the splat's centre, in place and in first derivatives.
-//! Its axis is the ray through the centre, its focal length a pixel, and a vector v has the axes
-//! `(z J v, g . v)`: J is the derivative of the image, z the centre's depth and g the depth's
-//! gradient. The centre is exact, and at a distance of q pixels from it the image errs by half the
-//! lens's curvature times q². For a distorted perspective g is the camera's axis, so depths and
-//! the foreshortening of the disk are exact too, and only the distortion is linearised.
+//! splat, by a pinhole that agrees with it at the splat's centre, in place and in first
+//! derivatives. Its axis is the ray through the centre, its focal length a pixel, and a vector v
+//! has the axes `(z J v, g . v)`: J is the derivative of the image, z the centre's depth and g the
+//! depth's gradient. The centre is exact, and at a distance of q pixels from it the image errs by
+//! half the lens's curvature times q². For a distorted perspective g is the camera's axis, so
+//! depths and the foreshortening of the disk are exact too, and only the distortion is linearised.
 //!
 //! **Extent.** The lines x = k that are tangent to the disk's outline solve a quadratic in k. A
 //! disk that crosses the near depth is bounded by its part in front of it.
@@ -100,9 +100,9 @@ pub(super) fn own(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Option<Own> 
     (image.abs().max_element() < FARTHEST_ANCHOR).then(|| Own { image, depth: sight.depth, s: of(s), t: of(t), rows })
 }
 
-/// Projects a disk by a pinhole of its own: one with focal lengths of a pixel, whose axis is the ray
-/// through the disk's centre, and whose image agrees with that of the lens at the centre, in place
-/// and in first derivatives.
+/// Projects a disk by a pinhole of its own: one with focal lengths of a pixel, whose axis is the
+/// ray through the disk's centre, and whose image agrees with that of the lens at the centre, in
+/// place and in first derivatives.
 pub(super) fn lens(near: f64, own: &Own) -> Projected {
     let Own { image, depth, s, t, .. } = *own;
     let away = depth * (s.x * t.y - s.y * t.x);

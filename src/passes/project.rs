@@ -40,8 +40,8 @@ pub(super) enum Missed {
     Between,
 }
 
-/// The splat of [`reference`], or why there is none; if `again`, the part of it beyond the border of
-/// a whole sphere.
+/// The splat of [`reference`], or why there is none; if `again`, the part of it beyond the border
+/// of a whole sphere.
 pub(super) fn projected(
     (index, surfel, cap): Indexed<'_>,
     relative: DVec3,

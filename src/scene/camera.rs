@@ -314,8 +314,8 @@ impl Camera {
         (depth >= self.near).then(|| (focal * plane + principal, depth))
     }
 
-    /// As [`Camera::image`], for what is drawn straight around the point: `None` far outside the image
-    /// of a lens ([`Optics::reach`]).
+    /// As [`Camera::image`], for what is drawn straight around the point: `None` far outside the
+    /// image of a lens ([`Optics::reach`]).
     pub fn corner(&self, p: DVec3) -> Option<(DVec2, f64)> {
         let is_near = self.optics.as_ref().is_none_or(|optics| {
             let sight = optics.see(p);
@@ -336,8 +336,8 @@ impl Camera {
 
     /// The world-space direction of the view ray through the image point (x, y), pixels.
     ///
-    /// It is not normalised: its depth is 1. The ray starts at [`ray_start`](Self::ray_start). Where
-    /// a lens shows nothing, it is the camera's axis.
+    /// It is not normalised: its depth is 1. The ray starts at [`ray_start`](Self::ray_start).
+    /// Where a lens shows nothing, it is the camera's axis.
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
         if let Some(optics) = &self.optics {
             let plane = DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy);

@@ -199,8 +199,8 @@ impl Optics {
         Self { limit, reach: limit, ..self }
     }
 
-    /// This lens in a camera whose image ends at `radius` of the plane, in focal lengths: splats are
-    /// drawn up to a tenth farther out ([`Self::reach`]).
+    /// This lens in a camera whose image ends at `radius` of the plane, in focal lengths: splats
+    /// are drawn up to a tenth farther out ([`Self::reach`]).
     #[must_use]
     pub fn within(self, radius: f64) -> Self {
         if self.form == Form::Equirectangular {

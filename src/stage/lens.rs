@@ -56,7 +56,8 @@ fn is_inside(camera: &Camera, image: DVec2) -> bool {
     image.cmpge(DVec2::ZERO).all() && image.x <= camera.width.into() && image.y <= camera.height.into()
 }
 
-/// The latitude from which on a whole sphere is stretched so much that errors do not count, radians.
+/// The latitude from which on a whole sphere is stretched so much that errors do not count,
+/// radians.
 const POLAR: f64 = 80.0 * PI / 180.0;
 
 /// The error at the ends of a disk's half-axes; 0 for a disk whose centre is out of view or near a

@@ -349,14 +349,15 @@ fn points_beyond_the_fold_of_a_distortion_are_dropped() {
     }
 }
 
-/// At r pixels from its centre, the image of a splat errs by at most C r² / f pixels, with f the focal
-/// length and the C of the guide. The formulas of C are those of the lenses' curvatures.
+/// At r pixels from its centre, the image of a splat errs by at most C r² / f pixels, with f the
+/// focal length and the C of the guide. The formulas of C are those of the lenses' curvatures.
 #[test]
 fn images_of_disks_err_as_the_guide_says() {
     for (name, camera) in &forms() {
         let focal = DVec2::new(camera.fx, camera.fy);
         let size = DVec2::new(camera.width.into(), camera.height.into());
-        // The largest C near the centre and at some pixels from it, in units of what the guide says.
+        // The largest C near the centre and at some pixels from it, in units of what the guide
+        // says.
         let (mut near, mut far, mut random) = (0.0f64, 0.0f64, Random(10));
         for _ in 0..20_000 {
             let mut at = || random.between(-1.0, 1.0);
@@ -400,7 +401,7 @@ fn images_of_disks_err_as_the_guide_says() {
     }
 }
 
-/// What a lens does not show is refused with a sentence; the same with a pinhole is drawn.
+/// A picture that a lens does not show is refused with a sentence; with a pinhole it is drawn.
 #[test]
 fn what_a_lens_does_not_show_is_refused() {
     let scene = disks(20, 0.1, 1.0, 11);
@@ -427,8 +428,8 @@ fn what_a_lens_does_not_show_is_refused() {
     assert_eq!(refusal(&meshed, Lens::Fisheye(180.0), &Settings::default()), "");
 }
 
-/// A wall of two triangles in a fisheye: each pixel's ray meets it where the depth says, because the
-/// triangles are split; drawn whole, they are far off.
+/// A wall of two triangles in a fisheye: each pixel's ray meets it where the depth says, because
+/// the triangles are split; drawn whole, they are far off.
 #[test]
 fn large_triangles_bend_with_the_lens() {
     let wall = "v -2 -2 1\nv 2 -2 1\nv 2 2 1\nv -2 2 1\nf 1 3 2\nf 1 4 3\n";

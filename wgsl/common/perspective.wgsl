@@ -1,5 +1,6 @@
-// What a pinhole (camera_pinhole.wgsl) and other lenses (camera_lens.wgsl) share: rays that start at
-// the eye, and rows that are (u/z, v/z, 1/z). Same interface as camera_orthographic.wgsl.
+// The part that a pinhole (camera_pinhole.wgsl) and other lenses (camera_lens.wgsl) share: rays
+// that start at the eye, and rows that are (u/z, v/z, 1/z). Same interface as
+// camera_orthographic.wgsl.
 // Twins: src/passes/homography.rs and src/passes/footprint.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x502c4730b0840c34
 // #import camera_*::{scaled_homography}

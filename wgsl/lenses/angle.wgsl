@@ -1,5 +1,5 @@
-// Angles and lengths in doubled precision (double.wgsl), and sine and cosine in f32. WGSL leaves the
-// digits of its own functions to the driver.
+// Angles and lengths in doubled precision (double.wgsl), and sine and cosine in f32. WGSL leaves
+// the digits of its own functions to the driver.
 // Twin: src/scene/optics.rs, which uses f64.
 // All loops end, by 1 of src/gpu/loops.rs: 0xfe62bd117434322e
 // #import double::{Double, product, quick_two_sum, quotient, sum, two_product}
@@ -23,8 +23,8 @@ fn length_of(x: Double, y: Double) -> Double {
 // How often an angle is halved. The tangent of the last half is below 0.05.
 const HALVINGS: u32 = 6u;
 
-// The angle of (x, y) from the x axis, 0 to pi, for y of 0 or more. The vector (x + |(x, y)|, y) has
-// half the angle.
+// The angle of (x, y) from the x axis, 0 to pi, for y of 0 or more. The vector (x + |(x, y)|, y)
+// has half the angle.
 fn angle_of(y: Double, x: Double) -> Double {
     var c = x;
     var s = y;

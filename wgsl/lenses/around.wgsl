@@ -10,8 +10,8 @@ fn is_again(slot: u32) -> bool {
     return slot >= places_held();
 }
 
-// Moves the splat of such a slot by the image's width: a splat near the right border is drawn beyond
-// the left one, and the other way round.
+// Moves the splat of such a slot by the image's width: a splat near the right border is drawn
+// beyond the left one, and the other way round.
 fn around(h: ptr<function, Homography>, slot: u32) {
     if (!is_again(slot)) {
         return;

@@ -1,7 +1,7 @@
-// A camera whose lens is no pinhole (lens_*.wgsl). A splat is projected by a pinhole of its own: one
-// whose axis is the ray through the splat's centre, and whose image agrees with that of the lens at
-// the centre, in place and in first derivatives. With perspective.wgsl, the same interface as
-// camera_pinhole.wgsl.
+// A camera whose lens is no pinhole (lens_*.wgsl). A splat is projected by a pinhole of its own:
+// one whose axis is the ray through the splat's centre, and whose image agrees with that of the
+// lens at the centre, in place and in first derivatives. With perspective.wgsl, the same interface
+// as camera_pinhole.wgsl.
 // Twin: src/passes/homography.rs.
 // #import double::{Double, product, quotient, sum, two_sum}
 // #import layout::{held}
@@ -95,8 +95,8 @@ fn scaled_homography(
     let sight = see(center);
     let depth = sight.depth.high;
     let image = vec2<f32>(sight.x.high, sight.y.high);
-    // A splat whose centre has no image, or one far outside, shows nothing. Beyond 2^22 the anchor's arithmetic is no
-    // longer exact, and the splat is far outside the image.
+    // A splat whose centre has no image, or one far outside, shows nothing. Beyond 2^22 the
+    // anchor's arithmetic is no longer exact, and the splat is far outside the image.
     let is_near = sight.radius_2 <= held.lens[6].y * held.lens[6].y;
     if (!(sight.seen && is_near && depth >= near && all(abs(image) < vec2<f32>(4194304.0)))) {
         return h;

@@ -9,8 +9,8 @@
 // #import rows::{single}
 // #import triangles::{Triangle}
 
-// A corner that the lens does not see, or far outside the image, is all 0: its edges have no sides, so its triangles cover
-// nothing.
+// A corner that the lens does not see, or far outside the image, is all 0: its edges have no sides,
+// so its triangles cover nothing.
 fn corner_of(p: array<Double, 3>) -> Corner {
     let sight = see(p);
     let is_near = sight.radius_2 <= held.lens[6].y * held.lens[6].y;

@@ -1,5 +1,5 @@
-// Every surfel is projected twice, for both sides of the border of a whole sphere. The first half of
-// the slots has the splats at their places, the second half those that reach across the border.
+// Every surfel is projected twice, for both sides of the border of a whole sphere. The first half
+// of the slots has the splats at their places, the second half those that reach across the border.
 // Same interface as cull_absent.wgsl.
 // Twin: src/passes/project.rs.
 // #import layout::{Splat, linear_index}

@@ -1,5 +1,5 @@
-// The first step of a fisheye: the angle from the axis, radians, in the direction of (X, Y). Depth is
-// the distance from the eye.
+// The first step of a fisheye: the angle from the axis, radians, in the direction of (X, Y). Depth
+// is the distance from the eye.
 // Twin: src/scene/optics.rs.
 // #import angle::{angle_of, length_of, turned_by}
 // #import camera_lens::{Sight}

@@ -58,7 +58,8 @@ const READ: &str = "its kind is not known; cameras are a transforms.json, a list
 ///   camera-to-world with the axes of OpenGL (x right, y up, z back). The lens is `fl_x fl_y cx cy`
 ///   in pixels of a picture of `w` x `h`, or `camera_angle_x` (the horizontal field of view,
 ///   radians), with the distortion `k1 k2 k3 k4 p1 p2` of a `camera_model`; a frame's own values
-///   take precedence over those for all frames. `file_path` is the name. A list of camera files may stand in place of the frames.
+///   take precedence over those for all frames. `file_path` is the name. A list of camera files may
+///   stand in place of the frames.
 /// - `cameras.json` of 3D Gaussian Splatting: a list of objects with `img_name`, `width`, `height`,
 ///   `position`, `rotation` (camera-to-world with x right, y down, z forward), `fx` and `fy`.
 /// - `camera_path.json` of nerfstudio: `camera_to_world` with the axes of OpenGL, `fov` (vertical,

@@ -138,8 +138,8 @@ impl Frame<'_> {
         Some(of_value(Value::Object(object)))
     }
 
-    /// `[fx, fy, cx, cy]` from focal lengths in pixels, or else from angles. Pixels are square if only one of
-    /// fx and fy is known.
+    /// `[fx, fy, cx, cy]` from focal lengths in pixels, or else from angles. Pixels are square if
+    /// only one of fx and fy is known.
     fn intrinsics(&self, width: f64, height: f64, sized: bool) -> Result<[f64; 4], String> {
         let of_angle = |key: &str, side: f64| match self.number(key)? {
             Some(angle) if !(angle > 0.0 && angle < PI) => {

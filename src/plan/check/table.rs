@@ -310,7 +310,7 @@ pub(super) const SCENES: [SceneClash; 13] = [
     },
 ];
 
-/// What a camera whose lens is no pinhole does not show.
+/// Combinations that a camera does not show if its lens is no pinhole.
 pub(super) const LENSES: [LensClash; 4] = [
     LensClash {
         applies: |_, _, options, device| device && options.raster.is_some(),

@@ -12,6 +12,10 @@ use crate::scene::{Camera, Scene, Triangle};
 /// The largest distance of the middle of an edge from its straight image, pixels.
 const STRAIGHT: f64 = 0.25;
 
+/// The largest relative error of the depth of the middle of an edge. A distance is not linear along
+/// an edge, and is interpolated as if it were.
+const LEVEL: f64 = 1e-3;
+
 /// The largest length of an edge that ends beyond the lens's image, pixels.
 const AT_BORDER: f64 = 4.0;
 
@@ -56,18 +60,20 @@ impl View<'_> {
 
     /// Whether the edge between two points of camera space has to be halved.
     fn bends(&self, a: DVec3, b: DVec3) -> bool {
-        let images = [a, b].map(|end| self.camera.corner(end).map(|(image, _)| image));
+        let images = [a, b].map(|end| self.camera.corner(end));
         let angle = |()| {
             let along = b - a;
             let share = (-a.dot(along) / along.length_squared()).clamp(0.0, 1.0);
             along.length() / (a + along * share).length()
         };
         match images {
-            [Some(a_image), Some(b_image)] => {
-                let Some((middle, _)) = self.camera.corner(0.5 * (a + b)) else { return true };
+            [Some((a_image, a_depth)), Some((b_image, b_depth))] => {
+                let Some((middle, depth)) = self.camera.corner(0.5 * (a + b)) else { return true };
                 let along = b_image - a_image;
                 let length = along.length();
-                length > STRAIGHT && (middle - a_image).perp_dot(along).abs() > STRAIGHT * length
+                let is_curved = (middle - a_image).perp_dot(along).abs() > STRAIGHT * length;
+                let is_off = (0.5 * (a_depth + b_depth) - depth).abs() > LEVEL * depth;
+                length > STRAIGHT && (is_curved || is_off)
             }
             [None, None] => angle(()) > BEYOND,
             _ => angle(()) * self.camera.fx.max(self.camera.fy) > AT_BORDER,

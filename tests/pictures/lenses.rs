@@ -414,7 +414,11 @@ fn what_a_lens_does_not_show_is_refused() {
         of(&posed((32, 32), lens)).unwrap_or_default()
     };
     let facing = Facing { shape: PointShape::Circle, pixels: Facing::LIMITS };
-    let said = refusal(&scene, Lens::Fisheye(180.0), &Settings { facing: Some(facing), ..Settings::default() });
+    let said = refusal(
+        &scene,
+        Lens::Fisheye(180.0),
+        &Settings { facing: Some(facing), shading: Shading::Unlit, ..Settings::default() },
+    );
     assert!(said.contains("leave --facing out with a lens"), "{said}");
     let leveled = hierarchy::build(scene.clone(), &()).unwrap().0;
     let settings = Settings { detail: Detail::Pixels(4.0), ..Settings::default() };

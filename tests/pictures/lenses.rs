@@ -6,7 +6,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::common::{self, Random, bits};
-use common::command::{Folder, succeeds, text};
+use common::command::{Folder, ply, succeeds, text};
 use epsplat::Lens;
 use epsplat::io::camera::Pose;
 use epsplat::io::cameras;
@@ -466,5 +466,22 @@ fn large_triangles_bend_with_the_lens() {
             (wrong, covered) = (wrong + u32::from(!fits), covered + u32::from(expected.is_finite()));
         }
         assert!(wrong == 0 && covered > 3000, "{backend}: {wrong} of {covered}");
+    }
+}
+
+/// A point that a pinhole would show beside the image, and the lens shows in it, is seen.
+#[test]
+fn visible_points_are_those_of_the_lens() {
+    let folder = Folder::new();
+    let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 2, "0 0 -1 0 0 1 0.05\n1.1 0 -1 0 0 1 0.05\n"));
+    let lens = r#""w": 200, "h": 200, "fl_x": 100, "cx": 100, "cy": 100, "k1": -0.2"#;
+    let pose = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+    let cameras = format!(r#"{{{lens}, "frames": [{{"file_path": "a", "transform_matrix": {pose}}}]}}"#);
+    let (cameras, seen) = (folder.file("t.json", cameras), folder.path("seen.ply"));
+    let line = ["visible", text(&cloud), "--cameras", text(&cameras), "-o", text(&seen), "--backend", "reference"];
+    for (more, count) in [(None, 2), (Some("--ignore-distortion"), 1)] {
+        succeeds(&[&line[..], &more.into_iter().collect::<Vec<_>>()].concat());
+        let head = String::from_utf8_lossy(&std::fs::read(&seen).unwrap()).into_owned();
+        assert!(head.contains(&format!("element vertex {count}\n")), "{more:?}");
     }
 }

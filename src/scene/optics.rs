@@ -273,7 +273,8 @@ impl Optics {
             Form::Equirectangular => return sphere(p),
         };
         // Comparisons with NaN are false.
-        if !(e.length() <= self.limit) {
+        let is_within = e.length() <= self.limit;
+        if !is_within {
             return None;
         }
         let (plane, slope) = self.distorted(e);

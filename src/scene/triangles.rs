@@ -71,15 +71,20 @@ impl Triangles {
 
     /// As [`Self::new`], with textures, which triangles refer to by their indices.
     pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
-        let made = Self::numbered(triangles, textures.len());
+        Self::textured_in_order(triangles, textures).0
+    }
+
+    /// As [`Self::textured`]. Also returns the place of each triangle among those given.
+    pub(crate) fn textured_in_order(triangles: &[Triangle], textures: &[Arc<Texture>]) -> (Self, Vec<u32>) {
+        let (made, places) = Self::numbered(triangles, textures.len());
         let is_painted = !made.painted.is_empty();
         let textures = textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect();
-        Self { textures, ..made }
+        (Self { textures, ..made }, places)
     }
 
     /// Other triangles with the textures of these.
     pub(crate) fn with(&self, triangles: &[Triangle]) -> Self {
-        let made = Self::numbered(triangles, self.textures.len());
+        let made = Self::numbered(triangles, self.textures.len()).0;
         let textures = if made.painted.is_empty() { Vec::new() } else { self.textures.clone() };
         Self { textures, ..made }
     }
@@ -95,8 +100,8 @@ impl Triangles {
         }
     }
 
-    /// As [`Self::textured`], for a number of textures, without them.
-    fn numbered(triangles: &[Triangle], textures: usize) -> Self {
+    /// As [`Self::textured_in_order`], for a number of textures, without them.
+    fn numbered(triangles: &[Triangle], textures: usize) -> (Self, Vec<u32>) {
         match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
             true => Self::kept(triangles, textures, doubled),
             false => Self::kept(triangles, textures, single),
@@ -104,7 +109,7 @@ impl Triangles {
     }
 
     /// As [`Self::numbered`], with positions rounded by `stored`.
-    fn kept<P: Place>(triangles: &[Triangle], textures: usize, stored: fn([f64; 3]) -> P) -> Self {
+    fn kept<P: Place>(triangles: &[Triangle], textures: usize, stored: fn([f64; 3]) -> P) -> (Self, Vec<u32>) {
         let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
         let bounds = Bounds::of(places.clone().map(Place::exact));
@@ -121,14 +126,16 @@ impl Triangles {
         let has_normals = triangles.par_iter().any(|triangle| triangle.normals.is_some());
         let mut all: Vec<Record> = triangles
             .par_iter()
-            .filter_map(|triangle| {
+            .enumerate()
+            .filter_map(|(given, triangle)| {
                 let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
                 let normals =
                     if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
                 let (texture, places) =
                     triangle.texture.filter(|(of, _)| textures > *of as usize).unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
-                let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
+                let record =
+                    Record { corners: [a, b, c], normals, colors: triangle.colors, painted, given: given as u32 };
                 has_area(placed(triangle).map(Place::exact)).then(|| record.turned())
             })
             .collect();
@@ -145,7 +152,7 @@ impl Triangles {
             }
         }
         let is_painted = all.par_iter().any(|record| record.painted.texture != UNPAINTED);
-        Self {
+        let made = Self {
             reaches,
             vertices: keyed.iter().map(|(_, place)| place.high()).collect(),
             low: keyed.iter().filter_map(|(_, place)| place.low()).collect(),
@@ -154,7 +161,8 @@ impl Triangles {
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
             painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
             textures: Vec::new(),
-        }
+        };
+        (made, all.iter().map(|record| record.given).collect())
     }
 
     /// The largest error of a coordinate stored as two f32, world units. Only triangles count for
@@ -279,6 +287,8 @@ struct Record {
     normals: [[f32; 3]; 3],
     colors: [[f32; 4]; 3],
     painted: Painted,
+    /// Its place among the given triangles. It decides the order of triangles that are the same.
+    given: u32,
 }
 
 impl Record {
@@ -291,6 +301,7 @@ impl Record {
             normals: std::array::from_fn(|k| self.normals[turn(k)]),
             colors: std::array::from_fn(|k| self.colors[turn(k)]),
             painted: Painted { places: std::array::from_fn(|k| self.painted.places[turn(k)]), ..self.painted },
+            given: self.given,
         }
     }
 
@@ -303,6 +314,7 @@ impl Record {
             .then_with(|| normals(self).cmp(&normals(other)))
             .then_with(|| colors(self).cmp(&colors(other)))
             .then_with(|| painted(self).cmp(&painted(other)))
+            .then_with(|| self.given.cmp(&other.given))
     }
 }
 

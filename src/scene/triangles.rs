@@ -82,11 +82,12 @@ impl Triangles {
         (Self { textures, ..made }, places)
     }
 
-    /// Other triangles with the textures of these.
-    pub(crate) fn with(&self, triangles: &[Triangle]) -> Self {
-        let made = Self::numbered(triangles, self.textures.len()).0;
+    /// Other triangles with the textures of these. Also returns the place of each triangle among
+    /// those given.
+    pub(crate) fn with(&self, triangles: &[Triangle]) -> (Self, Vec<u32>) {
+        let (made, places) = Self::numbered(triangles, self.textures.len());
         let textures = if made.painted.is_empty() { Vec::new() } else { self.textures.clone() };
-        Self { textures, ..made }
+        (Self { textures, ..made }, places)
     }
 
     /// A triangle as it was given, with its corners rounded as they are stored.

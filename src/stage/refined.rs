@@ -39,10 +39,15 @@ pub(super) fn refined(scene: &Scene, camera: &Camera) -> Option<Scene> {
     let parts = (0..all.len()).into_par_iter().flat_map_iter(|triangle| {
         let mut parts = Vec::new();
         view.split(all.triangle(triangle), MOST_LEVELS, &mut parts);
-        parts
+        parts.into_iter().map(move |part| (part, triangle as u32))
     });
-    let triangles = all.with(&parts.collect::<Vec<_>>());
-    Some(Scene { triangles, ..scene.clone() })
+    let (parts, whole): (Vec<Triangle>, Vec<u32>) = parts.unzip();
+    let (triangles, places) = all.with(&parts);
+    // Parts keep the names of their faces.
+    let mut provenance = scene.provenance.clone();
+    let face = |place: u32| scene.provenance.of_triangle(whole[place as usize]);
+    provenance.set_faces(places.into_iter().map(face).collect());
+    Some(Scene { triangles, provenance, ..scene.clone() })
 }
 
 struct View<'a> {

@@ -100,15 +100,17 @@ fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random
     change(&mut facts, &mut options, random);
     check::options(&options, false).ok()?;
     check::scene(&facts, &options, false).ok()?;
-    let (adapter, sizes, camera) = (adapter(random), sizes(random), lensed(camera, random));
+    let (adapter, sizes, camera) = (adapter(random), sizes(random), lensed(camera, &options, random));
     check::lens(&facts, &camera, &options, false).ok()?;
     Plan::of(&facts, &adapter, &camera, &options, &sizes).ok().map(|plan| plan.needs)
 }
 
 /// The camera, or one with a lens in its place.
-fn lensed(camera: &Camera, random: &mut Random) -> Camera {
+fn lensed(camera: &Camera, options: &Settings, random: &mut Random) -> Camera {
     let forms = [Form::Perspective, Form::Fisheye, Form::Equirectangular];
-    let is_lensed = random.one_in(4) && camera.projection == Projection::Pinhole;
+    // The rasteriser draws by pinholes.
+    let is_pinhole = camera.projection == Projection::Pinhole && options.raster.is_none();
+    let is_lensed = random.one_in(4) && is_pinhole;
     let optics = is_lensed.then(|| Optics::of(pick(random, &forms)).with_radial([-0.1, 0.0, 0.0, 0.0]));
     Camera { optics, ..camera.clone() }
 }

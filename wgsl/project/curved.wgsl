@@ -77,26 +77,18 @@ fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
 
 // Returns the cap of the surfel whose disk has the homography h, and replaces rows, extent and
 // depths in h by those of the cap.
-fn curve(
-    h: ptr<function, Homography>,
-    index: u32,
-    center: array<Double, 3>,
-    s_camera: vec3<f32>,
-    t_camera: vec3<f32>,
-) -> Cap {
-    let frame = frame_of(center, s_camera, t_camera);
+fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
+    let frame = frame_of(center, s, t);
     let p = frame.p;
-    let s = frame.s;
-    let t = frame.t;
     let r = frame.radius;
     // In units of r, so that no product under- or overflows.
-    let unit_s = s / r;
-    let unit_t = t / r;
+    let unit_s = frame.s / r;
+    let unit_t = frame.t / r;
     let m = frame_rows(frame, unit_s, unit_t);
     let normal = frame_normal(frame, m);
     let heights = world_heights(index) * (held.unit / r);
     let height = extremes(heights) * r;
-    let slope = norm2(vec2<f32>(s.z, t.z));
+    let slope = norm2(vec2<f32>(frame.s.z, frame.t.z));
     let low_shift = normal * height.x;
     let high_shift = normal * height.y;
     // The rounding of these sums is less than 4 * 2^-24 of the magnitudes, a quarter of this
@@ -136,7 +128,7 @@ fn curve(
     // D, the part of the rays' advance that all pixels share.
     let forward = toward(p, depth);
     (*h).a_low = vec3<f32>(dot3(forward, m[0]), dot3(forward, m[1]), dot3(forward, m[2]));
-    let extent = box_extent(*h, frame, array<vec3<f32>, 5>(p, s, t, low_shift, high_shift), depths);
+    let extent = box_extent(*h, frame, array<vec3<f32>, 5>(p, frame.s, frame.t, low_shift, high_shift), depths);
     (*h).low = extent.xy;
     (*h).high = extent.zw;
     (*h).depth_low = depths.x;

@@ -183,6 +183,9 @@ fn points_of_distorted_colmap_cameras_appear_within_a_hundredth_of_a_pixel() {
     }
 }
 
+/// Where a lens shows a point of camera space, pixels.
+type Formula<'a> = &'a dyn Fn([f64; 3]) -> DVec2;
+
 #[test]
 fn points_of_fisheyes_and_spheres_appear_where_their_angles_say() {
     let scene = disks(900, 0.02, 0.97 * PI, 6);
@@ -197,8 +200,7 @@ fn points_of_fisheyes_and_spheres_appear_where_their_angles_say() {
         let down = (y / (x * x + y * y + z * z).sqrt()).asin();
         DVec2::new(256.0 + 512.0 * x.atan2(z) / TAU, 128.0 + 256.0 * down / PI)
     };
-    let cases: [(&str, Camera, &dyn Fn([f64; 3]) -> DVec2); 2] =
-        [("fisheye", fisheye, &of_fisheye), ("sphere", sphere, &of_sphere)];
+    let cases: [(&str, Camera, Formula<'_>); 2] = [("fisheye", fisheye, &of_fisheye), ("sphere", sphere, &of_sphere)];
     for (name, camera, expected) in cases {
         let Some(images) = images(&scene, &camera) else { return };
         let mut worst = 0.0f64;

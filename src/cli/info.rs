@@ -25,11 +25,11 @@ use super::{outputs, print, write_json};
 pub struct Arguments {
     #[arg(help = help_of("A point cloud or mesh"))]
     input: PathBuf,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Write the description as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reading: InputOptions,
 }
 
 /// A surface counts as closed if at least this share of its surfels has no open gap to their

@@ -69,8 +69,13 @@ pub struct Sample {
 ///
 /// The errors of [`build`](super::build()).
 pub fn survey(points: Points, all: bool, progress: &dyn Progress) -> Result<Survey> {
+    surveyed(points, if all { usize::MAX } else { WHOLE }, progress)
+}
+
+/// As [`survey`], of some places if there are more than `whole` points.
+fn surveyed(points: Points, whole: usize, progress: &dyn Progress) -> Result<Survey> {
     let is_plain = points.faces.is_none() && points.tree.is_none() && points.whole.is_none() && !points.encoded;
-    if all || !is_plain || points.positions.len() <= WHOLE {
+    if !is_plain || points.positions.len() <= whole {
         let (scene, preparation) = build(vec![points], progress)?;
         return of_whole(scene, preparation, progress);
     }
@@ -252,4 +257,55 @@ impl Places {
 /// A hash of a cell's coordinates.
 fn hash(cell: Cell) -> u64 {
     cell.into_iter().fold(0, |hash, c| mixed(hash ^ c as u32 as u64).wrapping_add(1))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::random::Random;
+
+    /// Rough ground of 400,000 points in map coordinates, a tenth of it without the normals that
+    /// the rest has.
+    fn ground(reversed: bool) -> Points {
+        let mut random = Random::stream(9, 0);
+        let mut number = || random.number();
+        let at = |k: u32| {
+            let (x, y) = (f64::from(k % 800) + 0.5 * number(), f64::from(k / 800) + 0.5 * number());
+            [7e5 + 0.25 * x, 5e6 + 0.25 * y, 5.0 * (0.02 * x).sin() + 0.02 * number()]
+        };
+        let mut positions: Vec<[f64; 3]> = (0..400_000).map(at).collect();
+        positions.extend([[0.0; 3], [f64::NAN; 3]]);
+        let mut normals: Vec<[f32; 3]> =
+            (0..400_002).map(|k| if k % 10 == 0 { [0.0; 3] } else { [0.0, 0.0, 1.0] }).collect();
+        if reversed {
+            positions.reverse();
+            normals.reverse();
+        }
+        Points { positions, normals: Some(normals), ..Points::default() }
+    }
+
+    #[test]
+    fn some_places_tell_of_the_whole() {
+        let whole = surveyed(ground(false), usize::MAX, &()).unwrap();
+        let some = surveyed(ground(false), 1000, &()).unwrap();
+        let sample = some.sample.unwrap();
+        assert!(sample.points >= EXAMINED && sample.points < 100_000 && sample.places > 20, "{sample:?}");
+        let (found, all) = (some.coverage.unwrap(), whole.coverage.unwrap());
+        assert!((found.spacing / all.spacing - 1.0).abs() < 0.02, "{found:?} {all:?}");
+        assert!((found.covered - all.covered).abs() < 0.01, "{found:?} {all:?}");
+        assert!((found.covered_aslant - all.covered_aslant).abs() < 0.03, "{found:?} {all:?}");
+        assert_eq!((whole.sample, some.origin, some.scene.up), (None, whole.origin, whole.scene.up));
+        let counts = |survey: &Survey| {
+            let Preparation { points, dropped_non_finite, surfels, estimated_normals, estimated_radii, strays, .. } =
+                survey.preparation;
+            [points, dropped_non_finite, surfels, estimated_normals, estimated_radii, strays]
+        };
+        assert_eq!(counts(&some), counts(&whole));
+        assert_eq!(counts(&some)[1..], [1, 400_001, 40_001, 400_001, 1]);
+        // Another order of the points chooses the same places.
+        let reversed = surveyed(ground(true), 1000, &()).unwrap();
+        assert_eq!(reversed.sample, some.sample);
+        assert_eq!((reversed.coverage, reversed.largest_radius), (some.coverage, some.largest_radius));
+    }
 }

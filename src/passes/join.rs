@@ -4,6 +4,9 @@
 //! Splats are blended first, without the triangles. If a triangle took part in nearest depths and
 //! sums, fragments just behind the triangle would be missing from a mean that includes fragments
 //! just in front of it.
+//!
+//! Where surfaces show through each other, the nearest triangle is one more surface of the pixel's
+//! list: in front of the blended surfaces, or of the single fragments, whose depth is not smaller.
 
 use super::resolve::Surface;
 use super::triangles::Shown;
@@ -23,6 +26,14 @@ pub struct Beside<'a> {
     pub farthest: f64,
     /// Whether splat colours are sRGB codes.
     pub coded: bool,
+}
+
+impl Beside<'_> {
+    /// The nearest triangle of a pixel of the strip, with its colour as the splats have theirs.
+    pub(super) fn triangle(&self, pixel: usize) -> Option<Shown> {
+        let triangle = self.triangles.get(pixel).filter(|triangle| triangle.depth.is_finite())?;
+        Some(Shown { color: if self.coded { coded(triangle.color) } else { triangle.color }, ..*triangle })
+    }
 }
 
 /// The f64 twin: the surface that a pixel shows, from its splats and its triangle.
@@ -95,17 +106,24 @@ fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, opti
 pub const PASS: Pass = Pass {
     name: "join",
     files: |needs| {
-        // With lists or peeled layers there are no triangles.
-        if needs.surface.lists().is_some() || needs.surface.peels().is_some() {
+        // With peeled layers there are no triangles.
+        if needs.surface.peels().is_some() {
             return Vec::new();
         }
-        let Some(mesh) = needs.mesh else { return vec!["join_absent.wgsl"] };
+        let listed = needs.surface.lists().is_some();
+        let Some(mesh) = needs.mesh else {
+            return vec![if listed { "join_lists_absent.wgsl" } else { "join_absent.wgsl" }];
+        };
+        let color = if mesh.coded { "join_coded.wgsl" } else { "join_linear.wgsl" };
+        if listed {
+            return vec!["join_lists.wgsl", color];
+        }
         let join = match mesh.join {
             Join::Corrected => "join_corrected.wgsl",
             Join::Nearest => "join_nearest.wgsl",
             Join::Blended => "join_blended.wgsl",
         };
-        vec!["join.wgsl", join, if mesh.coded { "join_coded.wgsl" } else { "join_linear.wgsl" }]
+        vec!["join.wgsl", join, color]
     },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),

@@ -19,6 +19,7 @@
 use super::Strip;
 use super::accumulate::PixelSums;
 use super::fragments::{self, Fragment};
+use super::join::Beside;
 use super::resolve::{over, set, surface};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
@@ -164,26 +165,55 @@ impl Shown {
     }
 }
 
-/// The f64 twin: the image of `strip`.
-pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
+/// The depth of a surface: blended, or for a tail that of its nearest fragment.
+fn depth_of(sums: &PixelSums, is_tail: bool) -> f64 {
+    if is_tail { sums.nearest } else { sums.depth / sums.weight }
+}
+
+/// The f64 twin: the image of `strip`, whose triangles are surfaces like all others.
+pub fn reference(strip: &Strip<'_>, beside: &Beside<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
-    let most = if let Composite::Layers(most) = options.composite { most } else { 1 };
+    let all = if let Composite::Layers(most) = options.composite { most } else { 1 };
     // The rasteriser ends a surface one epsilon behind its nearest fragment (peel.rs).
     let parting = if options.raster.is_some() { Parting::Window } else { Parting::Runs };
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let along = camera.along_axis(x, y);
-        let (layers, mut decision) = part(&list.fragments, (most, options.tail), parting, (options, along));
+        let part = |most: u32| part(&list.fragments, (most, options.tail), parting, (options, along));
+        let (mut layers, mut decision) = part(all);
+        let triangle = beside.triangle(pixel);
+        let (mut most, mut place) = (all, None);
+        if let Some(triangle) = &triangle {
+            let depth = |number: usize| depth_of(&layers[number], number >= all as usize);
+            let margins = (0..layers.len()).map(|number| (depth(number) / triangle.depth - 1.0).abs());
+            decision = margins.fold(decision.min(triangle.decision), f64::min);
+            let before = (0..layers.len()).take_while(|number| depth(*number) < triangle.depth).count();
+            place = Some(before);
+            if before < all as usize {
+                // The triangle is one of the layers.
+                most = all - 1;
+                layers = part(most).0;
+            } else if options.tail == Tail::None {
+                place = None;
+            }
+        }
         let mut shown = Shown::NOTHING;
+        let join = |shown: &mut Shown, number: usize| {
+            let here = triangle.as_ref().filter(|_| place == Some(number) && shown.lets_through(LEAST_TRANSMITTANCE));
+            let Some(triangle) = here else { return };
+            *shown = Shown { tail: shown.tail, ..shown.with(triangle.color, triangle.depth) };
+        };
         for (number, sums) in layers.iter().enumerate() {
+            join(&mut shown, number);
             if shown.lets_through(LEAST_TRANSMITTANCE) {
                 let color = surface(sums, scene, camera, options, (x, y)).0;
                 let is_tail = number >= most as usize;
                 shown.tail = if is_tail { shown.transmittance * color[3] } else { 0.0 };
-                shown = shown.with(color, if is_tail { sums.nearest } else { sums.depth / sums.weight });
+                shown = shown.with(color, depth_of(sums, is_tail));
                 decision = decision.min(shown.decision(LEAST_TRANSMITTANCE));
             }
         }
+        join(&mut shown, layers.len());
         shown.write(options, list.decision.min(decision), frame, pixel);
     }
 }

@@ -30,7 +30,7 @@ const LOOKS: u32 = 1024;
 
 /// Words of the buffer before the first list, and words per list.
 const HEAD: u64 = 1;
-const WORDS: u64 = 39;
+const WORDS: u64 = 40;
 
 /// The most fragments of a list that one invocation sorts and composites. It composites the lists
 /// of all `samples` of a pixel.

@@ -5,6 +5,7 @@
 
 use super::Strip;
 use super::fragments::{self, Fragment};
+use super::join::Beside;
 use super::layers::Shown;
 use super::resolve::shaded;
 use crate::frame::Frame;
@@ -42,8 +43,8 @@ impl Rules {
     }
 }
 
-/// The f64 twin: the image of `strip`.
-pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
+/// The f64 twin: the image of `strip`, with each pixel's triangle among its fragments.
+pub fn reference(strip: &Strip<'_>, beside: &Beside<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let rules = Rules::of(options);
     // Fragments of two surfels with the same geometry have exactly the same depth, so the order of
@@ -56,7 +57,17 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
         let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let (mut shown, mut decision, mut before) = (Shown::NOTHING, list.decision, None::<&Fragment>);
         let mut sensitivity = 1.0;
+        let mut triangle = beside.triangle(pixel);
         for f in &list.fragments {
+            if let Some(in_front) = triangle {
+                decision = decision.min(in_front.decision).min((f.depth / in_front.depth - 1.0).abs());
+            }
+            if let Some(in_front) = triangle.take_if(|triangle| triangle.depth <= f.depth) {
+                shown = shown.with(in_front.color, in_front.depth);
+                if !shown.lets_through(rules.least_shown) {
+                    break;
+                }
+            }
             let normal = if f.back { -f.normal } else { f.normal };
             let [r, g, b, alpha] = shaded(f.color, normal, camera, options, at);
             // Where a kernel falls steeply, its weight errs by more than the position in the disk
@@ -89,6 +100,10 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
             if !shows_more {
                 break;
             }
+        }
+        if let Some(behind) = triangle.filter(|_| shown.lets_through(rules.least_shown)) {
+            decision = decision.min(behind.decision);
+            shown = shown.with(behind.color, behind.depth);
         }
         shown.write(options, decision, frame, pixel);
     }

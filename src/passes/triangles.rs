@@ -39,6 +39,9 @@
 //! Such scenes store two f32 per coordinate (`vertex_doubled.wgsl`); other scenes have neither the
 //! words nor the code.
 //!
+//! **Facing away**: a triangle's corners run counterclockwise as its front is seen. With
+//! [`Cull::Back`] triangles whose edges have p on the other side are left out.
+//!
 //! **The nearest triangle** is an atomic maximum of (bits(+inf) - bits(depth), number). The order
 //! of [`Triangles`](crate::scene::Triangles) does not depend on the order in files, so no bit of
 //! the image does. The rasteriser, for comparison, uses its own coverage and depths; among
@@ -56,7 +59,7 @@ use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step, Twin};
 use crate::plan::{Band, ColorNeed, Plan};
-use crate::scene::{Camera, Projection, Scene};
+use crate::scene::{Camera, Cull, Projection, Scene};
 
 /// A vertex in the image of a camera. Relative to the image point p it is `place - p w`.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +112,8 @@ pub struct Crossing {
     pub spread: f64,
     /// Whether the point is in the triangle and not nearer than the near depth.
     pub hit: bool,
+    /// Whether the corners run counterclockwise as the viewer sees them.
+    pub faces: bool,
     /// The smallest relative distance to a decision, negative on the rejecting side. For an edge it
     /// is the area divided by the products whose difference the area is; for the near depth it is
     /// relative to that depth.
@@ -160,6 +165,8 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
         parts,
         spread: spread.abs(),
         hit: inside && depth >= camera.near,
+        // In the image rows go down, so a positive area is clockwise.
+        faces: sides[0] < 0.0,
         decision: distance.min(beyond),
     })
 }
@@ -230,6 +237,9 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
             for x in first[0]..=last[0] {
                 let p = DVec2::new(x.into(), y.into()) + 0.5;
                 let Some(crossing) = crossing(camera, of, *numbers, p) else { continue };
+                if options.cull == Cull::Back && !crossing.faces {
+                    continue;
+                }
                 if crossing.decision > -NEARBY || crossing.hit {
                     let pixel = &mut shown[((y - first_row) * camera.width + x) as usize];
                     *pixel = pixel.with(number as u32, crossing);
@@ -354,6 +364,7 @@ pub const PASS: Pass = Pass {
     constants: |making| {
         let Some(mesh) = making.needs.mesh else { return Vec::new() };
         vec![
+            ("CULLED_SIDE", u32::from(mesh.cull_back).into()),
             ("TRIANGLE_WORDS", mesh.words().into()),
             ("TRIANGLE_COLORS", mesh.normal_words().into()),
             ("TRIANGLE_RECORDS", if mesh.colored { 0.0 } else { 12.0 }),

@@ -84,6 +84,8 @@ pub struct MeshNeeds {
     pub textured: bool,
     /// The f32 positions of corners omit visible digits, so their low parts are stored too.
     pub doubled: bool,
+    /// Triangles that face away are left out.
+    pub cull_back: bool,
     /// The nearest triangle is found in one pass, by 64-bit atomics.
     pub once: bool,
     /// The surfels' colours are sRGB codes, so those of triangles are encoded before they are

@@ -110,18 +110,20 @@ impl EpsilonForm {
     }
 }
 
-/// Returns the needs of the scene's triangles, or `None` if the view shows none. Without splats the
-/// join is [`Join::Nearest`], which needs no sums of depths.
+/// Returns the needs of the scene's triangles, or `None` if the view shows none. Without splats, or
+/// with fragment lists, the join is [`Join::Nearest`], which needs no sums of depths.
 fn mesh(facts: &Facts, camera: &Camera, options: &Settings) -> Option<MeshNeeds> {
     let of = facts.mesh;
     let shows = of.triangles > 0 && in_view(&of.bounds, facts.origin, camera);
-    let join = if facts.surfels > 0 { options.join } else { Join::Nearest };
+    let blends = facts.surfels > 0 && Lists::of(facts, options).is_none();
+    let join = if blends { options.join } else { Join::Nearest };
     shows.then_some(MeshNeeds {
         join,
         normals: of.normals,
         colored: of.colored,
         textured: of.textured,
         doubled: of.doubled,
+        cull_back: options.cull == Cull::Back,
         once: false,
         coded: facts.encoded,
     })
@@ -319,7 +321,10 @@ impl SceneNeeds {
 
     /// Whether depths are summed.
     pub fn sums_depth(&self) -> bool {
-        self.compares_depth() || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
+        let among_layers = self.mesh.is_some() && self.surface.lists() == Some(Lists::Layers);
+        self.compares_depth()
+            || among_layers
+            || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
     }
 
     /// Whether fragments have weights: they are summed, or drawn by the rasteriser, whose targets

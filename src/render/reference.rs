@@ -116,6 +116,10 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     // The nearest surface at each pixel among the separate inputs drawn so far.
     let mut kept = None;
     let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
+    fn beside<'a>(strip: &Strip<'_>, triangles: &'a [triangles::Shown]) -> Beside<'a> {
+        let Strip { scene, largest_shorter, farthest, .. } = *strip;
+        Beside { triangles, largest_shorter, farthest, coded: scene.encoded }
+    }
     for twin in twins {
         spent.timed(twin.pass(), rayon::current_num_threads(), || match twin {
             Twin::Project => {}
@@ -127,18 +131,16 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
                 sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
             }
             Twin::Oit => sums = oit::reference(strip),
-            Twin::Layers => layers::reference(strip, &mut frame),
-            Twin::Sorted => sorted::reference(strip, &mut frame),
+            Twin::Layers => layers::reference(strip, &beside(strip, &shown), &mut frame),
+            Twin::Sorted => sorted::reference(strip, &beside(strip, &shown), &mut frame),
             Twin::Individual(individual) => {
                 let kept = kept.get_or_insert_with(|| vec![Surface::NOTHING; pixels]);
                 individuals::keep_nearest(kept, individuals::reference(strip, *individual));
             }
             Twin::Triangles => shown = triangles::reference(strip),
             Twin::Resolve => {
-                let Strip { largest_shorter, farthest, .. } = *strip;
-                let beside = Beside { triangles: &shown, largest_shorter, farthest, coded: scene.encoded };
                 let blended = || resolve::surfaces(&sums, &nearest, (scene, camera, options), first_row);
-                resolve::reference(&kept.take().unwrap_or_else(blended), &beside, options, &mut frame);
+                resolve::reference(&kept.take().unwrap_or_else(blended), &beside(strip, &shown), options, &mut frame);
             }
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::io::{self, Mesh, Points, ReadOptions, Texture};
 use crate::options::MeshAs;
 use crate::progress::Progress;
+use crate::scene::{Colors, Composite};
 use crate::surfels::smooth::smooth_normals;
 use crate::surfels::{Preparation, with_triangles};
 
@@ -27,17 +28,30 @@ pub(super) struct Meshes {
 /// [`Error::Usage`] if all inputs are drawn as triangles and an option needs surfels.
 fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> Result<(MeshAs, Option<String>)> {
     let (drawn_as, needed) = request.scene.options.mesh(request.options);
+    let layered = request.options.transparency.composite.is_some_and(|how| how != Composite::Opaque);
     let alone = inputs.iter().all(|points| points.is_mesh() || points.positions.is_empty());
     match (request.triangles().mesh, needed) {
         (Some(MeshAs::Triangles), Some(option)) if alone => Err(Error::Usage(format!(
             "{option} is for surfels, and --mesh triangles draws none: leave one of them out"
         ))),
         (Some(chosen), _) => Ok((chosen, None)),
-        (None, None) if inputs.iter().any(|points| points.encoded) => {
-            Ok((MeshAs::Surfels, Some("as Gaussians show through each other and triangles do not".into())))
+        (None, None) if layered && inputs.iter().any(|points| points.is_mesh() && is_translucent(points)) => {
+            Ok((MeshAs::Surfels, Some("so that all their translucent surfaces show".into())))
         }
         (None, needed) => Ok((drawn_as, needed.map(|option| format!("which {option} is for")))),
     }
+}
+
+/// Whether a vertex or a triangle of a mesh has an alpha below 1.
+fn is_translucent(mesh: &Points) -> bool {
+    let of_vertices = match &mesh.colors {
+        Some(Colors::Constant([.., alpha])) => *alpha < 1.0,
+        Some(Colors::Srgb8(colors)) => colors.iter().any(|[.., alpha]| *alpha < 255),
+        Some(Colors::Linear(colors)) => colors.iter().any(|[.., alpha]| *alpha < 1.0),
+        Some(Colors::Textured(_) | Colors::Harmonics(_)) | None => false,
+    };
+    let paint = mesh.faces.as_ref().and_then(|faces| faces.paint.as_ref());
+    of_vertices || paint.is_some_and(|paint| paint.colors.iter().any(|[.., alpha]| *alpha < 1.0))
 }
 
 impl Meshes {

@@ -79,11 +79,12 @@ impl Request<'_> {
                 .and_then(|()| check::scene(&Facts::of(scene), &layered, self.is_reference()))
                 .is_ok()
         };
-        // With layers, meshes of the inputs are drawn as surfels.
+        // With layers, translucent meshes of the inputs are drawn as surfels.
         let turns_to_surfels = self.triangles().mesh.is_none() && self.triangles().meshes.is_empty();
-        let can = (!scene.triangles.is_empty() && turns_to_surfels) || layers_can_be_drawn();
         let of_triangles = scene.triangles.colors().as_flattened().iter().any(|[.., alpha]| *alpha < 1.0);
         let of_surfels = !scene.surfels.is_empty() && scene.color_range().0[3] < 1.0;
+        let through_triangles = of_triangles || (settings.opacity < 1.0 && !scene.triangles.is_empty());
+        let can = if through_triangles { turns_to_surfels } else { layers_can_be_drawn() };
         !chosen && (settings.opacity < 1.0 || of_surfels || of_triangles) && can
     }
 

@@ -3,6 +3,7 @@
 //! One test program, so that shared test code and kernels compile once.
 
 mod adapters;
+mod among_layers;
 mod cameras;
 mod clips;
 #[path = "../common/mod.rs"]

@@ -75,9 +75,6 @@ fn gaussians_and_triangles_are_one_picture_where_nothing_shows_through() {
         }
         assert!(seen.iter().all(|seen| *seen > 200), "{seen:?}");
     }
-    let through = Settings { composite: Composite::Gaussians, ..options };
-    let why = check::scene(&Facts::of(&both), &through, false).unwrap_err().to_string();
-    assert!(why.contains("--composite opaque"), "{why}");
 }
 
 #[test]

@@ -4,18 +4,19 @@
 // All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
 // #import *::{quantise, resolve_color, sum_at, surface_depth}
 // #import blend::{attributes_without_place, blend_weighted}
-// #import compositing::{Compositing}
+// #import compositing::{Compositing, NO_TRIANGLE, with_joined}
 // #import curved|facing|flat::{Bend}
 // #import epsilon_*::{farthest_shown}
 // #import fragments::{Record, keys, listed_color, listed_normal, listed_radius, listed_weight}
 // #import fragments::{record_at}
+// #import join_lists::{triangle_depth}
 // #import layer_sums::{clear_sums}
 // #import layout::{WEIGHT_CHANNEL}
 // #import long_lists::{has_rounds, next_round}
 // #import maps::{write_surface}
 // #import normal::{resolve_normal}
 // #import resolve::{shaded}
-// #import resolve_lists::{LEAST_TRANSMITTANCE, with_behind}
+// #import resolve_lists::{LEAST_TRANSMITTANCE, Shown, with_behind}
 // #import side::{SIDES, SIDE_BIT}
 
 override MOST_LAYERS: u32;
@@ -85,9 +86,11 @@ fn sum_rest(begun: Compositing, end: u32) -> Compositing {
     return so_far;
 }
 
-// Continues to composite the list, which ends at `end`. The maps of its surfaces are at `out`.
+// Continues to composite the list, which ends at `end`. The maps of its surfaces are at `out`. The
+// pixel's triangle is one of the surfaces.
 fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Compositing {
     let image = vec2<f32>(vec2<u32>(x, y)) + 0.5;
+    let triangle = triangle_depth(x, y);
     var so_far = before;
     loop {
         while (so_far.first < end && !is_untold(so_far.first, so_far.told) && next_round()) {
@@ -113,13 +116,32 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
         if (!has_rounds()) {
             break;
         }
-        so_far = with_surface(so_far, is_last, front, out, x, y);
-        let more = so_far.shown.transmittance >= LEAST_TRANSMITTANCE;
-        if (is_last || !more || (so_far.shown.layers == MOST_LAYERS && !TAIL)) {
+        let joins = !so_far.joined && summed_depth(is_last, front) >= triangle;
+        if (joins) {
+            so_far = with_joined(so_far, triangle, out, x, y);
+            // With one layer fewer, the surface may belong to the tail, so it is summed again.
+            so_far.key = so_far.first;
+        } else {
+            so_far = with_surface(so_far, is_last, front, out, x, y);
+        }
+        if ((is_last && !joins) || !shows_more(so_far.shown)) {
             so_far.first = end;
         }
     }
+    if (so_far.first >= end && !so_far.joined && triangle < NO_TRIANGLE && shows_more(so_far.shown)) {
+        so_far = with_joined(so_far, triangle, out, x, y);
+    }
     return so_far;
+}
+
+// Whether a surface behind the shown ones would show.
+fn shows_more(shown: Shown) -> bool {
+    return shown.transmittance >= LEAST_TRANSMITTANCE && (shown.layers < MOST_LAYERS || TAIL);
+}
+
+// The depth of the summed surface: blended, or that of the tail's nearest fragment.
+fn summed_depth(is_last: bool, front: f32) -> f32 {
+    return select(surface_depth(0u, sum_at(0u, WEIGHT_CHANNEL), front), front, is_last);
 }
 
 // Composites the summed surface behind what is shown.
@@ -128,7 +150,7 @@ fn with_surface(summed: Compositing, is_last: bool, front: f32, out: u32, x: u32
     let weight = sum_at(0u, WEIGHT_CHANNEL);
     let normal = resolve_normal(0u, weight, front);
     let color = shaded(resolve_color(0u, weight), normal, x, y);
-    write_surface(out, so_far.shown.layers, select(surface_depth(0u, weight, front), front, is_last), color.a);
+    write_surface(out, so_far.shown.layers, summed_depth(is_last, front), color.a);
     let tail = select(0.0, so_far.shown.transmittance * color.a, is_last);
     so_far.shown = with_behind(so_far.shown, color);
     so_far.shown.tail = tail;

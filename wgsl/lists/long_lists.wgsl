@@ -26,9 +26,9 @@ override HEAP_STEPS: u32;
 override LOOKS: u32;
 
 const LONG_HEAD: u32 = 1u;
-const LONG_WORDS: u32 = 39u;
+const LONG_WORDS: u32 = 40u;
 const SO_FAR: u32 = 3u;
-const SO_FAR_SUMS: u32 = 15u;
+const SO_FAR_SUMS: u32 = 16u;
 
 fn is_long(list: vec2<u32>) -> bool {
     return list.y > list.x + LONG;
@@ -127,7 +127,8 @@ fn compositing_at(kept: u32) -> Compositing {
     let color = vec4<f32>(kept_float(at), kept_float(at + 1u), kept_float(at + 2u), kept_float(at + 3u));
     let shown = Shown(color, kept_float(at + 4u), long_lists[at + 5u], kept_float(at + 6u));
     let told = vec2<f32>(kept_float(at + 7u), kept_float(at + 8u));
-    return Compositing(shown, told, long_lists[at + 9u], long_lists[at + 10u], kept_float(at + 11u));
+    let joined = long_lists[at + 12u] != 0u;
+    return Compositing(shown, told, long_lists[at + 9u], long_lists[at + 10u], kept_float(at + 11u), joined);
 }
 
 fn keep_compositing(kept: u32, so_far: Compositing) {
@@ -147,6 +148,7 @@ fn keep_compositing(kept: u32, so_far: Compositing) {
     long_lists[at + 9u] = so_far.first;
     long_lists[at + 10u] = so_far.key;
     long_lists[at + 11u] = bitcast<u32>(so_far.farthest);
+    long_lists[at + 12u] = u32(so_far.joined);
 }
 
 // One invocation per long list, which writes the maps of its surfaces. The pixel itself is resolved

@@ -1,8 +1,9 @@
 // Stage 4: composites every fragment of a pixel by itself, from front to back.
 // Twin: src/passes/sorted.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x296fe3b00e53d0eb
-// #import compositing::{Compositing}
+// #import compositing::{Compositing, NO_TRIANGLE, with_joined}
 // #import fragments::{keys, listed_color, listed_normal, listed_weight, record_at}
+// #import join_lists::{triangle_depth}
 // #import layout::{held}
 // #import long_lists::{next_round}
 // #import maps::{write_surface}
@@ -18,8 +19,16 @@ override LEAVES_LAST: bool;
 
 fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Compositing {
     var so_far = before;
+    let triangle = triangle_depth(x, y);
     for (; so_far.first < end && next_round(); so_far.first++) {
         let key = keys[so_far.first];
+        if (!so_far.joined && bitcast<f32>(key.x) >= triangle) {
+            so_far = with_joined(so_far, triangle, out, x, y);
+            if (so_far.shown.transmittance < LEAST_SHOWN) {
+                so_far.first = end;
+                break;
+            }
+        }
         let record = record_at(key.y);
         let mapped = listed_normal(record) * 2.0 - 1.0;
         let normal = mapped * (side_of(bitcast<f32>(key.x)) * inverseSqrt(max(dot3(mapped, mapped), 1e-12)));
@@ -35,6 +44,10 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
             so_far.first = end;
             break;
         }
+    }
+    // The triangle may lie behind all fragments.
+    if (so_far.first >= end && !so_far.joined && triangle < NO_TRIANGLE && so_far.shown.transmittance >= LEAST_SHOWN) {
+        so_far = with_joined(so_far, triangle, out, x, y);
     }
     return so_far;
 }

@@ -1,11 +1,8 @@
 // Joins a pixel's splats with its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
 // #import join_*::{color_beside, share_of_splats}
 // #import resolve_surface::{Surface}
-// #import triangles_tiles::{shows_triangles}
+// #import triangles_tiles::{beside, shows_triangles}
 // #import vectors::{dot3}
-
-// The triangles' surfaces from triangles_attributes.wgsl, valid in tiles where triangles show.
-@group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
 // The surface that shows: that of the splats, that of the triangle, or their mean, by the share of
 // the splats (join_*.wgsl). `row` is the pixel's row in the band.

@@ -76,10 +76,15 @@ struct Crossing {
     spread: f32,
 }
 
-// Whether the point is in the triangle, by the sides of its edges, and not nearer than the near
-// depth. False for NaN.
+// The side of its edges on which a triangle that is left out has its points: 1 for triangles that
+// face away, or 0 if none is left out.
+override CULLED_SIDE: f32;
+
+// Whether the point is in a visible triangle, by the sides of its edges, and not nearer than the
+// near depth. False for NaN.
 fn is_hit(sides: vec3<f32>, depth: f32) -> bool {
-    return sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z && depth >= held.near;
+    let inside = sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z;
+    return inside && sides.x != CULLED_SIDE && depth >= held.near;
 }
 
 // The crossing in f32, for triangles that are not ill-formed (is_ill_formed()) and whose corners

@@ -4,7 +4,6 @@
 // All loops end, by 1 of src/gpu/loops.rs: 0x739883655b001de7
 // #import covered::{TILE_ROWS, TILE_WIDTH, tiles_across}
 // #import footprint::{band_pixels}
-// #import join::{beside}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
 // #import project::{rows_of}
 // #import triangles_*::{nearest_triangle}
@@ -16,6 +15,9 @@
 // `triangle_tiles`, read-only.
 @group(0) @binding(70) var<storage, read_write> triangle_tiles: array<atomic<u32>>;
 @group(0) @binding(71) var<storage, read> tiles_of_triangles: array<u32>;
+// The same buffer as `triangle_pixels`, read-only. Its pixels are valid in tiles where triangles
+// show.
+@group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
 const TRIANGLE_TILES: u32 = 8u;
 const TRIANGLE_TILE: u32 = 8u;

@@ -237,9 +237,9 @@ pub(super) const TEXTURES: [Clash; 3] = [
 ];
 
 /// Combinations of scenes and options that are rejected.
-pub(super) const SCENES: [SceneClash; 12] = [
+pub(super) const SCENES: [SceneClash; 13] = [
     SceneClash {
-        applies: |facts, options, _| options.cull == Cull::Back && !facts.oriented,
+        applies: |facts, options, _| options.cull == Cull::Back && !facts.oriented && facts.surfels > 0,
         sentence: "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
                    normals a side with epsplat surfels",
     },
@@ -255,13 +255,13 @@ pub(super) const SCENES: [SceneClash; 12] = [
         sentence: "the map surfaces counts surfaces behind each other: take --composite layers, sorted or gaussians with it",
     },
     SceneClash {
-        applies: |facts, options, _| has_triangles(facts) && facts.encoded && is_composited(options),
-        sentence: "Gaussians show through each other, and triangles are drawn on the nearest surface only: take --composite \
-                   opaque, or leave the triangles out",
+        applies: |facts, options, _| has_triangles(facts) && options.composite.is_order_free(),
+        sentence: "order-free sums cannot leave out what lies behind a triangle: take --composite layers or sorted, or leave \
+                   the triangles out",
     },
     SceneClash {
-        applies: |facts, options, _| has_triangles(facts) && is_composited(options),
-        sentence: "triangles are drawn on the nearest surface only: leave --composite out, or the triangles",
+        applies: |facts, options, device| has_triangles(facts) && peels(options, device),
+        sentence: "the rasteriser peels splats and no triangles: take --backend gpu, or leave the triangles out",
     },
     SceneClash {
         applies: |facts, options, _| {
@@ -272,6 +272,12 @@ pub(super) const SCENES: [SceneClash; 12] = [
     SceneClash {
         applies: |facts, options, _| has_triangles(facts) && options.maps.has(Map::Index),
         sentence: "triangles have no points to name: leave the map index out",
+    },
+    SceneClash {
+        applies: |facts, options, device| {
+            device && has_triangles(facts) && options.raster.is_some() && options.cull == Cull::Back
+        },
+        sentence: "the rasteriser draws both sides of triangles: leave --cull back out, or take --backend gpu",
     },
     SceneClash {
         applies: |facts, options, device| {

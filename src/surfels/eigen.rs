@@ -168,9 +168,9 @@ fn rotated<const LANES: usize>(
                 (a, b)
             };
             (off[q], off[p]) = turned((off[q], off[p]));
-            for axis in 0..3 {
-                (vectors[p][axis], vectors[q][axis]) = turned((vectors[p][axis], vectors[q][axis]));
-            }
+            let (mut of_p, mut of_q) = (vectors[p], vectors[q]);
+            of_p.iter_mut().zip(&mut of_q).for_each(|(p, q)| (*p, *q) = turned((*p, *q)));
+            (vectors[p], vectors[q]) = (of_p, of_q);
             for lane in 0..LANES {
                 let (change, keeps) = (t[lane] * entry[lane], keeps[lane]);
                 diagonal[p][lane] = if keeps { diagonal[p][lane] } else { diagonal[p][lane] - change };

@@ -38,7 +38,7 @@ pub struct Survey {
     /// The scene; of a sampled cloud, the surfels in and around the examined places.
     pub scene: Scene,
     /// The counts of all points' preparation. Of a sampled cloud, those that depend on neighbours
-    /// are estimates.
+    /// are estimates, and the number of surfels that neighbours limit is left out (0).
     pub preparation: Preparation,
     /// The scene's origin, world coordinates.
     pub origin: DVec3,
@@ -109,7 +109,8 @@ fn surveyed(points: Points, whole: usize, progress: &dyn Progress) -> Result<Sur
     let preparation = Preparation {
         distinct_positions: sampled.distinct_positions.map(of_built),
         opposed_normals: of_built(sampled.opposed_normals),
-        limited_by_neighbours: of_built(sampled.limited_by_neighbours),
+        // At the rim of the margin, points lack neighbours that they have in the cloud.
+        limited_by_neighbours: 0,
         limited_radii: of_built(sampled.limited_radii),
         rounding: sampled.rounding,
         median_spacing: sampled.median_spacing,
@@ -192,16 +193,9 @@ impl Places {
         let of_part = |part: &[[f64; 3]]| {
             let mut counts = HashMap::new();
             // Most points follow one of the same cell.
-            let mut run = (None, 0);
-            for position in part {
-                let cell = Some(self.cell(DVec3::from_array(*position)));
-                if cell != run.0 {
-                    run.0.map(|last| *counts.entry(last).or_insert(0) += run.1);
-                    run = (cell, 0);
-                }
-                run.1 += 1;
+            for run in part.chunk_by(|a, b| self.cell(DVec3::from_array(*a)) == self.cell(DVec3::from_array(*b))) {
+                *counts.entry(self.cell(DVec3::from_array(run[0]))).or_insert(0) += run.len() as u64;
             }
-            run.0.map(|last| *counts.entry(last).or_insert(0) += run.1);
             counts
         };
         positions.par_chunks(1 << 16).map(of_part).reduce(HashMap::new, |mut all, part| {

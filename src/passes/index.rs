@@ -6,10 +6,15 @@
 //! [`order`](super::order) wins. That order depends on the surfels' values, not on their places in
 //! files.
 //!
+//! Where a triangle shows, the map has its input and face instead. A triangle shows where the
+//! picture's depth is the triangle's own.
+//!
 //! Two sweeps over the fragments find the greatest weight, then the first surfel with that weight.
-//! Both are stored in the map's words of the image.
+//! Both are stored in the map's words of the image. The word of a shown triangle's weight is greater
+//! than that of any weight.
 
 use super::footprint::footprint;
+use super::join::Beside;
 use super::visibility::Nearest;
 use super::{MapPass, Strip};
 use crate::frame::Frame;
@@ -25,8 +30,14 @@ pub const MAP: MapPass = MapPass {
     map: Map::Index,
     pass: Pass {
         name: "index",
-        files: |_| vec!["index.wgsl"],
-        kernels: |_| vec![STRONGEST, STRONGEST_LARGE, NAME, NAME_LARGE],
+        files: |needs| match needs.mesh {
+            Some(_) => vec!["index.wgsl", "index_triangles.wgsl"],
+            None => vec!["index.wgsl"],
+        },
+        kernels: |needs| {
+            let of_splats = [STRONGEST, STRONGEST_LARGE, NAME, NAME_LARGE];
+            needs.mesh.map(|_| SHOWN_TRIANGLES).into_iter().chain(of_splats).collect()
+        },
         constants: |_| Vec::new(),
     },
     runs,
@@ -34,6 +45,7 @@ pub const MAP: MapPass = MapPass {
     reference,
 };
 
+const SHOWN_TRIANGLES: Kernel = Kernel::new("index_triangles");
 const STRONGEST: Kernel = Kernel::new("strongest");
 const STRONGEST_LARGE: Kernel = Kernel::of("strongest_large", [TILE, TILE, 1]);
 const NAME: Kernel = Kernel::new("name_strongest");
@@ -42,11 +54,15 @@ const NAME_LARGE: Kernel = Kernel::of("name_strongest_large", [TILE, TILE, 1]);
 /// The input and point number of an empty pixel.
 pub const NOTHING: u32 = u32::MAX;
 
-fn runs(_: &Plan, band: usize) -> Stage {
+/// The word of the weight of a shown triangle.
+const OF_TRIANGLE: u32 = u32::MAX;
+
+fn runs(plan: &Plan, band: usize) -> Stage {
     let run = |kernel, over| Run { kernel, over };
     let (slots, large) = (Over::Slots(Part::All), Over::Large);
-    let runs = vec![run(STRONGEST, slots), run(STRONGEST_LARGE, large), run(NAME, slots), run(NAME_LARGE, large)];
-    Stage::new("index", band, runs)
+    let of_splats = [run(STRONGEST, slots), run(STRONGEST_LARGE, large), run(NAME, slots), run(NAME_LARGE, large)];
+    let of_triangles = plan.needs.mesh.map(|_| run(SHOWN_TRIANGLES, Over::Pixels));
+    Stage::new("index", band, of_triangles.into_iter().chain(of_splats).collect())
 }
 
 /// The input and point number of a surfel, as bits of the two f32 that a frame stores per pixel.
@@ -59,14 +75,19 @@ fn named(provenance: &Provenance, surfel: Option<u32>) -> [f32; 2] {
 /// Converts each pixel's pair (weight, `u32::MAX` - rank) to the pair (input, point).
 fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
     for [weight, place] in words.as_chunks_mut().0 {
+        if weight.to_bits() == OF_TRIANGLE {
+            [*weight, *place] = provenance.of_triangle(place.to_bits()).map(f32::from_bits);
+            continue;
+        }
         let surfel = order.get((u32::MAX - place.to_bits()) as usize);
         [*weight, *place] = named(provenance, surfel.copied());
     }
 }
 
 /// The f64 twin.
-fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
+fn reference(strip: &Strip<'_>, nearest: &[Nearest], beside: &Beside<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
+    let depths = frame.map(Map::Depth).filter(|_| !beside.triangles.is_empty()).map(<[f32]>::to_vec);
     let (Some(ranks), Some(map)) = (strip.ranks, frame.map_mut(Map::Index)) else { return };
     let mut strongest = vec![(0.0, NOTHING, NOTHING); nearest.len()];
     for splat in &strip.splats {
@@ -91,5 +112,11 @@ fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
     }
     for (words, (_, _, surfel)) in map.as_chunks_mut().0.iter_mut().zip(strongest) {
         *words = named(&scene.provenance, (surfel != NOTHING).then_some(surfel));
+    }
+    let of_pixels = map.as_chunks_mut().0.iter_mut().zip(beside.triangles).zip(depths.into_iter().flatten());
+    for ((words, triangle), depth) in of_pixels {
+        if triangle.depth.is_finite() && triangle.depth as f32 == depth {
+            *words = scene.provenance.of_triangle(triangle.triangle).map(f32::from_bits);
+        }
     }
 }

@@ -153,8 +153,8 @@ pub struct MapPass {
     /// Turns the map's words, as read back, into its values; the last argument lists the surfels'
     /// numbers in storage order.
     pub finish: fn(&mut [f32], &Provenance, &[u32]),
-    /// The f64 twin, given the nearest depths.
-    pub reference: fn(&Strip<'_>, &[visibility::Nearest], &mut Frame),
+    /// The f64 twin, given the nearest depths and the triangles.
+    pub reference: fn(&Strip<'_>, &[visibility::Nearest], &join::Beside<'_>, &mut Frame),
 }
 
 /// All maps that have a pass of their own.

@@ -100,8 +100,11 @@ pub struct Renderer<S, B> {
     /// The level of detail in the options. A number of splats is converted to a node size anew for
     /// each view.
     detail: Detail,
-    /// The strength of eye-dome lighting, and whether the map of depths is wanted too.
-    eye_dome: Option<(EyeDome, bool)>,
+    /// The strength of eye-dome lighting.
+    eye_dome: Option<EyeDome>,
+    /// Whether the map of depths is rendered only for eye-dome lighting or for the names of
+    /// triangles.
+    drops_depth: bool,
     /// State that recorded frames share.
     recorded: encode::Shared,
 }
@@ -118,15 +121,18 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::scene(&facts, options, reference)?;
         let (sources, options) = own::settled(backend.borrow(), options)?;
         let faults = own::faults(&options);
-        let eye_dome = options.edl.map(|strength| (strength, options.maps.has(Map::Depth)));
-        let maps = if eye_dome.is_some() { options.maps.and(&[Map::Depth]) } else { options.maps };
+        let eye_dome = options.edl;
+        let names_triangles = options.maps.has(Map::Index) && facts.mesh.triangles > 0;
+        let needs_depth = eye_dome.is_some() || names_triangles;
+        let drops_depth = needs_depth && !options.maps.has(Map::Depth);
+        let maps = if needs_depth { options.maps.and(&[Map::Depth]) } else { options.maps };
         let options = &encoded::of(&facts, &Settings { maps, ..options.clone() });
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
         let (kept, recorded) = (Kept::new(facts, colors), encode::Shared::default());
-        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, eye_dome, recorded })
+        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, eye_dome, drops_depth, recorded })
     }
 
     /// Renders one frame.
@@ -162,11 +168,10 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
 
     /// Applies the filters of finished pictures, and removes a map that only they need.
     fn filtered(&self, mut frame: Frame, camera: &Camera) -> Frame {
-        if let Some((strength, keeps_depth)) = self.eye_dome {
+        if let Some(strength) = self.eye_dome {
             eye_dome::light(&mut frame, camera, strength);
-            frame = if keeps_depth { frame } else { frame.without(Map::Depth) };
         }
-        frame
+        if self.drops_depth { frame.without(Map::Depth) } else { frame }
     }
 
     /// Returns the node size for the view of `camera`. The options of the colour's part determine

@@ -144,7 +144,7 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             }
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);
-                own.for_each(|own| (own.reference)(strip, &nearest, &mut frame));
+                own.for_each(|own| (own.reference)(strip, &nearest, &beside(strip, &shown), &mut frame));
             }
         });
     }

@@ -110,7 +110,6 @@ pub const MAPS: [MapRow; 12] = [
     },
     MapRow {
         raster: false,
-        of_surfels: true,
         numbers: true,
         compared: false,
         ..row(Map::Index, "index", &["input", "point"], "index", Some("INDEX_IMAGE"))

@@ -1,4 +1,5 @@
-//! Provenance: the input and point that each surfel comes from.
+//! Provenance: the input and point that each surfel comes from, and the input and face of each
+//! triangle.
 
 use std::ops::Range;
 
@@ -9,6 +10,8 @@ pub struct Provenance {
     inputs: Vec<Input>,
     /// For each surfel, its index before the scene was reordered.
     order: Option<Vec<u32>>,
+    /// For each triangle, the number of its mesh and of its face in that mesh.
+    faces: Vec<[u32; 2]>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -81,6 +84,26 @@ impl Provenance {
         let kept = index - input.first;
         let of = input.numbers.as_ref().and_then(|numbers| numbers.get(kept as usize)).map(|&number| number.into());
         (after as u64 - 1, number(&input.left_out, of.unwrap_or(kept)))
+    }
+}
+
+impl Provenance {
+    /// Sets the number of its mesh, and of its face in that mesh, for each triangle of the scene.
+    pub(crate) fn set_faces(&mut self, faces: Vec<[u32; 2]>) {
+        self.faces = faces;
+    }
+
+    /// Replaces the number of each mesh by that of its input.
+    pub(crate) fn number_meshes(&mut self, inputs: &[u32]) {
+        for [mesh, _] in &mut self.faces {
+            *mesh = inputs.get(*mesh as usize).copied().unwrap_or(*mesh);
+        }
+    }
+
+    /// The number of the input of triangle `index`, and the number of its face in that input; both
+    /// start at 0. A triangle that was not read from a file counts as one of input 0.
+    pub fn of_triangle(&self, index: u32) -> [u32; 2] {
+        self.faces.get(index as usize).copied().unwrap_or([0, index])
     }
 }
 

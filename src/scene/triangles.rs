@@ -71,14 +71,23 @@ impl Triangles {
 
     /// As [`Self::new`], with textures, which triangles refer to by their indices.
     pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
+        Self::textured_in_order(triangles, textures).0
+    }
+
+    /// As [`Self::textured`]. Also returns the place of each triangle among those given.
+    pub(crate) fn textured_in_order(triangles: &[Triangle], textures: &[Arc<Texture>]) -> (Self, Vec<u32>) {
         match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
             true => Self::kept(triangles, textures, doubled),
             false => Self::kept(triangles, textures, single),
         }
     }
 
-    /// As [`Self::textured`], with positions rounded by `stored`.
-    fn kept<P: Place>(triangles: &[Triangle], textures: &[Arc<Texture>], stored: fn([f64; 3]) -> P) -> Self {
+    /// As [`Self::textured_in_order`], with positions rounded by `stored`.
+    fn kept<P: Place>(
+        triangles: &[Triangle],
+        textures: &[Arc<Texture>],
+        stored: fn([f64; 3]) -> P,
+    ) -> (Self, Vec<u32>) {
         let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
         let bounds = Bounds::of(places.clone().map(Place::exact));
@@ -95,7 +104,8 @@ impl Triangles {
         let has_normals = triangles.par_iter().any(|triangle| triangle.normals.is_some());
         let mut all: Vec<Record> = triangles
             .par_iter()
-            .filter_map(|triangle| {
+            .enumerate()
+            .filter_map(|(given, triangle)| {
                 let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
                 let normals =
                     if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
@@ -104,7 +114,8 @@ impl Triangles {
                     .filter(|(of, _)| textures.len() > *of as usize)
                     .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
-                let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
+                let record =
+                    Record { corners: [a, b, c], normals, colors: triangle.colors, painted, given: given as u32 };
                 has_area(placed(triangle).map(Place::exact)).then(|| record.turned())
             })
             .collect();
@@ -121,7 +132,7 @@ impl Triangles {
             }
         }
         let is_painted = all.par_iter().any(|record| record.painted.texture != UNPAINTED);
-        Self {
+        let made = Self {
             reaches,
             vertices: keyed.iter().map(|(_, place)| place.high()).collect(),
             low: keyed.iter().filter_map(|(_, place)| place.low()).collect(),
@@ -130,7 +141,8 @@ impl Triangles {
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
             painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
             textures: textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect(),
-        }
+        };
+        (made, all.iter().map(|record| record.given).collect())
     }
 
     /// The largest error of a coordinate stored as two f32, world units. Only triangles count for
@@ -255,6 +267,8 @@ struct Record {
     normals: [[f32; 3]; 3],
     colors: [[f32; 4]; 3],
     painted: Painted,
+    /// Its place among the given triangles. It decides the order of triangles that are the same.
+    given: u32,
 }
 
 impl Record {
@@ -267,6 +281,7 @@ impl Record {
             normals: std::array::from_fn(|k| self.normals[turn(k)]),
             colors: std::array::from_fn(|k| self.colors[turn(k)]),
             painted: Painted { places: std::array::from_fn(|k| self.painted.places[turn(k)]), ..self.painted },
+            given: self.given,
         }
     }
 
@@ -279,6 +294,7 @@ impl Record {
             .then_with(|| normals(self).cmp(&normals(other)))
             .then_with(|| colors(self).cmp(&colors(other)))
             .then_with(|| painted(self).cmp(&painted(other)))
+            .then_with(|| self.given.cmp(&other.given))
     }
 }
 

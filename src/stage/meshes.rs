@@ -19,6 +19,8 @@ use crate::surfels::{Preparation, with_triangles};
 pub(super) struct Meshes {
     meshes: Vec<Mesh>,
     paths: Vec<PathBuf>,
+    /// The number of each mesh among the inputs; meshes that are no inputs follow them.
+    numbers: Vec<u32>,
 }
 
 /// Returns how the meshes among `inputs` are drawn, and why if nobody said so and they are surfels.
@@ -95,6 +97,7 @@ impl Meshes {
             }
             meshes.meshes.push(mesh);
             meshes.paths.push(path);
+            meshes.numbers.push(number as u32);
         }
         Ok(meshes)
     }
@@ -131,6 +134,8 @@ impl Meshes {
             }
             _ => {}
         }
+        let first = request.files().paths().len().max(request.scene.given.len()) as u32;
+        self.numbers.extend((first..).take(named.len()));
         self.meshes.append(&mut named);
         self.paths.append(&mut paths);
         Ok(())
@@ -142,10 +147,11 @@ impl Meshes {
     ///
     /// [`Error::EmptyScene`] if there are no triangles to draw.
     pub fn joined(self, of_surfels: Option<Made>, progress: &dyn Progress) -> Result<Made> {
-        let Self { meshes, paths } = self;
+        let Self { meshes, paths, numbers } = self;
         meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| progress.note(line));
         let (scene, preparation) = of_surfels.unzip();
-        let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| error.of_inputs(&paths))?;
+        let (mut scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| error.of_inputs(&paths))?;
+        scene.provenance.number_meshes(&numbers);
         of_triangles.notes().iter().for_each(|line| progress.note(line));
         let guessed_up = of_triangles.guessed_up;
         Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))

@@ -84,19 +84,22 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
         let up = given.unwrap_or_else(|| guess_up(&bounds));
         Scene { origin: origin_for(&bounds), oriented: true, up, ..Scene::default() }
     });
-    let (mut all, mut textures) = (Vec::new(), Numbers::default());
-    for mesh in meshes {
+    let (mut all, mut faces, mut textures) = (Vec::new(), Vec::new(), Numbers::default());
+    for (mesh, of_mesh) in meshes.iter().zip(0..) {
         preparation.given += mesh.triangles.len() as u64;
         // The index of each material's texture, which meshes may share.
         let number = |of: &Material| of.texture.as_ref().map(|texture| textures.of(texture));
         let numbers: Vec<Option<u32>> = mesh.materials.iter().map(number).collect();
         let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
+        faces.par_extend(of.clone().map(|(index, _)| [of_mesh, index as u32]));
         let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin, &numbers)).collect();
         preparation.dropped_non_finite += (mesh.triangles.len() - made.len()) as u64;
         preparation.replaced_colors += made.iter().filter(|(_, replaced)| *replaced).count() as u64;
         all.extend(made.into_iter().map(|(triangle, _)| triangle));
     }
-    scene.triangles = Triangles::textured(&all, &textures.all);
+    let (triangles, order) = Triangles::textured_in_order(&all, &textures.all);
+    scene.triangles = triangles;
+    scene.provenance.set_faces(order.iter().map(|given| faces[*given as usize]).collect());
     preparation.rounding = Triangles::rounding(&all);
     preparation.triangles = scene.triangles.len() as u64;
     preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;

@@ -30,6 +30,12 @@ use epsplat::low_level::scene::Map;
 /// One unit of a sum of the accumulator `fixed`, as a fraction of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
 
+/// Whether a run takes the `k`th of many like cases: a plain run takes one in `of`, and a run with
+/// `EPSPLAT_THOROUGH=1` takes all.
+pub fn takes(k: usize, of: usize) -> bool {
+    k.is_multiple_of(of) || std::env::var("EPSPLAT_THOROUGH").is_ok_and(|value| value == "1")
+}
+
 /// Opens the adapter under test. Without an adapter, returns `None` and says so on stderr, or
 /// panics if `EPSPLAT_REQUIRE_ADAPTER` is 1.
 pub fn gpu() -> Option<Gpu> {

@@ -6,18 +6,18 @@
 
 use crate::common;
 
-use common::Random;
-use common::command::{Folder, succeeds, text};
+use common::command::{Folder, ply, succeeds, text};
 use common::scenes::sphere_camera;
-use epsplat::io::{self, Points};
+use common::{Random, meshes};
+use epsplat::io::{self, Mesh, Points};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Sources};
 use epsplat::low_level::passes::index::NOTHING;
 use epsplat::low_level::plan::{Optimisation, Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
-use epsplat::low_level::scene::{Colors, Kernel, LowPass, Map, Maps, Projection, Scene};
+use epsplat::low_level::scene::{Colors, Kernel, LowPass, Map, Maps, Projection, Scene, Shading};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
-use epsplat::low_level::surfels::build;
+use epsplat::low_level::surfels::{build, with_triangles};
 
 const WANTED: Maps = Maps::of(&[Map::Index, Map::Depth]);
 
@@ -153,11 +153,7 @@ fn numbers_are_those_of_the_files() {
         let center = if lost { "nan 0" } else { "0 0" };
         folder.file(
             if lost { "a.ply" } else { "b.ply" },
-            common::command::ply(
-                "x y z nx ny nz radius",
-                3,
-                &format!("{center} 0 0 0 1 0.1\n-1 0 {z} 0 0 1 0.8\n1 0 {z} 0 0 1 0.8\n"),
-            ),
+            ply("x y z nx ny nz radius", 3, &format!("{center} 0 0 0 1 0.1\n-1 0 {z} 0 0 1 0.8\n1 0 {z} 0 0 1 0.8\n")),
         )
     };
     let (a, b) = (rows(0.0, true), rows(5.0, false));
@@ -179,4 +175,82 @@ fn numbers_are_those_of_the_files() {
     line.extend(["--backend", "raster"]);
     line.drain(line.iter().position(|word| *word == "reference").map(|at| at - 1..=at).unwrap());
     common::command::fails(&line, 2, &["rasteriser", "index"]);
+}
+
+/// A closed body of triangles whose colours count its faces, in this order.
+fn counted(order: &[usize]) -> Mesh {
+    let body = meshes::sphere(3, false);
+    let triangles: Vec<[u32; 3]> = order.iter().map(|&face| body.triangles[face]).collect();
+    let color =
+        |&face: &usize| [(face % 16) as f32 / 16.0, (face / 16 % 16) as f32 / 16.0, (face / 256) as f32 / 16.0, 1.0];
+    Mesh { face_colors: Some(order.iter().map(color).collect()), triangles, ..body }
+}
+
+/// The map names the face that a pixel shows, as its colour tells, or else the surfel. Kernels and
+/// twins agree, and the order of faces in a file decides their numbers and nothing else.
+#[test]
+fn triangles_are_named_by_their_faces() {
+    let Some(gpu) = common::gpu() else { return };
+    let device = Backend::gpu(gpu);
+    let count = meshes::sphere(3, false).triangles.len();
+    assert!(count > 256 && count % 7 != 0);
+    let own: Vec<usize> = (0..count).collect();
+    let turned: Vec<usize> = (0..count).map(|k| (k * 7 + 3) % count).collect();
+    let unlit = Settings { shading: Shading::Unlit, maps: Maps::of(&[Map::Index]), ..Settings::default() };
+    for order in [&own, &turned] {
+        let alone = with_triangles(None, &[counted(order)]).unwrap().0;
+        for backend in [&device, &Backend::Reference] {
+            let shown = frame(&alone, &unlit, backend);
+            assert!(shown.map(Map::Depth).is_none());
+            let mut seen = 0;
+            for (color, [input, face]) in shown.color.iter().zip(named(&shown)) {
+                if color[3] == 0.0 {
+                    assert_eq!([*input, *face], [NOTHING; 2]);
+                    continue;
+                }
+                let [low, middle, high] = [color[0], color[1], color[2]].map(|value| (value * 16.0).round() as usize);
+                assert_eq!((*input, order[*face as usize]), (0, low + 16 * middle + 256 * high));
+                seen += 1;
+            }
+            assert!(seen > 500, "{seen}");
+        }
+    }
+    // Surfels that stick out of the body, and the body beside them.
+    let surfels = scene(&points(3000));
+    let mut body = counted(&own);
+    body.positions.iter_mut().for_each(|place| *place = place.map(|x| 0.9 * x + 0.12));
+    let both = with_triangles(Some(surfels), &[body]).unwrap().0;
+    let twin = frame(&both, &options(), &Backend::Reference);
+    let (differ, covered) = different(&frame(&both, &options(), &device), &twin);
+    assert!(differ * 500 < covered && covered > 2000, "{differ} of {covered}");
+    let sources = Sources::default().replace("index_triangles.wgsl", "depth > 0.0 &&", "false &&").unwrap();
+    let Backend::Gpu { gpu, .. } = device else { return };
+    let broken = Backend::Gpu { gpu, sources };
+    let (differ, _) = different(&frame(&both, &options(), &broken), &twin);
+    assert!(differ > 300, "{differ}");
+}
+
+/// In a picture of several files each is an input of its own, in the order of the command line.
+#[test]
+fn meshes_are_numbered_as_inputs() {
+    let folder = Folder::new();
+    let mesh = |name: &str, x: f64| {
+        let text = format!("v {x} 0 0\nv {} 0 0\nv {x} 1 0\nf 1 2 3\n", x + 1.0);
+        folder.file(name, text)
+    };
+    let cloud: String = (0..100)
+        .map(|k| format!("{} {} 0 0 0 1 0.1\n", 4.0 + 0.1 * f64::from(k % 10), 0.1 * f64::from(k / 10)))
+        .collect();
+    let cloud = folder.file("cloud.ply", ply("x y z nx ny nz radius", 100, &cloud));
+    let (first, last, output) = (mesh("first.obj", 0.0), mesh("last.obj", 2.0), folder.path("named.exr"));
+    let inputs = ["render", text(&first), text(&cloud), text(&last), "-o", text(&output)];
+    let view = ["--view", "front", "--up", "y", "--size", "96x48", "--aov", "index", "--backend", "reference"];
+    succeeds(&[&inputs[..], &view].concat());
+    let drawn = io::exr::read(&output).unwrap();
+    let found: std::collections::BTreeSet<u32> = named(&drawn).iter().map(|[input, _]| *input).collect();
+    assert_eq!(found, [0, 1, 2, NOTHING].into());
+    // Left to right: the first mesh, the last one, the cloud.
+    let in_row = named(&drawn).chunks(96).flat_map(|row| row.iter().enumerate());
+    let places: std::collections::BTreeMap<u32, usize> = in_row.map(|(x, [input, _])| (*input, x)).collect();
+    assert!(places[&0] < places[&2] && places[&2] < places[&1], "{places:?}");
 }

@@ -296,7 +296,7 @@ fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
     write(&format!("# {}\n", gpu.adapter.name));
     let (backend, core_backend) = (Backend::gpu(gpu.clone()), Backend::gpu(core.clone()));
     let (mut compared, mut all_adapters) = (0, Vec::new());
-    for row in &all {
+    for (number, row) in all.iter().enumerate() {
         let limited = |limit| common::gpu().map(|gpu| Backend::gpu(Gpu::with_buffer_limit(gpu, limit))).unwrap();
         let own = row.buffer_limit.map(limited);
         if let Some(why) = refused(row, &gpu) {
@@ -308,14 +308,14 @@ fn frames_repeat_and_core_webgpu_makes_the_same_ones() {
         if row.options.raster.is_none() {
             all_adapters.push(format!("{made:016x} {}", row.name));
         }
-        if row.buffer_limit.is_none() && refused(row, &core).is_none() {
+        if row.buffer_limit.is_none() && refused(row, &core).is_none() && common::takes(number, 2) {
             let (scene, camera) = row.view;
             let (frame, _) = render(scene, camera, &row.options, &core_backend, &()).unwrap();
             assert_eq!(hash(&frame), made, "{}", row.name);
             compared += 1;
         }
     }
-    assert!(compared >= 75, "{compared}");
+    assert!(compared >= 35, "{compared}");
     compare_with_kept(&all_adapters);
 }
 

@@ -192,8 +192,11 @@ fn lists_do_not_show_how_they_came_to_be() {
     let mut all = crowded();
     all.push((dense, camera));
     for (number, (scene, camera)) in all.iter().enumerate() {
-        for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
+        for (way, composite) in [ALL, Composite::Layers(2), Composite::Sorted].into_iter().enumerate() {
             for samples in [Samples::ONE, "4".parse().unwrap()] {
+                if samples != Samples::ONE && !common::takes(number + way, 3) {
+                    continue;
+                }
                 let own = Settings { samples, opacity: 0.6, maps: BOTH_MAPS, ..options(composite) };
                 let first = all_bits(&frame(scene, camera, &own, &backend));
                 let name = format!("{number} {composite:?} {samples:?}");

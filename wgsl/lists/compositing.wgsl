@@ -24,9 +24,6 @@ struct Compositing {
     joined: bool,
 }
 
-// The depth of no triangle, beyond all fragments.
-const NO_TRIANGLE: f32 = 3.4028234e38;
-
 fn begun(list: vec2<u32>) -> Compositing {
     return Compositing(shown_nothing(), vec2<f32>(-1.0), list.x, list.x, 0.0, false);
 }

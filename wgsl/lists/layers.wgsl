@@ -1,15 +1,15 @@
 // Stage 4: splits a pixel's fragments into surfaces, blends each surface as blend.wgsl blends the
 // nearest one, and composites the surfaces from front to back. Same interface as sorted.wgsl.
 // Twin: src/passes/layers.rs.
-// All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
+// All loops end, by 1, 6 of src/gpu/loops.rs: 0x92b6c9dfd975d317
 // #import *::{quantise, resolve_color, sum_at, surface_depth}
 // #import blend::{attributes_without_place, blend_weighted}
-// #import compositing::{Compositing, NO_TRIANGLE, with_joined}
+// #import compositing::{Compositing, with_joined}
 // #import curved|facing|flat::{Bend}
 // #import epsilon_*::{farthest_shown}
 // #import fragments::{Record, keys, listed_color, listed_normal, listed_radius, listed_weight}
 // #import fragments::{record_at}
-// #import join_lists::{triangle_depth}
+// #import join_lists::{has_triangle, is_behind_triangle, triangle_depth}
 // #import layer_sums::{clear_sums}
 // #import layout::{WEIGHT_CHANNEL}
 // #import long_lists::{has_rounds, next_round}
@@ -116,7 +116,7 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
         if (!has_rounds()) {
             break;
         }
-        let joins = !so_far.joined && summed_depth(is_last, front) >= triangle;
+        let joins = !so_far.joined && is_behind_triangle(summed_depth(is_last, front), triangle);
         if (joins) {
             so_far = with_joined(so_far, triangle, out, x, y);
             // With one layer fewer, the surface may belong to the tail, so it is summed again.
@@ -128,7 +128,7 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
             so_far.first = end;
         }
     }
-    if (so_far.first >= end && !so_far.joined && triangle < NO_TRIANGLE && shows_more(so_far.shown)) {
+    if (so_far.first >= end && !so_far.joined && has_triangle(triangle) && shows_more(so_far.shown)) {
         so_far = with_joined(so_far, triangle, out, x, y);
     }
     return so_far;

@@ -2,7 +2,7 @@
 // several dispatches, each of which does a part and stores where it stopped. Same interface as
 // long_lists_absent.wgsl.
 // Host side and bounds: src/passes/long_lists.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x02e03c9a3f60526d
+// All loops end, by 1 of src/gpu/loops.rs: 0xd50948f00032dae2
 // #import *::{CHANNELS}
 // #import compositing::{Compositing, begun}
 // #import footprint::{band_pixels}

@@ -1,9 +1,9 @@
 // Stage 4: composites every fragment of a pixel by itself, from front to back.
 // Twin: src/passes/sorted.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x296fe3b00e53d0eb
-// #import compositing::{Compositing, NO_TRIANGLE, with_joined}
+// All loops end, by 1 of src/gpu/loops.rs: 0xc25542ba6e8b7305
+// #import compositing::{Compositing, with_joined}
 // #import fragments::{keys, listed_color, listed_normal, listed_weight, record_at}
-// #import join_lists::{triangle_depth}
+// #import join_lists::{has_triangle, is_behind_triangle, triangle_depth}
 // #import layout::{held}
 // #import long_lists::{next_round}
 // #import maps::{write_surface}
@@ -22,7 +22,7 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
     let triangle = triangle_depth(x, y);
     for (; so_far.first < end && next_round(); so_far.first++) {
         let key = keys[so_far.first];
-        if (!so_far.joined && bitcast<f32>(key.x) >= triangle) {
+        if (!so_far.joined && is_behind_triangle(bitcast<f32>(key.x), triangle)) {
             so_far = with_joined(so_far, triangle, out, x, y);
             if (so_far.shown.transmittance < LEAST_SHOWN) {
                 so_far.first = end;
@@ -46,7 +46,8 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
         }
     }
     // The triangle may lie behind all fragments.
-    if (so_far.first >= end && !so_far.joined && triangle < NO_TRIANGLE && so_far.shown.transmittance >= LEAST_SHOWN) {
+    let shows = has_triangle(triangle) && so_far.shown.transmittance >= LEAST_SHOWN;
+    if (so_far.first >= end && !so_far.joined && shows) {
         so_far = with_joined(so_far, triangle, out, x, y);
     }
     return so_far;

@@ -1,11 +1,13 @@
 // Puts a pixel's nearest triangle among the surfaces or fragments of its list, as one surface more.
 // Same interface as join_lists_absent.wgsl. Twin: src/passes/join.rs.
-// #import compositing::{NO_TRIANGLE}
 // #import join_*::{color_beside}
 // #import layout::{held, held_band}
 // #import maps::{write_surface}
 // #import resolve_lists::{Shown, with_behind}
 // #import triangles_tiles::{beside, shows_triangles}
+
+// The depth of no triangle, beyond all fragments.
+const NO_TRIANGLE: f32 = 3.4028234e38;
 
 // The depth of the pixel's triangle, device units. It is beyond all fragments if there is none.
 fn triangle_depth(x: u32, y: u32) -> f32 {
@@ -15,6 +17,16 @@ fn triangle_depth(x: u32, y: u32) -> f32 {
         depth = beside[2u * (row * held.width + x) + 1u].w;
     }
     return select(NO_TRIANGLE, depth, depth > 0.0);
+}
+
+// Whether a surface at `depth` lies behind the triangle.
+fn is_behind_triangle(depth: f32, triangle: f32) -> bool {
+    return depth >= triangle;
+}
+
+// Whether the pixel has a triangle.
+fn has_triangle(triangle: f32) -> bool {
+    return triangle < NO_TRIANGLE;
 }
 
 // Composites the triangle behind what is shown, and writes the maps of its surface at `out`.

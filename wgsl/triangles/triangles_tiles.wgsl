@@ -1,7 +1,7 @@
 // The list of image tiles in which triangles show. Pixels of other tiles are not shaded, nor read
 // when splats and triangles are joined. Same interface as triangles_tiles_absent.wgsl.
 // Host side: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x739883655b001de7
+// All loops end, by 1 of src/gpu/loops.rs: 0xe27600bd9fa6ddd4
 // #import covered::{TILE_ROWS, TILE_WIDTH, tiles_across}
 // #import footprint::{band_pixels}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}

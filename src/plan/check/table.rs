@@ -270,8 +270,10 @@ pub(super) const SCENES: [SceneClash; 13] = [
         sentence: "--blend nearest has no tolerance within which triangles blend: take another --join",
     },
     SceneClash {
-        applies: |facts, options, _| has_triangles(facts) && options.maps.has(Map::Index),
-        sentence: "triangles have no points to name: leave the map index out",
+        applies: |facts, options, device| {
+            device && has_triangles(facts) && options.maps.has(Map::Index) && options.raster.is_some()
+        },
+        sentence: "the rasteriser names no triangles: leave the map index out, or take --backend gpu",
     },
     SceneClash {
         applies: |facts, options, device| {

@@ -34,7 +34,7 @@ use common::any_scene::{self, Sampled};
 use common::{Random, any_options};
 
 /// Frames that the device draws by default.
-const FRAMES: usize = 300;
+const FRAMES: usize = 200;
 
 /// Views per combination.
 const VIEWS: usize = 3;

@@ -12,7 +12,7 @@ use crate::progress::Progress;
 use crate::scene::camera::Projection;
 use crate::scene::{self, Camera, Epsilon, Map, Samples, Surfel};
 use crate::surfels::gather::gather;
-use crate::surfels::mesh::vertex_colors;
+use crate::surfels::vertex_colors;
 
 /// The number of views that see each point of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]

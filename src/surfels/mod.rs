@@ -56,6 +56,7 @@ pub(crate) use self::density::densities;
 pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;
+pub(crate) use self::mesh::vertex_colors;
 pub use self::orient::Orientation;
 pub use self::painting::build_painted;
 pub use self::preparation::Preparation;

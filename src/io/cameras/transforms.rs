@@ -70,8 +70,10 @@ impl Frame<'_> {
             _ => return Err("a size is both w and h".into()),
         };
         let (width, height) = given.unwrap_or(size);
+        // A frame without a pose is of another kind, so its lens tells nothing.
+        let pose = self.pose()?;
         let (lens, undrawn) = self.bent_lens(f64::from(width), f64::from(height), given.is_some())?;
-        let camera = CameraFile { size: given, lens, pose: self.pose()?, near: None };
+        let camera = CameraFile { size: given, lens, pose, near: None };
         Ok(NamedCamera { name, camera, undrawn })
     }
 
@@ -141,13 +143,18 @@ impl Frame<'_> {
     /// `[fx, fy, cx, cy]` from focal lengths in pixels, or else from angles. Pixels are square if
     /// only one of fx and fy is known.
     fn intrinsics(&self, width: f64, height: f64, sized: bool) -> Result<[f64; 4], String> {
-        let of_angle = |key: &str, side: f64| match self.number(key)? {
+        // A frame's own angles come before lengths for all frames.
+        let has_own = |key: &str| self.own.get(key).is_some_and(|value| !value.is_null());
+        let of_own_angles =
+            ["camera_angle_x", "camera_angle_y"].into_iter().any(has_own) && !["fl_x", "fl_y"].into_iter().any(has_own);
+        let of_angle = |key: &str, side: f64| match self.number(key)?.filter(|_| !of_own_angles || has_own(key)) {
             Some(angle) if !(angle > 0.0 && angle < PI) => {
                 Err(format!("its {key} must lie between 0 and pi (radians), but it is {angle:?}"))
             }
             angle => Ok(angle.map(|angle| 0.5 * side / (0.5 * angle).tan())),
         };
-        let pixels = [self.number("fl_x")?, self.number("fl_y")?, self.number("cx")?, self.number("cy")?];
+        let length = |key: &str| if of_own_angles { Ok(None) } else { self.number(key) };
+        let pixels = [length("fl_x")?, length("fl_y")?, self.number("cx")?, self.number("cy")?];
         if !sized && pixels.iter().any(Option::is_some) {
             return Err("intrinsics are in pixels, so the camera needs w and h".into());
         }
@@ -232,6 +239,12 @@ mod tests {
         assert_eq!(lens("").size, Some((800, 600)));
         let own = lens(r#""fl_x": 700, "fl_y": 710, "cy": 310, "w": 640, "cx": null,"#);
         assert_eq!((own.lens, own.size), (Lens::Intrinsics([700.0, 710.0, 390.5, 310.0]), Some((640, 600))));
+        // An angle of the frame's own too, before lengths for all.
+        for shared in [shared.to_owned(), format!(r#"{shared} "fl_y": 600, "camera_angle_y": 1,"#)] {
+            let camera = one(&shared, r#""camera_angle_x": 1.5707963267948966,"#).unwrap().camera;
+            let Lens::Intrinsics([fx, fy, ..]) = camera.lens else { panic!() };
+            assert!((fx - 400.0).abs() < 1e-9 && fy == fx, "{fx} {fy}");
+        }
         let intrinsics = [500.0, 500.0, 390.5, 300.0];
         let bent = |optics: Optics| Lens::Curved(optics, intrinsics);
         let plain = Optics::of(Form::Perspective);
@@ -303,7 +316,9 @@ mod tests {
             (r#"[{"eye": [1,2,3]}]"#, "frame 1: the camera needs eye and target"),
             (r#"[{"eye": [1,2,3], "target": [0,0,0], "fl_x": 5}]"#, "unknown field"),
             (r#"{"frames": 5}"#, "(a single camera is given with --camera)"),
-            (r#"{"frames": [5]}"#, "frame 1: it gives neither"),
+            (r#"{"frames": [5]}"#, "frame 1: it has neither a transform_matrix nor eye and target"),
+            // A pose of 3 rows, as nerfstudio exports it.
+            (r#"[{"file_path": "a.png", "transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]"#, "neither a transform_matrix"),
             (
                 r#"{"camera_angle_x": 1, "frames": [{}]}"#,
                 "frame 1: it has neither a transform_matrix nor eye and target",

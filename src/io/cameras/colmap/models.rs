@@ -23,7 +23,7 @@ const fn fisheye(number: i32, name: &'static str, two: bool, distortions: &'stat
 }
 
 /// All models, by number.
-const MODELS: [Model; 12] = [
+const MODELS: [Model; 18] = [
     model(0, "SIMPLE_PINHOLE", false, &[]),
     model(1, "PINHOLE", true, &[]),
     model(2, "SIMPLE_RADIAL", false, &["k"]),
@@ -41,10 +41,19 @@ const MODELS: [Model; 12] = [
         true,
         &["k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"],
     ),
+    model(12, "SIMPLE_DIVISION", false, &["k"]),
+    model(13, "DIVISION", true, &["k"]),
+    fisheye(14, "SIMPLE_FISHEYE", false, &[]),
+    fisheye(15, "FISHEYE", true, &[]),
+    model(16, "EUCM", true, &["alpha", "beta"]),
+    model(17, SPHERE, false, &[]),
 ];
 
-/// The model whose lens is not drawn.
-const UNDRAWN: &str = "RAD_TAN_THIN_PRISM_FISHEYE";
+/// The model of a whole sphere, whose parameters are the width and the height of the picture.
+const SPHERE: &str = "EQUIRECTANGULAR";
+
+/// The models whose lenses are not drawn.
+const UNDRAWN: [&str; 4] = ["RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION", "EUCM"];
 
 /// A camera without its pose.
 pub(super) struct Camera {
@@ -65,12 +74,12 @@ impl Model {
 
     /// Whether the lens is not drawn.
     pub(in crate::io::cameras) fn is_undrawn(&self) -> bool {
-        self.name == UNDRAWN
+        UNDRAWN.contains(&self.name)
     }
 
     /// The number of parameters.
     pub(super) fn parameters(&self) -> usize {
-        3 + usize::from(self.two) + self.distortions.len()
+        if self.name == SPHERE { 2 } else { 3 + usize::from(self.two) + self.distortions.len() }
     }
 
     /// The camera of these parameters; the error is one clause.
@@ -79,6 +88,9 @@ impl Model {
         let needed = self.parameters();
         if parameters.len() != needed {
             return Err(format!("a {name} camera has {needed} parameters, not {}", parameters.len()));
+        }
+        if *name == SPHERE {
+            return Ok(Camera { size, lens: Lens::Equirectangular, undrawn: None });
         }
         let (lens, rest) = parameters.split_at(needed - distortions.len());
         let intrinsics = match *lens {
@@ -121,4 +133,36 @@ impl Model {
 /// A lens of these optics; a pinhole if they bend nothing.
 pub(in crate::io::cameras) fn bent(optics: Optics, intrinsics: [f64; 4]) -> Lens {
     if optics.is_pinhole() { Lens::Intrinsics(intrinsics) } else { Lens::Curved(optics, intrinsics) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn later_models_are_known_by_number_and_name() {
+        let camera = |number: i32, name: &str, parameters: &[f64]| {
+            let model = Model::of_number(number).unwrap();
+            assert_eq!((model.name, Model::of_name(name).unwrap().number), (name, number));
+            assert_eq!(model.parameters(), parameters.len(), "{name}");
+            let camera = model.camera((8, 4), parameters).unwrap();
+            (camera.lens, camera.undrawn)
+        };
+        let equidistant = Optics::of(Form::Fisheye);
+        assert_eq!(
+            camera(14, "SIMPLE_FISHEYE", &[5.0, 4.0, 2.0]),
+            (Lens::Curved(equidistant, [5.0, 5.0, 4.0, 2.0]), None)
+        );
+        assert_eq!(
+            camera(15, "FISHEYE", &[5.0, 6.0, 4.0, 2.0]),
+            (Lens::Curved(equidistant, [5.0, 6.0, 4.0, 2.0]), None)
+        );
+        assert_eq!(camera(17, "EQUIRECTANGULAR", &[8.0, 4.0]), (Lens::Equirectangular, None));
+        let pinhole = Lens::Intrinsics([5.0, 6.0, 4.0, 2.0]);
+        assert_eq!(camera(13, "DIVISION", &[5.0, 6.0, 4.0, 2.0, 0.1]), (pinhole, Some("DIVISION")));
+        assert_eq!(camera(16, "EUCM", &[5.0, 6.0, 4.0, 2.0, 0.5, 1.0]), (pinhole, Some("EUCM")));
+        let square = Lens::Intrinsics([5.0, 5.0, 4.0, 2.0]);
+        assert_eq!(camera(12, "SIMPLE_DIVISION", &[5.0, 4.0, 2.0, 0.1]), (square, Some("SIMPLE_DIVISION")));
+    }
 }

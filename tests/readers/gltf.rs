@@ -371,6 +371,7 @@ fn damaged_files_are_refused_in_a_sentence() {
         refused(r#"{"asset":{"version":"2.0"},"nodes":[{"children":[1]},{"children":[0]}]}"#).contains("below another")
     );
     assert!(refused(&"[".repeat(100_000)).contains("it is no glTF file"));
+    assert!(refused(r#"{"asset":{},"meshes":{"a":{}}}"#).contains("it is glTF of version 1.0"));
     assert!(folder.refusal("a.glb", b"glTF\x01\0\0\0\x14\0\0\0").contains("version 1"));
     assert!(folder.read("e.gltf", br#"{"asset":{"version":"2.0"},"scenes":[{}]}"#).unwrap().positions.is_empty());
 }

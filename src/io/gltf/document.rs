@@ -51,6 +51,7 @@ impl Document {
             return Err(malformed(format!("its JSON is longer than {} MiB: save it as GLB", MOST_JSON >> 20)));
         }
         let mut value: Value = serde_json::from_slice(text).map_err(not_gltf)?;
+        check_version(&value)?;
         let transforms = value.get("nodes").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
         let transforms = transforms.iter().map(transform).collect();
         let animations = trim(&mut value)?;
@@ -123,12 +124,21 @@ fn trim(value: &mut Value) -> Result<usize, Fault> {
     Ok(animations)
 }
 
-/// Checks the version and the extensions that the file requires.
-fn check(root: &Root) -> Result<(), Fault> {
-    if root.asset.version.split('.').next() != Some("2") {
-        let version = shown(root.asset.version.as_bytes());
-        return Err(malformed(format!("it is glTF of version {version}, and only version 2 is read")));
+/// Checks the version. Version 1 has objects in place of lists.
+fn check_version(value: &Value) -> Result<(), Fault> {
+    let version = value.get("asset").and_then(|asset| asset.get("version"));
+    let is_first = value.get("meshes").is_some_and(Value::is_object);
+    match version.and_then(Value::as_str).unwrap_or(if is_first { "1.0" } else { "2.0" }) {
+        version if version.split('.').next() == Some("2") => Ok(()),
+        version => {
+            let version = shown(version.as_bytes());
+            Err(malformed(format!("it is glTF of version {version}, and only version 2 is read")))
+        }
     }
+}
+
+/// Checks the extensions that the file requires.
+fn check(root: &Root) -> Result<(), Fault> {
     let is_read = |name: &str| READ.contains(&name) || name.starts_with(MATERIALS);
     match root.extensions_required.iter().find(|name| !is_read(name)) {
         None => Ok(()),

@@ -2,10 +2,12 @@
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 
-/// The codes of component types.
+/// The codes of component types; a test program needs some of them.
 pub const U8: u32 = 5121;
+#[allow(dead_code)]
 pub const I16: u32 = 5122;
 pub const U16: u32 = 5123;
+#[allow(dead_code)]
 pub const U32: u32 = 5125;
 pub const F32: u32 = 5126;
 

@@ -17,7 +17,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, Settings, Sides, composited, culls_back};
 use crate::plan::{Plan, tuning};
-use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cap, Clip, Composite, Fade, Form, LowPass, Scene, Surfel, copies, has_copies};
 
 /// A surfel with its index, and with its cap if some surfel of the scene curves.
 pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
@@ -26,7 +26,7 @@ pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
 ///
 /// `relative` is the surfel's centre relative to the camera's eye, world units.
 pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
-    projected(of, relative, camera, design).ok()
+    projected(of, relative, camera, design, false).ok()
 }
 
 /// Why a surfel touches no pixel.
@@ -40,24 +40,38 @@ pub(super) enum Missed {
     Between,
 }
 
-/// The splat of [`reference`], or why there is none.
+/// The splat of [`reference`], or why there is none; if `again`, the part of it beyond the border
+/// of a whole sphere.
 pub(super) fn projected(
     (index, surfel, cap): Indexed<'_>,
     relative: DVec3,
     camera: &Camera,
     design: &Design,
+    again: bool,
 ) -> Result<Splat, Missed> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
     let [s, t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
-    let seen = cap.map(|cap| Seen { p, s, t, cap });
+    let own = match camera.optics {
+        Some(_) => Some(homography::own(camera, p, s, t).ok_or(Missed::Behind)?),
+        None => None,
+    };
+    let (normal, radius) = (curved::normal_of(s, t), s.length().max(t.length()));
+    let normal = own.as_ref().map_or(normal, |own| own.axes(normal));
+    let (p, s, t) = own.as_ref().map_or((p, s, t), |own| (DVec3::Z * own.depth, own.s, own.t));
+    let seen = cap.map(|cap| Seen { p, s, t, normal, radius, cap });
+    let pinhole = own.as_ref().map(|own| own.camera(camera));
+    let camera = pinhole.as_ref().unwrap_or(camera);
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
         return Err(Missed::Behind);
     }
-    let mut projected = homography::projected(camera, p, s, t);
+    let mut projected = match &own {
+        Some(own) => homography::lens(camera.near, own),
+        None => homography::projected(camera, p, s, t),
+    };
     let near = depths[0].max(camera.near);
     let depths = [near, depths[1].max(near)];
     let curve = seen.as_ref().map(|seen| {
@@ -73,6 +87,13 @@ pub(super) fn projected(
         let beside = design.low_pass != LowPass::Ewa;
         projected.low = if beside { projected.low.min(low) } else { low };
         projected.high = if beside { projected.high.max(high) } else { high };
+    }
+    if again {
+        let width = i64::from(camera.width);
+        let turn = if 2 * projected.anchor[0] >= width { -width } else { width };
+        projected.anchor[0] += turn;
+        projected.low.x += turn as f64;
+        projected.high.x += turn as f64;
     }
     let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
     let size = DVec2::new(camera.width.into(), camera.height.into());
@@ -119,9 +140,10 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
     let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
     let copies = (has_copies(scene) && once).then(|| copies(scene));
     let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
-    let project = |(index, surfel): (usize, &Surfel)| {
+    let project = |again: bool, (index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || reference((index as u32, surfel, cap(index)), scene.center(index) - eye, camera, &design);
+        let of = (index as u32, surfel, cap(index));
+        let splat = || projected(of, scene.center(index) - eye, camera, &design, again).ok();
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
             let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());
@@ -139,7 +161,12 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
         };
         splat.map(own)
     };
-    surfels.filter_map(project).collect()
+    let is_sphere = camera.optics.is_some_and(|optics| optics.form == Form::Equirectangular);
+    match is_sphere {
+        false => surfels.filter_map(|one| project(false, one)).collect(),
+        // A splat at the border of a whole sphere shows on both sides.
+        true => surfels.flat_map_iter(|one| [project(false, one), project(true, one)].into_iter().flatten()).collect(),
+    }
 }
 
 /// The pass's kernels, files and constants.

@@ -202,7 +202,7 @@ fn images_are_placed_by_their_samplers_and_transforms() {
     };
     let (points, paint) = of("", "");
     assert_eq!(paint.places, [[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]]);
-    // The colour that all vertices share multiplies the image, whose alphas an opaque material ignores.
+    // The colour that all vertices share multiplies the image; an opaque material ignores alphas.
     assert_eq!((paint.colors.as_slice(), paint.numbers.as_slice()), (&[[0.5, 0.25, 0.5, 1.0]][..], &[0][..]));
     assert_eq!(paint.textures[0].texels(), [[255, 0, 0, 255], [0, 0, 255, 255]]);
     assert!(paint.textures[0].clamps() && points.colors.is_none() && points.notes.is_empty(), "{:?}", points.notes);

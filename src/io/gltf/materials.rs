@@ -102,8 +102,8 @@ pub(super) struct Materials<'a> {
     ignore_alpha: bool,
     /// Decoded images, by their place: a file, or the index of an image inside the file.
     decoded: HashMap<Source, Option<Arc<Texture>>>,
-    /// Images as materials show them, by the index of the image, whether it clamps, and what becomes
-    /// of its alphas.
+    /// Images as materials show them, by the index of the image, whether it clamps, and the fate of
+    /// its alphas.
     shown: HashMap<(usize, bool, Cut), Option<Arc<Texture>>>,
     pixels: u64,
     pub(super) numbers: Numbers,

@@ -39,8 +39,8 @@ const MOST_SHARED_PER_BYTE: u64 = 32;
 ///
 /// - Positions are those of the world: the transforms of nodes are applied in f64, and normals
 ///   follow by the inverse transpose. A transform that mirrors turns the winding. Up is y.
-/// - Triangles come from triangles, strips and fans. Vertices of no triangle are left out. Lines are
-///   left out with a note.
+/// - Triangles come from triangles, strips and fans. Vertices of no triangle are left out. Lines
+///   are left out with a note.
 /// - Colours are linear: that of a vertex is `COLOR_0` times the base colour of its material. An
 ///   image is multiplied by the base colour, and by `COLOR_0` if all vertices of a primitive share
 ///   it. Texture coordinates may be transformed (`KHR_texture_transform`), and their origin becomes
@@ -223,8 +223,8 @@ fn of_mesh(mut parts: Parts, materials: Materials<'_>) -> Points {
     points
 }
 
-/// Gives vertices without normals the normals of their triangles, beside others that have some. Their
-/// corners keep none, so these triangles are flat, as the format demands.
+/// Gives vertices without normals the normals of their triangles, beside others that have some.
+/// Their corners keep none, so these triangles are flat, as the format demands.
 fn fill_normals(points: &mut Points) {
     let (Some(normals), Some(faces)) = (&mut points.normals, &points.faces) else { return };
     let is_missing = |normal: &[f32; 3]| *normal == [0.0; 3];

@@ -311,8 +311,8 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
     }
 }
 
-/// Renumbers the vertices of triangles without gaps; returns the vertices in use, in order. The time
-/// is that of the triangles, however many vertices a primitive shares with others.
+/// Renumbers the vertices of triangles without gaps; returns the vertices in use, in order. The
+/// time is that of the triangles, however many vertices a primitive shares with others.
 fn compact(triangles: &mut [[u32; 3]], count: usize) -> Vec<u32> {
     if count / 16 > triangles.len() {
         let mut used = triangles.as_flattened().to_vec();

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// All files that are read together with the one at `path`, whether they exist or not.
 ///
 /// A PLY file may name a mesh and textures. An OBJ file may name material libraries, which may name
-/// images. A named mesh is searched in turn. The list is empty for other files, and for files that
+/// images. A glTF file may name buffers and images. A named mesh is searched in turn. The list is empty for other files, and for files that
 /// cannot be read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the
 /// next [`Input::open`] uses the copy.
 ///
@@ -54,6 +54,8 @@ fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<Pat
     let named = match input.format {
         Format::Ply => ply::companions(&mut input.file, own),
         Format::Obj => obj::companions(&mut input.file, own),
+        #[cfg(feature = "gltf")]
+        Format::Gltf => super::gltf::companions(&mut input.file, own),
         _ => Vec::new(),
     };
     let ready = if stream { input.keep(path) } else { input.file.rewind() };

@@ -29,6 +29,8 @@ pub enum Format {
     Stl,
     /// Polygons of Geomview.
     Off,
+    /// Scenes of glTF 2.0, in text or binary; needs the feature `gltf`.
+    Gltf,
 }
 
 /// A format that is known by name and not read.
@@ -45,14 +47,13 @@ struct Unread {
 const BY_SPLATS: &str = "convert it to PLY with SuperSplat or splat-transform";
 
 /// Advice for formats of meshes.
-const BY_MESHES: &str = "convert it to PLY or OBJ, for example with Blender or with `assimp export`";
+const BY_MESHES: &str = "convert it to glTF, PLY or OBJ, for example with Blender or with `assimp export`";
 
-const UNREAD: [Unread; 8] = [
+const UNREAD: [Unread; 7] = [
     Unread { extensions: &["spz"], start: b"NGSP", what: "an SPZ file of Gaussians", instead: BY_SPLATS },
     Unread { extensions: &["splat"], start: b"", what: "a .splat file of Gaussians", instead: BY_SPLATS },
     Unread { extensions: &["ksplat"], start: b"", what: "a .ksplat file of Gaussians", instead: BY_SPLATS },
     Unread { extensions: &["sog"], start: b"", what: "a SOG file of Gaussians", instead: BY_SPLATS },
-    Unread { extensions: &["glb", "gltf"], start: b"glTF", what: "a glTF file", instead: BY_MESHES },
     Unread { extensions: &["fbx"], start: b"Kaydara FBX", what: "an FBX file", instead: BY_MESHES },
     Unread { extensions: &["3mf"], start: b"", what: "a 3MF file", instead: BY_MESHES },
     Unread { extensions: &["dae"], start: b"", what: "a COLLADA file", instead: BY_MESHES },
@@ -77,10 +78,14 @@ impl Format {
         ("ptx", Self::Ptx),
         ("stl", Self::Stl),
         ("off", Self::Off),
+        #[cfg(feature = "gltf")]
+        ("glb", Self::Gltf),
+        #[cfg(feature = "gltf")]
+        ("gltf", Self::Gltf),
     ];
 
     /// The formats that hold meshes.
-    pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off];
+    pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off, Self::Gltf];
 
     /// The names in [`Self::READ`] as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {
@@ -111,6 +116,7 @@ impl Format {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "e57" => Some(Self::E57),
             "pcd" => Some(Self::Pcd),
+            "glb" | "gltf" => Some(Self::Gltf),
             other => other.parse().ok(),
         }
     }
@@ -136,6 +142,9 @@ impl Format {
         if start.starts_with(b"ASTM") {
             return Some(Self::E57);
         }
+        if start.starts_with(b"glTF") || is_json(start) {
+            return Some(Self::Gltf);
+        }
         let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start);
         if text.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace)) {
             return Some(Self::Ply);
@@ -157,7 +166,7 @@ impl Format {
     pub(super) fn fault_of_start(self, start: &[u8]) -> Option<String> {
         let name = format!("{self:?}").to_ascii_uppercase();
         let fits = match self {
-            Self::Ply | Self::Las | Self::E57 => Self::of_start(start) == Some(self),
+            Self::Ply | Self::Las | Self::E57 | Self::Gltf => Self::of_start(start) == Some(self),
             // The header of a binary file may be zero, but not the number of triangles after it.
             Self::Stl => start.is_empty() || start.iter().any(|byte| *byte != 0),
             // Text may begin with anything but two zero bytes; in UTF-16, every other byte may be
@@ -167,6 +176,12 @@ impl Format {
         let first = if self == Self::Ply { "line is not 'ply'" } else { "bytes do not match that format" };
         (!fits).then(|| format!("it is not a {name} file: its first {first}"))
     }
+}
+
+/// Whether text starts with an object in JSON.
+fn is_json(start: &[u8]) -> bool {
+    let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start).trim_ascii_start();
+    text.strip_prefix(b"{").is_some_and(|rest| rest.trim_ascii_start().starts_with(b"\""))
 }
 
 impl FromStr for Format {
@@ -194,8 +209,6 @@ mod tests {
             ("a.Splat", b"", ".splat"),
             ("a.ksplat", b"\0\x01", ".ksplat"),
             ("a.sog", b"PK\x03\x04", "SOG"),
-            ("a.glb", b"glTF\x02\0\0\0", "glTF"),
-            ("a.gltf", b"{", "glTF"),
             ("a.ply.gz", b"\x1f\x8b\x08", "gzip"),
         ] {
             assert!(unread(name, start).contains(word), "{name}: {}", unread(name, start));

@@ -111,3 +111,21 @@ pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Res
     check(path, (width.into(), height.into()), own + each)?;
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
+
+/// Decodes an image for textures from `bytes` in a file at `path`.
+///
+/// # Errors
+///
+/// The errors of [`decode`].
+#[cfg(feature = "gltf")]
+pub(super) fn decode_bytes(path: &Path, bytes: &[u8], each: u64) -> Result<DynamicImage> {
+    let unreadable = |e: ImageError| Error::malformed(path, format!("not a readable {PAINT}: {e}"));
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes));
+    reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?;
+    reader.no_limits();
+    let decoder = reader.into_decoder().map_err(unreadable)?;
+    let (width, height) = decoder.dimensions();
+    let own = u64::from(decoder.color_type().bytes_per_pixel());
+    check(path, (width.into(), height.into()), own + each)?;
+    DynamicImage::from_decoder(decoder).map_err(unreadable)
+}

@@ -20,6 +20,8 @@ mod encoding;
 pub mod exr;
 mod fault;
 mod format;
+#[cfg(feature = "gltf")]
+pub mod gltf;
 pub mod image;
 pub mod images;
 pub(crate) mod input;
@@ -86,7 +88,8 @@ pub struct ReadOptions {
 
 /// Reads a file of any supported format; see [`Input::open`].
 ///
-/// The formats are those of [`Format::READ`]. E57 and PCD need the features `e57` and `pcd`. Points
+/// The formats are those of [`Format::READ`]. E57, glTF and PCD need the features `e57`,
+/// `gltf` and `pcd`. Points
 /// keep the file's order and coordinates. A file without points is not an error here.
 ///
 /// # Errors
@@ -138,6 +141,7 @@ fn read_opened(input: Input, options: &ReadOptions, progress: &dyn Progress) -> 
         Format::Ptx => text::read_ptx(input, options, progress),
         Format::Stl => stl::read(input, options, progress),
         Format::Off => off::read(input, options, progress),
+        Format::Gltf => read_gltf(input, options, progress),
     }?;
     if format == Format::Obj {
         dimensions::of_positions(&mut points, &options.wanted).map_err(|fault| fault.of(&path))?;
@@ -150,6 +154,8 @@ fn read_opened(input: Input, options: &ReadOptions, progress: &dyn Progress) -> 
 
 #[cfg(feature = "e57")]
 use e57::read as read_e57;
+#[cfg(feature = "gltf")]
+use gltf::read as read_gltf;
 #[cfg(feature = "pcd")]
 use pcd::read as read_pcd;
 
@@ -158,13 +164,18 @@ fn read_e57(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "e57"))
 }
 
+#[cfg(not(feature = "gltf"))]
+fn read_gltf(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
+    Err(without(&input.path, "gltf"))
+}
+
 #[cfg(not(feature = "pcd"))]
 fn read_pcd(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "pcd"))
 }
 
 /// The error for a format whose reader is not compiled in.
-#[cfg(not(all(feature = "e57", feature = "pcd")))]
+#[cfg(not(all(feature = "e57", feature = "gltf", feature = "pcd")))]
 fn without(path: &Path, feature: &str) -> Error {
     let format = feature.to_ascii_uppercase();
     Error::malformed(path, format!("this build does not read {format} files: build with '--features {feature}'"))

@@ -2,9 +2,14 @@
 
 use std::path::Path;
 
+use ::image::DynamicImage;
+
 use super::image;
 use crate::error::{Error, Result};
 pub use crate::scene::Texture;
+
+/// Bytes a pixel: 4 for the decoded image, and 4 for the texels, which may be a copy.
+const COPIED: u64 = 4 + 4;
 
 impl Texture {
     /// Reads a PNG, JPEG, BMP or TGA file. 16-bit values are reduced to their upper byte.
@@ -19,8 +24,21 @@ impl Texture {
     /// [`MOST_PIXELS`](image::MOST_PIXELS).
     pub fn read(path: &Path) -> Result<Self> {
         image::check_file(path)?;
-        // 4 bytes a pixel for the decoded image, and 4 for the texels, which may be a copy.
-        let picture = image::decode(path, None, 4 + 4)?.into_rgba8();
+        Self::of_picture(path, image::decode(path, None, COPIED)?)
+    }
+
+    /// Reads an image from `bytes` in a file at `path`, as [`Self::read`] does.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::read`].
+    #[cfg(feature = "gltf")]
+    pub(super) fn decoded(path: &Path, bytes: &[u8]) -> Result<Self> {
+        Self::of_picture(path, image::decode_bytes(path, bytes, COPIED)?)
+    }
+
+    fn of_picture(path: &Path, picture: DynamicImage) -> Result<Self> {
+        let picture = picture.into_rgba8();
         let (width, height) = (picture.width(), picture.height());
         // Reuses the allocation if its capacity is a multiple of a texel's size.
         let texels = bytemuck::allocation::try_cast_vec(picture.into_raw());

@@ -63,7 +63,8 @@ pub struct TriangleOptions {
     /// normals of the file
     #[cfg_attr(feature = "cli", arg(long, value_name = "ANGLE"))]
     pub smooth: Option<CreaseAngle>,
-    /// Meshes drawn as triangles, beside surfels of the inputs or alone: .obj, .ply, .stl or .off
+    /// Meshes drawn as triangles, beside surfels of the inputs or alone: .obj, .ply, .stl,
+    /// .off, .glb or .gltf
     #[cfg_attr(feature = "cli", arg(long = "triangles", id = "triangles", value_name = "MESH", num_args = 1.., hide_short_help = true))]
     pub meshes: Vec<PathBuf>,
     /// Image for the triangles of meshes whose materials have no image: .png, .jpg, .bmp or .tga

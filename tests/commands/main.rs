@@ -9,6 +9,8 @@ mod cli;
 #[path = "../common/mod.rs"]
 mod common;
 mod examples;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod own_kernel;
 mod prose;
 mod readme;

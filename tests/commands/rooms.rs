@@ -17,7 +17,7 @@ struct Thing {
     most: usize,
 }
 
-const THINGS: [Thing; 7] = [
+const THINGS: [Thing; 8] = [
     Thing { what: "a map", rooms: &["src", "wgsl"], names: &["Map::Index", "INDEX_IMAGE"], most: 5 },
     Thing {
         what: "a kernel function",
@@ -33,6 +33,12 @@ const THINGS: [Thing; 7] = [
     },
     Thing { what: "a format", rooms: &["src"], names: &["Format::Pcd", "Self::Pcd", "pcd::", "read_pcd"], most: 4 },
     Thing { what: "a format of meshes", rooms: &["src"], names: &["Format::Stl", "Self::Stl", "stl::"], most: 2 },
+    Thing {
+        what: "a format that names other files",
+        rooms: &["src"],
+        names: &["Format::Gltf", "Self::Gltf", "read_gltf", "gltf::companions"],
+        most: 3,
+    },
     Thing { what: "an image format", rooms: &["src"], names: &["mod jpeg", "jpeg::"], most: 2 },
     Thing { what: "a command", rooms: &["src/cli", "src/main.rs"], names: &["simplify::"], most: 4 },
 ];

@@ -19,10 +19,15 @@ mod e57;
 #[cfg(feature = "e57")]
 #[path = "../common/e57_page.rs"]
 mod e57_page;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod las;
 #[path = "../common/las_forms.rs"]
 mod las_forms;
 mod levels;
+#[cfg(feature = "gltf")]
+#[path = "../common/gltf_made.rs"]
+mod made;
 mod materials;
 mod memory;
 mod mutate;
@@ -137,6 +142,18 @@ fn cameras() {
 #[test]
 fn colmap() {
     session::run(&colmap::TARGET);
+}
+
+#[cfg(feature = "gltf")]
+#[test]
+fn gltf() {
+    session::run(&gltf::TEXT);
+}
+
+#[cfg(feature = "gltf")]
+#[test]
+fn glb() {
+    session::run(&gltf::BINARY);
 }
 
 #[cfg(feature = "pcd")]

@@ -8,11 +8,16 @@ mod e57;
 #[path = "../common/e57_page.rs"]
 mod e57_page;
 mod gaussians;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod las;
 mod las_damage;
 #[path = "../common/las_forms.rs"]
 mod las_forms;
 mod las_headers;
+#[cfg(feature = "gltf")]
+#[path = "../common/gltf_made.rs"]
+mod made;
 mod mesh;
 mod obj;
 mod off;
@@ -131,7 +136,8 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
         let said = folder.refusal("a.dat", unknown);
         let optional = ["E57", "PCD"].into_iter().zip([cfg!(feature = "e57"), cfg!(feature = "pcd")]);
         let optional: String = optional.filter(|(_, is_read)| *is_read).map(|(name, _)| format!("{name}, ")).collect();
-        let formats = format!("PLY, LAS, LAZ, OBJ, {optional}XYZ, TXT, CSV, ASC, PTS, PTX, STL and OFF");
+        let last = if cfg!(feature = "gltf") { ", OFF, GLB and GLTF" } else { " and OFF" };
+        let formats = format!("PLY, LAS, LAZ, OBJ, {optional}XYZ, TXT, CSV, ASC, PTS, PTX, STL{last}");
         let expected =
             format!("its format is not known: {formats} files are read; if it is one, name it by --input-format");
         assert_eq!(said, expected);
@@ -162,12 +168,14 @@ fn missing_files_and_directories_cannot_be_read() {
 }
 
 /// A format that was not compiled in is refused with the name of its feature.
-#[cfg(not(all(feature = "e57", feature = "pcd")))]
+#[cfg(not(all(feature = "e57", feature = "gltf", feature = "pcd")))]
 #[test]
 fn readers_that_were_left_out_are_named() {
     let folder = Folder::new();
-    let (e57, pcd) = (cfg!(not(feature = "e57")), cfg!(not(feature = "pcd")));
-    for (format, first_bytes, left_out) in [("e57", &b"ASTM-E57"[..], e57), ("pcd", b"# .PCD v0.7", pcd)] {
+    let (e57, gltf, pcd) = (cfg!(not(feature = "e57")), cfg!(not(feature = "gltf")), cfg!(not(feature = "pcd")));
+    for (format, first_bytes, left_out) in
+        [("e57", &b"ASTM-E57"[..], e57), ("gltf", b"glTF", gltf), ("pcd", b"# .PCD v0.7", pcd)]
+    {
         for (name, bytes) in [(format!("a.{format}"), b"".as_slice()), ("scan".into(), first_bytes)] {
             let said = folder.refusal(&name, bytes);
             assert_eq!(said.contains(&format!("'--features {format}'")), left_out, "{said}");

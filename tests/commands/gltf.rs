@@ -1,5 +1,7 @@
 //! Scenes of glTF on the command line: the same picture as the same mesh in another form.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use super::common::command::{Folder, succeeds, text};
 use base64::prelude::{BASE64_STANDARD, Engine};
 

@@ -115,6 +115,9 @@ pub(super) struct Materials<'a> {
 /// The most notes about materials.
 const MOST_NOTES: usize = 16;
 
+/// The place of an image, and its bytes if it is no file.
+type Placed<'a> = (Source, Option<Cow<'a, [u8]>>);
+
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Source {
     File(PathBuf),
@@ -321,7 +324,7 @@ impl<'a> Materials<'a> {
     }
 
     /// The place of an image, and its bytes if it is no file.
-    fn bytes(&mut self, number: usize, image: &Image) -> Result<(Source, Option<Cow<'a, [u8]>>), String> {
+    fn bytes(&mut self, number: usize, image: &Image) -> Result<Placed<'a>, String> {
         if let Some(view) = image.buffer_view {
             return match self.buffers.view(view) {
                 Ok((bytes, _)) => Ok((Source::View(view.value()), Some(bytes.into()))),

@@ -343,7 +343,7 @@ fn damaged_files_are_refused_in_a_sentence() {
     }
     let text = made.text(&scene(PLAIN));
     for length in 0..text.len() {
-        folder.refusal("a.gltf", text[..length].as_bytes());
+        folder.refusal("a.gltf", &text.as_bytes()[..length]);
     }
     for (from, to, said) in [
         (r#""count":4"#, r#""count":5"#, "the accessor 0 goes beyond the end of its buffer view"),

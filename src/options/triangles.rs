@@ -96,7 +96,7 @@ impl SceneOptions {
             ("--kernel", surface.kernel.is_some()),
             ("--blend", surface.blend.is_some()),
             ("--lowpass", surface.lowpass.is_some()),
-            ("--composite weighted or moments", transparency.composite.is_some_and(|how| how.is_order_free())),
+            ("an order-free --composite", transparency.composite.is_some_and(|how| how.is_order_free())),
             ("--opacity", transparency.opacity.is_some()),
             ("--aov", maps.aov.iter().any(|map| map.row().of_surfels)),
             ("--source", !research.sources.is_empty()),

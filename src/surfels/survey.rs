@@ -21,7 +21,7 @@ use crate::{Progress, Result};
 /// A cloud with at most this many points is examined as a whole.
 const WHOLE: usize = 1 << 20;
 
-/// Of larger clouds, the examined places hold at least this many points. Shares of surfels then err
+/// The examined places of larger clouds hold at least this many points. Shares of surfels then err
 /// by about a percent where neighbouring places are alike.
 const EXAMINED: u64 = 1 << 16;
 
@@ -32,7 +32,7 @@ const SIDE: f64 = 32.0;
 /// reach 4.5 spacings far, and their own neighbours 2.3.
 const MARGIN: f64 = 8.0;
 
-/// What a renderer would make of a cloud.
+/// The surfels that a renderer would make of a cloud, and how well they cover it.
 #[derive(Clone, Debug)]
 pub struct Survey {
     /// The scene; of a sampled cloud, the surfels in and around the examined places.

@@ -558,7 +558,7 @@ fn triangles_are_drawn_alone_and_beside_surfels() {
     by(&scan, &[], 1, &["autzen.laz", "only PLY, OBJ, STL"]);
     by("absent.obj", &[], 1, &["absent.obj"]);
     by(&bunny, &["--triangle-texture", &painted], 1, &["bunny.obj", "texture coordinates"]);
-    by(&cube, &["--composite", "layers"], 2, &["--composite"]);
+    by(&cube, &["--composite", "moments"], 2, &["--composite layers or sorted"]);
     by(&cube, &["--join", "glued"], 2, &["corrected, nearest or blended"]);
     fails(&[&with(&[])[..], &[image, "--join", "nearest", "--mesh", "surfels", &bunny]].concat(), 2, &["--triangles"]);
     // Options that triangles do not have are refused, not left out.

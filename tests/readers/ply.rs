@@ -201,8 +201,11 @@ fn colours_keep_what_their_type_says() {
         for kind in ["float", "double"] {
             assert_eq!(read(kind, names, linear, 4), Some(Colors::Linear(vec![[0.25, -0.5, 4.0, 0.5]])));
             assert_eq!(read(kind, names, linear, 3), Some(Colors::Linear(vec![[0.25, -0.5, 4.0, 1.0]])));
-            let wild = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1.0];
-            assert_eq!(read(kind, names, wild, 3), Some(Colors::Linear(vec![[0.0, f32::MAX, f32::MIN, 1.0]])));
+            let wild = [0.5, f64::INFINITY, -f64::INFINITY, 1.0];
+            assert_eq!(read(kind, names, wild, 3), Some(Colors::Linear(vec![[0.5, f32::MAX, f32::MIN, 1.0]])));
+            // A colour that is no number is missing, so the default takes its place.
+            let missing = [f64::NAN, 0.5, 0.5, 1.0];
+            assert_eq!(read(kind, names, missing, 3), Some(Colors::Linear(vec![[0.7, 0.7, 0.7, 1.0]])));
         }
     }
 }

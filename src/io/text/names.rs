@@ -39,6 +39,9 @@ pub(super) fn names_in(line: &[u8]) -> Option<Vec<String>> {
             name.clone_from(plain);
         }
     }
+    // Other columns of these names, such as places in an image, must not be taken for coordinates.
+    let is_axis = |name: &str| ["x", "y", "z"].iter().any(|axis| name.eq_ignore_ascii_case(axis));
+    names.iter_mut().filter(|name| is_axis(name)).for_each(|name| name.push_str("_2"));
     for (axis, place) in ["x", "y", "z"].into_iter().zip(places) {
         *names.get_mut(place)? = axis.to_owned();
     }
@@ -78,8 +81,8 @@ mod tests {
             ("X,Y,Z,Amplitude[],Reflectance[dB],Range [m]", "x y z Amplitude Reflectance Range [m]"),
             ("Points:0,Points:1,Points:2,RGB:0", "x y z RGB:0"),
             ("Points_0,Points_1,Points_2", "x y z"),
-            ("X,Y,Z,x,y", "x y z x y"),
-            ("x,y,Easting,Northing,Height", "x y x y z"),
+            ("X,Y,Z,x,y", "x y z x_2 y_2"),
+            ("x,y,Easting,Northing,Height", "x_2 y_2 x y z"),
             ("Easting [m];Northing [m];Height [m];rgb[0]", "x y z rgb[0]"),
             ("x y height", "x y z"),
         ] {

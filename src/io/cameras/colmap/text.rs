@@ -188,10 +188,7 @@ mod tests {
         let of_one = "7 1 0 0 0 0 0 0 1 a.png\n";
         for (cameras, said) in [
             ("1 PINHOLE 640 480 500 510 320", "line 1 of cameras.txt: a PINHOLE camera has 4 parameters, not 3"),
-            (
-                "\n1 EQUIRECTANGULAR 6 4 5 5 3 2 0 0 0 0",
-                "line 2 of cameras.txt: the model 'EQUIRECTANGULAR' is not known",
-            ),
+            ("\n1 HOMEMADE 6 4 5 5 3 2 0 0 0 0", "line 2 of cameras.txt: the model 'HOMEMADE' is not known"),
             ("1", "line 1 of cameras.txt: it ends before its MODEL"),
             ("1 PINHOLE 640 -480 1 1 1 1", "line 1 of cameras.txt: its HEIGHT, '-480', is not a whole number"),
             ("1 PINHOLE 640 480 1 1 1 nan", "line 1 of cameras.txt: its PARAMS, 'nan', is not a number"),

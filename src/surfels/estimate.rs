@@ -151,8 +151,8 @@ fn estimates_at(
     std::array::from_fn(|lane| estimate_at(near.of_neighbours(lane), normals[lane], (up, distinct.scale())))
 }
 
-/// The estimate at a position with the unit normal `normal`, from the offsets of its neighbours, the
-/// nearest first; `scale` is in scaled units per world unit.
+/// The estimate at a position with the unit normal `normal`, from the offsets of its neighbours,
+/// the nearest first; `scale` is in scaled units per world unit.
 fn estimate_at(offsets: &[DVec3], normal: DVec3, (up, scale): (DVec3, f64)) -> Estimate {
     let world = |length: f64| (length / scale).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
     let Some(nearest) = offsets.first() else {

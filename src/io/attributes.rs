@@ -1,8 +1,8 @@
 //! Names of point attributes that programs write in PLY and PCD files.
 //!
 //! These programs write the names, or recognise them when reading: PDAL (`normalx`, `intensity`,
-//! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field, `Rf` for the red of
-//! colours that are fractions), ParaView (`Normals:0`, `RGB_0`), the Point Cloud
+//! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field, `Rf` for the red
+//! of colours that are fractions), ParaView (`Normals:0`, `RGB_0`), the Point Cloud
 //! Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D (`normal_x` and `rgb` in PCD), MeshLab
 //! (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
 //! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`) and 3D Gaussian splatting

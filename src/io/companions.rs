@@ -10,8 +10,8 @@ use crate::{Error, Result};
 /// All files that are read together with the one at `path`, whether they exist or not.
 ///
 /// A PLY file may name a mesh and textures. An OBJ file may name material libraries, which may name
-/// images. A glTF file may name buffers and images. A named mesh is searched in turn. The list is empty for other files, and for files that
-/// cannot be read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the
+/// images. A glTF file may name buffers and images. A named mesh is searched in turn. The list is
+/// empty for other files, and for files that cannot be read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the
 /// next [`Input::open`] uses the copy.
 ///
 /// # Errors

@@ -77,8 +77,8 @@ impl Scene {
 
 impl Visible {
     /// Returns the points that at least `least` views see, as one cloud in the order of the inputs,
-    /// and the number of views of each. There are no triangles and no levels of detail; the vertices
-    /// of a mesh have the mean colours of the triangles around them, as in a cloud.
+    /// and the number of views of each. There are no triangles and no levels of detail; the
+    /// vertices of a mesh have the mean colours of the triangles around them, as in a cloud.
     ///
     /// # Errors
     ///

@@ -95,7 +95,8 @@ impl<const LANES: usize> Neighbourhoods<LANES> {
 }
 
 /// The direction in which the offsets vary least, in the half-space of the unit vector `up`; there
-/// is one for each of up to [`NORMAL_NEIGHBOURS`] neighbours, and the position's own, which is zero.
+/// is one for each of up to [`NORMAL_NEIGHBOURS`] neighbours, and the position's own, which is
+/// zero.
 pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
     let mut alone = Neighbourhoods { offsets: [[DVec3::ZERO; NORMAL_NEIGHBOURS + 1]], count: offsets.len() };
     alone.offsets[0][..offsets.len()].copy_from_slice(offsets);

@@ -65,8 +65,8 @@ fn settings(composite: Composite) -> Settings {
     Settings { composite, shading: Shading::Unlit, kernel: "constant".parse().unwrap(), maps, ..Settings::default() }
 }
 
-/// The depth and the straight colour of a triangle, how it is composited with the sheets, the straight
-/// colours of the layers from front to back, and a depth that one of them has.
+/// The depth and the straight colour of a triangle, how it is composited with the sheets, the
+/// straight colours of the layers from front to back, and a depth that one of them has.
 type Case = (f64, [f32; 4], Composite, Vec<[f32; 4]>, f32);
 
 /// An opaque triangle hides the sheets behind it and shows through those before it; a translucent

@@ -127,7 +127,7 @@ enum Source {
     Data(usize),
 }
 
-/// What becomes of the alphas of an image.
+/// How the alphas of an image are changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Cut {
     /// Alphas are kept.

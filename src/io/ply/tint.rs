@@ -50,7 +50,8 @@ pub(super) fn code(value: f64) -> u8 {
 }
 
 /// Converts a colour number whose range is not known yet; NaN, which means that there is none,
-/// stays. Negative numbers of signed bytes and 16-bit integers are codes that were stored as signed.
+/// stays. Negative numbers of signed bytes and 16-bit integers are codes that were stored as
+/// signed.
 pub(super) fn number(value: f64, scalar: Scalar) -> f32 {
     match scalar {
         _ if value.is_nan() => f32::NAN,

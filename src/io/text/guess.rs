@@ -13,7 +13,7 @@ pub(super) struct Sample {
     pub(super) is_counted: bool,
 }
 
-/// What the columns are taken as.
+/// The guessed names of columns.
 #[derive(Debug, Default)]
 pub(super) struct Guess {
     pub(super) names: Vec<String>,

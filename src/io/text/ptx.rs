@@ -46,8 +46,8 @@ impl Scans {
         self.left
     }
 
-    /// Returns the numbers of the points in the rows of a block, in the coordinates of the file: one
-    /// for each of [`NAMES`], NaN where a point has none.
+    /// Returns the numbers of the points in the rows of a block, in the coordinates of the file:
+    /// one for each of [`NAMES`], NaN where a point has none.
     ///
     /// # Errors
     ///

@@ -11,8 +11,8 @@ use crate::{Error, Result};
 ///
 /// A PLY file may name a mesh and textures. An OBJ file may name material libraries, which may name
 /// images. A glTF file may name buffers and images. A named mesh is searched in turn. The list is
-/// empty for other files, and for files that cannot be read. The file is opened as by [`Input::open`]. A pipe is read to its end, and the
-/// next [`Input::open`] uses the copy.
+/// empty for other files, and for files that cannot be read. The file is opened as by
+/// [`Input::open`]. A pipe is read to its end, and the next [`Input::open`] uses the copy.
 ///
 /// # Errors
 ///

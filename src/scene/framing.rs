@@ -37,7 +37,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// As [`Camera::framing`], and [`Error::Usage`](crate::Error::Usage) if `up` or the side has no
+    /// As [`Camera::framing`], and [`Error::Usage`] if `up` or the side has no
     /// direction, or if both have the same.
     pub fn framing_from(
         size: (u32, u32),

@@ -21,7 +21,7 @@ fn cameras(target: DVec3, distance: f64, size: (u32, u32)) -> Vec<Camera> {
         target + distance * DVec3::new(sin, 0.25, cos)
     };
     let look = |k| Camera::look_at(size, Lens::Fov(45.0), eye(k), target, Some(DVec3::Y), Up::Y, 0.01).unwrap();
-    (0..4).map(look).collect()
+    (0..6).map(look).collect()
 }
 
 /// The image point of `point` and its depth.

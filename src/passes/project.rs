@@ -8,9 +8,9 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::curved::{self, Curve, Seen};
-use super::homography::{self, slope};
+use super::homography::{self, Projected, slope};
 use super::lowpass::{self, Design};
-use super::splat::Splat;
+use super::splat::{Filter, Splat};
 use super::visibility;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::Pass;
@@ -80,20 +80,10 @@ pub(super) fn projected(
     });
     let filter = projected.images.and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
     if let Some(filter) = &filter {
-        let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
-        let (low, high) = (center - filter.extent, center + filter.extent);
-        // With `ewa` the filter includes the disk; with other low-passes the disk shows beside the
-        // filter.
-        let beside = design.low_pass != LowPass::Ewa;
-        projected.low = if beside { projected.low.min(low) } else { low };
-        projected.high = if beside { projected.high.max(high) } else { high };
+        widen(&mut projected, filter, design.low_pass);
     }
     if again {
-        let width = i64::from(camera.width);
-        let turn = if 2 * projected.anchor[0] >= width { -width } else { width };
-        projected.anchor[0] += turn;
-        projected.low.x += turn as f64;
-        projected.high.x += turn as f64;
+        turn(&mut projected, camera.width);
     }
     let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
     let size = DVec2::new(camera.width.into(), camera.height.into());
@@ -125,6 +115,25 @@ pub(super) fn projected(
         copies: 1,
         fade: Fade::WHOLE,
     })
+}
+
+/// Widens the bounds of a disk by those of its low-pass filter. With `ewa` the filter includes the
+/// disk; with other low-passes the disk shows beside the filter.
+fn widen(disk: &mut Projected, filter: &Filter, low_pass: LowPass) {
+    let center = DVec2::new(disk.anchor[0] as f64, disk.anchor[1] as f64) + 0.5 + filter.center;
+    let (low, high) = (center - filter.extent, center + filter.extent);
+    let beside = low_pass != LowPass::Ewa;
+    disk.low = if beside { disk.low.min(low) } else { low };
+    disk.high = if beside { disk.high.max(high) } else { high };
+}
+
+/// Moves a disk by the width of the image of a whole sphere, toward the other border.
+fn turn(disk: &mut Projected, width: u32) {
+    let width = i64::from(width);
+    let turn = if 2 * disk.anchor[0] >= width { -width } else { width };
+    disk.anchor[0] += turn;
+    disk.low.x += turn as f64;
+    disk.high.x += turn as f64;
 }
 
 /// All splats of a scene that may touch a pixel, in the order of the surfels.

@@ -114,6 +114,9 @@ struct Gaussians {
     opacities: [f32; 3],
     /// Medians of the longer and of the shorter standard deviation, world units.
     deviations: [f32; 2],
+    /// Median standard deviation along the shortest axis; None for Gaussian surfels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    thickness: Option<f32>,
 }
 
 impl Gaussians {
@@ -136,6 +139,8 @@ impl Gaussians {
             degree: if let Colors::Harmonics(harmonics) = &scene.colors { harmonics.degree() } else { 0 },
             opacities: [opacities[0], middle(&opacities), opacities[count - 1]],
             deviations: [middle(&longer), middle(&shorter)],
+            thickness: (!scene.thirds.is_empty())
+                .then(|| middle(&sorted(&mut scene.thirds.iter().map(|third| deviation(*third))))),
         })
     }
 }
@@ -345,16 +350,21 @@ fn held(text: &mut String, info: &Info) {
         None => "none, estimated from neighbours".to_owned(),
     };
     // Writing to a string cannot fail.
-    if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations: [longer, shorter] }) =
-        info.gaussians
-    {
+    if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations, thickness }) = info.gaussians {
+        let [longer, shorter] = deviations;
         let changes = match degree {
             0 => "colours the same from every side".to_owned(),
             _ => format!("colours change with the view by harmonics of degree {degree}"),
         };
-        let _ = writeln!(text, "  kind      Gaussian surfels: {changes}");
+        let kind = if thickness.is_some() { "3D Gaussians" } else { "Gaussian surfels" };
+        let _ = writeln!(text, "  kind      {kind}: {changes}");
         let _ = writeln!(text, "  opacity   {least:.3} to {greatest:.3}, half of them below {median:.3}");
-        let _ = writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)");
+        let _ = match thickness {
+            None => writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)"),
+            Some(least) => {
+                writeln!(text, "  sizes     standard deviations of {longer:.4}, {shorter:.4} and {least:.4} (medians)")
+            }
+        };
     } else {
         let _ = writeln!(text, "  normals   {}", given(info.normals, info.points_with_normals));
         let _ = writeln!(text, "  radii     {}", given(info.radii, info.points_with_radii));

@@ -7,6 +7,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::conic;
 use super::curved::{self, Curve, Seen};
 use super::homography::{self, slope};
 use super::lowpass::{self, Design};
@@ -19,8 +20,25 @@ use crate::plan::{Facts, Settings, Sides, composited, culls_back};
 use crate::plan::{Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
-/// A surfel with its index, and with its cap if some surfel of the scene curves.
-pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
+/// How a surfel extends out of its plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Body {
+    /// By a cap.
+    Cap(Cap),
+    /// As a 3D Gaussian with this third half-axis, world units.
+    Solid(f32),
+}
+
+impl Body {
+    /// The body of the surfel at `index`; None if it is flat.
+    pub fn of(scene: &Scene, index: usize, options: &Settings) -> Option<Self> {
+        let third = scene.thirds.get(index).map(|third| Self::Solid(*third));
+        third.or_else(|| scene.caps.get(index).filter(|_| options.draws_caps()).map(|cap| Self::Cap(*cap)))
+    }
+}
+
+/// A surfel with its index, and with its body if some surfel of the scene has one.
+pub type Indexed<'a> = (u32, &'a Surfel, Option<Body>);
 
 /// The f64 twin of `wgsl/project/project.wgsl` for one surfel; `None` if it can touch no pixel.
 ///
@@ -42,7 +60,7 @@ pub(super) enum Missed {
 
 /// The splat of [`reference`], or why there is none.
 pub(super) fn projected(
-    (index, surfel, cap): Indexed<'_>,
+    (index, surfel, body): Indexed<'_>,
     relative: DVec3,
     camera: &Camera,
     design: &Design,
@@ -51,8 +69,17 @@ pub(super) fn projected(
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
-    let [s, t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
-    let seen = cap.map(|cap| Seen { p, s, t, cap });
+    let [mut s, mut t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
+    let mut seen = None;
+    match body {
+        Some(Body::Cap(cap)) => seen = Some(Seen { p, s, t, cap }),
+        Some(Body::Solid(third)) => {
+            let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
+            [s, t] = conic::half_axes(p, [s, t, w], camera, design.dilation);
+        }
+        None => {}
+    }
+    let is_solid = matches!(body, Some(Body::Solid(_)));
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
         return Err(Missed::Behind);
@@ -64,7 +91,7 @@ pub(super) fn projected(
         [projected.low, projected.high] = seen.extent(camera);
         Curve { slopes: curved::normal_slopes(s_world, t_world, seen.cap), ..curved::curve(camera, seen, &projected) }
     });
-    let filter = projected.images.and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
+    let filter = projected.images.filter(|_| !is_solid).and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
     if let Some(filter) = &filter {
         let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
         let (low, high) = (center - filter.extent, center + filter.extent);
@@ -93,7 +120,7 @@ pub(super) fn projected(
         b: projected.b,
         c: projected.c,
         // A point that faces the camera shows no back.
-        away: projected.away && point.is_none(),
+        away: projected.away && point.is_none() && !is_solid,
         sides: Sides::None,
         normal,
         filter,
@@ -118,10 +145,9 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
     // Fragment lists hold every copy.
     let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
     let copies = (has_copies(scene) && once).then(|| copies(scene));
-    let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || reference((index as u32, surfel, cap(index)), scene.center(index) - eye, camera, &design);
+        let splat = || reference((index as u32, surfel, Body::of(scene, index, options)), scene.center(index) - eye, camera, &design);
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
             let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());
@@ -129,7 +155,7 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
             Splat {
                 copies,
                 fade: scene.fades.get(index).copied().unwrap_or(Fade::WHOLE),
-                clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none()).unwrap_or_default(),
+                clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none() && !facts.solid).unwrap_or_default(),
                 outline: options.outline,
                 sides,
                 normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },

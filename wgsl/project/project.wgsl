@@ -117,7 +117,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let index = surfel_of(place);
     let surfel = surfel_at(index);
     let center = rotate(relative_center(index, surfel));
-    let axes = half_axes(surfel, center[2].high);
+    let axes = half_axes(index, surfel, vec3<f32>(center[0].high, center[1].high, center[2].high));
     var h = homography(center, axes.s, axes.t, axes.s_world, axes.t_world, every);
     if (h.rare) {
         return RARE;

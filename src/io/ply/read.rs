@@ -260,7 +260,7 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     };
     progress.end();
     let Contents { mut points, faces, tree, whole, collector } = contents.map_err(in_file)?;
-    gaussian::check(&points, options.flatten).map_err(in_file)?;
+    gaussian::settle(&mut points, [options.flatten, options.solid]).map_err(in_file)?;
     points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
     if options.describe {
         points.about = Some(Box::new(about(&header, vertex).map_err(in_file)?));

@@ -1,6 +1,7 @@
-//! Times surfels from points, stage by stage: `cargo bench --bench points [-- COUNT...]`.
+//! Times surfels from points, stage by stage: `cargo bench --bench points [-- COUNT... | NAME...]`.
 //!
-//! Without counts it measures 1,000,000 points.
+//! `picture` is the way to a picture of bare points; the other names are those of the sizes of
+//! `epsplat surfels`. Without counts it measures 1,000,000 points, without names all of them.
 
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -10,7 +11,7 @@ use std::time::Instant;
 use epsplat::Progress;
 use epsplat::io::Points;
 use epsplat::low_level::surfels::analytic::{Shape, generate};
-use epsplat::low_level::surfels::{FromPoints, Size, from_points};
+use epsplat::low_level::surfels::{FromPoints, Size, build, from_points};
 
 /// The time of each stage, in seconds.
 #[derive(Default)]
@@ -51,20 +52,35 @@ fn peak_memory() -> String {
     line.map_or("not known".into(), |line| line.trim().to_owned())
 }
 
+/// Makes surfels of bare points for a picture, or of this size; returns their number.
+fn surfels(name: &str, positions: &[[f64; 3]], parts: &Parts) -> (u64, f64) {
+    let points = Points { positions: positions.to_vec(), ..Points::default() };
+    let start = Instant::now();
+    let made = match Size::ALL.iter().find(|(_, known)| *known == name) {
+        Some((size, _)) => {
+            let options = FromPoints { size: *size, ..FromPoints::default() };
+            from_points(vec![points], &options, parts).unwrap().preparation.surfels
+        }
+        None => build(vec![points], parts).unwrap().1.surfels,
+    };
+    (made, start.elapsed().as_secs_f64())
+}
+
 fn main() {
-    let mut counts: Vec<u64> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut counts: Vec<u64> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
     if counts.is_empty() {
         counts.push(1_000_000);
     }
+    let all = std::iter::once("picture").chain(Size::ALL.map(|(_, name)| name));
+    let named: Vec<&str> = all.clone().filter(|name| arguments.iter().any(|argument| argument == name)).collect();
+    let names = if named.is_empty() { all.collect() } else { named };
     for count in counts {
         let positions = shuffled(count);
-        for (size, name) in Size::ALL {
+        for name in &names {
             let parts = Parts::default();
-            let points = Points { positions: positions.clone(), ..Points::default() };
-            let start = Instant::now();
-            let surfels = from_points(vec![points], &FromPoints { size, ..FromPoints::default() }, &parts).unwrap();
-            let total = start.elapsed().as_secs_f64();
-            assert_eq!(surfels.preparation.surfels, count);
+            let (made, total) = surfels(name, &positions, &parts);
+            assert_eq!(made, count);
             println!("{count} points, {name}: {total:.2} s, {:.0} points/s", count as f64 / total);
             for (what, seconds) in parts.done.into_inner().unwrap() {
                 println!("  {what:24} {seconds:7.3} s {:12.0} points/s", count as f64 / seconds);

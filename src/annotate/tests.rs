@@ -20,6 +20,7 @@ fn camera(projection: Projection, turned: bool) -> Camera {
         eye: DVec3::new(0.0, 0.0, 100.0),
         rotation: DMat3::from_cols(rows[0], rows[1], rows[2]).transpose(),
         near: 0.1,
+        optics: None,
     }
 }
 

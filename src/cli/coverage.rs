@@ -29,8 +29,6 @@ use super::{note, outputs, print, write_json};
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Files of surfels, or of points, whose radii are then estimated"))]
     surfels: Vec<PathBuf>,
-    #[command(flatten)]
-    reading: InputOptions,
     #[arg(long, help = help_of_mesh("Mesh that the surfels represent"))]
     mesh: PathBuf,
     /// Number of directions to cast rays from
@@ -42,6 +40,8 @@ pub struct Arguments {
     /// Write the measures as JSON to a file, or to stdout for - (in place of the table)
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reading: InputOptions,
 }
 
 #[derive(Serialize)]

@@ -27,8 +27,6 @@ use super::{note, outputs, print, write_json};
 pub struct Arguments {
     #[arg(help = help_of_mesh("Mesh, - for standard input"))]
     mesh: PathBuf,
-    #[command(flatten)]
-    input: FormatOptions,
     /// Output file of the surfels: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -41,6 +39,8 @@ pub struct Arguments {
     /// Write counts and file names as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    input: FormatOptions,
 }
 
 fn pixels(text: &str) -> std::result::Result<f64, String> {

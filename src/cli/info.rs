@@ -1,5 +1,6 @@
 //! `epsplat info`: describes a file and the surfels that the renderer would make of it.
 
+mod gaussians;
 mod ranges;
 
 use std::collections::BTreeMap;
@@ -8,8 +9,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::io::{About, Points, Span, class_name};
-use epsplat::low_level::scene::{Colors, Scene, gaussian};
-use epsplat::low_level::surfels::{self, ASLANT, Coverage, Preparation};
+use epsplat::low_level::scene::{Colors, Scene};
+use epsplat::low_level::surfels::{self, ASLANT, Coverage, Preparation, Sample};
 use epsplat::options::InputOptions;
 use epsplat::{Files, Result};
 use serde::Serialize;
@@ -18,18 +19,25 @@ use super::inputs::help_of;
 use super::outputs::Source;
 use super::progress::Bars;
 use super::{outputs, print, write_json};
+use gaussians::Gaussians;
 
 /// Describe a file: its points, attributes, bounding box, coverage, and how they are rendered.
+///
+/// A cloud of more than a million points is read as a whole, but spacing, coverage and radii are
+/// those of some places in it, which a line of the output tells.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat info scan.laz")]
 pub struct Arguments {
     #[arg(help = help_of("A point cloud or mesh"))]
     input: PathBuf,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Write the description as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    /// Examine all points of a large cloud: takes many times as long
+    #[arg(long)]
+    all: bool,
+    #[command(flatten)]
+    reading: InputOptions,
 }
 
 /// A surface counts as closed if at least this share of its surfels has no open gap to their
@@ -75,6 +83,9 @@ struct Info {
     /// World coordinates that are subtracted before coordinates are converted to f32.
     origin: [f64; 3],
     largest_radius: f64,
+    /// Places of a large cloud that were examined for spacing, coverage and radii; None if all of
+    /// it was.
+    sample: Option<Sample>,
     /// Coverage of the surface; None for Gaussians and if all points are at one position.
     coverage: Option<Coverage>,
     /// Attributes that are missing in the file, so that they are estimated or not used.
@@ -105,46 +116,6 @@ impl LevelsOfDetail {
     }
 }
 
-/// Statistics of a file of Gaussians.
-#[derive(Serialize)]
-struct Gaussians {
-    /// Degree of the spherical harmonics of view-dependent colours, 0 for constant colours.
-    degree: u32,
-    /// Minimum, median and maximum opacity of the Gaussians that are drawn.
-    opacities: [f32; 3],
-    /// Medians of the longer and of the shorter standard deviation, world units.
-    deviations: [f32; 2],
-    /// Median standard deviation along the shortest axis; None for Gaussian surfels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    thickness: Option<f32>,
-}
-
-impl Gaussians {
-    fn of(scene: &Scene) -> Option<Self> {
-        if !scene.encoded {
-            return None;
-        }
-        let sorted = |values: &mut dyn Iterator<Item = f32>| {
-            let mut values: Vec<f32> = values.collect();
-            values.sort_by(f32::total_cmp);
-            values
-        };
-        let middle = |values: &[f32]| values[values.len() / 2];
-        let count = scene.surfels.len();
-        let opacities = sorted(&mut (0..count).map(|index| scene.colors.linear(index)[3]));
-        let deviation = |axis: f32| axis / gaussian::EXTENT as f32;
-        let longer = sorted(&mut scene.surfels.iter().map(|surfel| deviation(surfel.radius())));
-        let shorter = sorted(&mut scene.surfels.iter().map(|surfel| deviation(surfel.shorter())));
-        Some(Self {
-            degree: if let Colors::Harmonics(harmonics) = &scene.colors { harmonics.degree() } else { 0 },
-            opacities: [opacities[0], middle(&opacities), opacities[count - 1]],
-            deviations: [middle(&longer), middle(&shorter)],
-            thickness: (!scene.thirds.is_empty())
-                .then(|| middle(&sorted(&mut scene.thirds.iter().map(|third| deviation(*third))))),
-        })
-    }
-}
-
 pub fn run(arguments: &Arguments) -> Result<()> {
     let source = Source::Cloud(&arguments.input, arguments.reading.file.input_format);
     outputs::check([source], &arguments.json)?;
@@ -164,11 +135,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     // The greys made from intensities do not count as colours.
     let of_colors = if about.intensities.is_some() { "none" } else { colors(&points) };
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), of_colors);
-    let (scene, preparation) =
-        surfels::build(vec![points], &bars).map_err(|error| error.of_inputs(std::slice::from_ref(&arguments.input)))?;
+    let surveyed = surfels::survey(points, arguments.all, &bars);
+    let surveyed = surveyed.map_err(|error| error.of_inputs(std::slice::from_ref(&arguments.input)))?;
+    let surfels::Survey { scene, preparation, origin, largest_radius, coverage, sample } = surveyed;
     let gaussians = Gaussians::of(&scene);
-    // Gaussians are no samples of a closed surface, so gaps between them mean nothing.
-    let coverage = if gaussians.is_some() { None } else { surfels::coverage(&scene, &bars)? };
     let lacking = [
         (preparation.estimated_normals > 0, if held.1 { "some normals" } else { "normals" }),
         (!scene.oriented && gaussians.is_none(), "a side for its normals"),
@@ -198,8 +168,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         up: scene.up.name(),
         min: bounds.min.to_array(),
         max: bounds.max.to_array(),
-        origin: scene.origin.to_array(),
-        largest_radius: scene.largest_radius().into(),
+        origin: origin.to_array(),
+        largest_radius: largest_radius.into(),
+        sample,
         coverage,
         lacks,
         supplied_by,
@@ -254,6 +225,10 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     ranges::write(&mut text, &info.attributes);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
+    if let Some(Sample { points, places }) = info.sample {
+        let what = "spacing, coverage, radii and counts below are estimates";
+        let _ = writeln!(text, "  sample    {what} from {points} points in {places} places (--all examines all)");
+    }
     if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
         // Rounded down, so that 100 % means all.

@@ -31,13 +31,9 @@ use super::{note, outputs, print, write_json};
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Surfels, point clouds or meshes"))]
     inputs: Vec<PathBuf>,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    #[command(flatten)]
-    limits: LimitOptions,
     /// Write a cut of the tree in place of the tree: nodes of up to this radius, world units
     ///
     /// A node replaces the surfels below it if all of them fit into a ball of this radius. A node
@@ -53,6 +49,10 @@ pub struct Arguments {
     /// Write the tree's counts and times as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reading: InputOptions,
+    #[command(flatten)]
+    limits: LimitOptions,
 }
 
 /// Counts and times of the tree, as text or JSON.

@@ -26,8 +26,6 @@ use super::{note, outputs};
 pub struct Arguments {
     #[arg(help = help_of_mesh("Mesh, - for standard input"))]
     mesh: PathBuf,
-    #[command(flatten)]
-    input: FormatOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -52,6 +50,8 @@ pub struct Arguments {
     /// Seed of the random samples; not used by --method projected
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    input: FormatOptions,
 }
 
 #[derive(Clone, Copy, ValueEnum)]

@@ -30,8 +30,6 @@ use super::{note, outputs, print, write_json};
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Point clouds or meshes, whose vertices are used"))]
     inputs: Vec<PathBuf>,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -55,6 +53,8 @@ pub struct Arguments {
     /// Write counts and deviations as JSON to a file, or to stdout for -
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    reading: InputOptions,
 }
 
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]

@@ -24,8 +24,6 @@ use super::{note, outputs};
 pub struct Arguments {
     #[arg(required = true, help = help_of_all("Point clouds, or meshes, whose vertices are used"))]
     inputs: Vec<PathBuf>,
-    #[command(flatten)]
-    reading: InputOptions,
     /// Output file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -48,6 +46,8 @@ pub struct Arguments {
     /// Estimate all normals, also those that the files have
     #[arg(long)]
     estimate_normals: bool,
+    #[command(flatten)]
+    reading: InputOptions,
     #[command(flatten)]
     limits: LimitOptions,
 }

@@ -144,6 +144,7 @@ pub struct View {
     pub place: [f32; 4],
     pub levels: [f32; 4],
     pub atlas: [f32; 4],
+    pub lens: [[f32; 4]; 7],
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.

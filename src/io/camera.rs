@@ -8,7 +8,8 @@
 //! Camera space is x right, y down, z forward. The pose is `camera_to_world` or `world_to_camera`
 //! (4x4, rows), or `eye`, `target` and optionally `up`. The lens is `fx fy cx cy` in pixels, or
 //! `fov` (vertical, degrees). With `"model": "orthographic"` the lens is `fx fy cx cy` in pixels
-//! per world unit, or `height_world`.
+//! per world unit, or `height_world`. With `"model": "fisheye"` it is `fx fy cx cy` in pixels per
+//! radian, or `fov` across the width; with `"model": "equirectangular"` it is the whole sphere.
 
 use std::path::Path;
 
@@ -18,8 +19,8 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::io::input::text;
 use crate::io::values::one_line;
-use crate::scene::Lens;
-use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::camera::{DEFAULT_FISHEYE, DEFAULT_FOV};
+use crate::scene::{Form, Lens, Optics};
 
 /// The content of a camera file.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +71,8 @@ enum Model {
     #[default]
     Pinhole,
     Orthographic,
+    Fisheye,
+    Equirectangular,
 }
 
 /// Reads a camera file.
@@ -92,9 +95,19 @@ impl CameraFile {
         let lens = match self.lens {
             Lens::Intrinsics(values) => Lens::Intrinsics(pixels(values)),
             Lens::OrthographicScale(values) => Lens::OrthographicScale(pixels(values)),
-            lens @ (Lens::Fov(_) | Lens::OrthographicHeight(_)) => lens,
+            Lens::Curved(optics, values) => Lens::Curved(optics, pixels(values)),
+            lens @ (Lens::Fov(_) | Lens::OrthographicHeight(_) | Lens::Fisheye(_) | Lens::Equirectangular) => lens,
         };
         Self { size: Some(size), lens, ..self }
+    }
+
+    /// This camera as a pinhole with the same focal lengths and principal point, if its lens has
+    /// such; `None` for other cameras.
+    pub fn as_pinhole(&self) -> Option<Self> {
+        match self.lens {
+            Lens::Curved(_, values) => Some(Self { lens: Lens::Intrinsics(values), ..self.clone() }),
+            _ => None,
+        }
     }
 }
 
@@ -125,6 +138,15 @@ fn of_raw(raw: Raw) -> std::result::Result<CameraFile, String> {
         (Model::Pinhole, None, fov, None) => Lens::Fov(fov.unwrap_or(DEFAULT_FOV)),
         (Model::Orthographic, Some(values), None, None) => Lens::OrthographicScale(values),
         (Model::Orthographic, None, None, Some(height)) => Lens::OrthographicHeight(height),
+        (Model::Fisheye, Some(values), None, None) => Lens::Curved(Optics::of(Form::Fisheye), values),
+        (Model::Fisheye, None, fov, None) => Lens::Fisheye(fov.unwrap_or(DEFAULT_FISHEYE)),
+        (Model::Equirectangular, None, None, None) => Lens::Equirectangular,
+        (Model::Equirectangular, ..) => {
+            return Err(
+                "an equirectangular camera shows the whole sphere: leave fx, fy, cx, cy, fov and height_world out"
+                    .into(),
+            );
+        }
         (Model::Orthographic, None, None, None) => {
             return Err("an orthographic camera needs height_world, or fx, cx and cy".into());
         }

@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use super::values::Ortho;
 use crate::error::Result;
-use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::camera::{DEFAULT_FISHEYE, DEFAULT_FOV};
 use crate::scene::side::ELEVATION;
-use crate::scene::{Lens, Side};
+use crate::scene::{Form, Lens, Optics, Side};
 
 /// The view of a picture. Without an eye or a camera file it shows the whole scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,9 +51,16 @@ pub struct CameraOptions {
     /// flat, else y
     #[cfg_attr(feature = "cli", arg(long, value_name = "AXIS|X,Y,Z", value_parser = super::parse::up, allow_hyphen_values = true))]
     pub up: Option<DVec3>,
-    /// Vertical field of view in degrees [default: 45]
+    /// Vertical field of view in degrees; a fisheye's is horizontal [default: 45]
     #[cfg_attr(feature = "cli", arg(long, value_name = "DEGREES", conflicts_with_all = ["ortho", "intrinsics"]))]
     pub fov: Option<f64>,
+    /// Projection: perspective, fisheye (equidistant; --fov is the angle across the width, 180 by
+    /// default) or equirectangular (the whole sphere) [default: perspective]
+    ///
+    /// A fisheye and a sphere need --eye, and their depth is the distance from it. The size of a
+    /// sphere's image is 2048x1024 by default
+    #[cfg_attr(feature = "cli", arg(long, value_name = "NAME", conflicts_with = "ortho", hide_short_help = true))]
+    pub projection: Option<Form>,
     /// Orthographic view; the image is HEIGHT world units high, or as high as the scene needs
     #[cfg_attr(feature = "cli", arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "fit", conflicts_with = "intrinsics"))]
     pub ortho: Option<Ortho>,
@@ -61,7 +68,7 @@ pub struct CameraOptions {
     #[cfg_attr(feature = "cli", arg(long, value_name = "FX,FY,CX,CY", value_parser = super::parse::intrinsics, allow_hyphen_values = true, hide_short_help = true))]
     pub intrinsics: Option<[f64; 4]>,
     /// Camera file (see the guide), in place of all other camera options except --size
-    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics"], hide_short_help = true))]
+    #[cfg_attr(feature = "cli", arg(long = "camera", value_name = "CAMERA.json", conflicts_with_all = ["eye", "from", "azimuth", "elevation", "target", "up", "fov", "projection", "ortho", "intrinsics"], hide_short_help = true))]
     pub file: Option<PathBuf>,
     /// Map from straight above with pixels of SIZE world units, north (+y) at the top
     ///
@@ -69,7 +76,7 @@ pub struct CameraOptions {
     /// multiples of SIZE, so that maps with one SIZE fit together. A .tif has the place of the map
     /// and the coordinate system of LAS files (GeoTIFF) and may be larger than memory; a .png or
     /// .jpg gets a world file (.pgw, .jgw). z is up: files whose up is y need --up z
-    #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::scale, conflicts_with_all = ["size", "eye", "from", "azimuth", "elevation", "target", "fov", "ortho", "intrinsics", "file", "near"]))]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::scale, conflicts_with_all = ["size", "eye", "from", "azimuth", "elevation", "target", "fov", "projection", "ortho", "intrinsics", "file", "near"]))]
     pub pixel_size: Option<f64>,
     /// Part of a map of --pixel-size, extended to whole pixels [default: all data]
     #[cfg_attr(feature = "cli", arg(long, value_name = "XMIN,YMIN,XMAX,YMAX", value_parser = super::parse::bounds, allow_hyphen_values = true, requires = "pixel_size"))]
@@ -93,6 +100,14 @@ impl CameraOptions {
 
     /// Returns the lens, and the name of the option that gives it.
     pub(crate) fn lens(&self) -> (Lens, &'static str) {
+        match (self.projection, self.intrinsics) {
+            (Some(Form::Fisheye), Some(values)) => {
+                return (Lens::Curved(Optics::of(Form::Fisheye), values), "--intrinsics");
+            }
+            (Some(Form::Fisheye), None) => return (Lens::Fisheye(self.fov.unwrap_or(DEFAULT_FISHEYE)), "--fov"),
+            (Some(Form::Equirectangular), _) => return (Lens::Equirectangular, "--projection"),
+            (Some(Form::Perspective) | None, _) => {}
+        }
         match (self.intrinsics, self.ortho) {
             (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
             (None, Some(Ortho::Height(height))) => (Lens::OrthographicHeight(height), "--ortho"),

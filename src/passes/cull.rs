@@ -89,10 +89,11 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
 pub const PASS: Pass = Pass {
     name: "cull",
     files: |needs| match (needs.cull, needs.levels) {
-        (true, true) => vec!["ball.wgsl", "cull.wgsl"],
-        (true, false) => vec!["ball.wgsl", "cull.wgsl", "balls_own.wgsl"],
-        (false, true) => vec!["ball.wgsl", "cull_absent.wgsl"],
-        (false, false) => vec!["cull_absent.wgsl"],
+        _ if needs.twice() => vec!["cull_twice.wgsl", "around.wgsl"],
+        (true, true) => vec!["ball.wgsl", "cull.wgsl", "around_absent.wgsl"],
+        (true, false) => vec!["ball.wgsl", "cull.wgsl", "balls_own.wgsl", "around_absent.wgsl"],
+        (false, true) => vec!["ball.wgsl", "cull_absent.wgsl", "around_absent.wgsl"],
+        (false, false) => vec!["cull_absent.wgsl", "around_absent.wgsl"],
     },
     kernels: |needs| if needs.cull { vec![CULL_NEAR, CULL_FAR] } else { Vec::new() },
     constants: |making| match making.needs.cull || making.needs.levels {

@@ -59,11 +59,16 @@ impl Curve {
     }
 }
 
-/// A surfel in camera space: centre p, half-axes s and t, and cap, world units.
+/// A surfel in camera space, or in the axes of its own pinhole for a lens that is none: centre p,
+/// half-axes s and t, and cap.
 pub(super) struct Seen {
     pub p: DVec3,
     pub s: DVec3,
     pub t: DVec3,
+    /// The image of the unit normal in these axes, which need not be perpendicular.
+    pub normal: DVec3,
+    /// The longer half-axis, world units.
+    pub radius: f64,
     pub cap: Cap,
 }
 
@@ -77,8 +82,7 @@ impl Seen {
 
     /// The displacements of the disk's centre at the cap's lowest and highest point.
     fn shifts(&self) -> [DVec3; 2] {
-        let normal = self.s.cross(self.t).normalize_or_zero();
-        self.cap.extremes().map(|height| normal * height)
+        self.cap.extremes().map(|height| self.normal * height)
     }
 
     /// The first and last corner of the rectangle, in pixels, that holds the cap's image past the
@@ -130,18 +134,21 @@ impl Seen {
     }
 }
 
-/// The rows of the inverse of [s t n], where n is the unit normal of s and t. The half-axes s and t
-/// need not be perpendicular.
-fn inverse(s: DVec3, t: DVec3) -> [DVec3; 3] {
-    let cross = s.cross(t);
-    let n = cross.normalize_or_zero();
-    [t.cross(n) / cross.length(), n.cross(s) / cross.length(), n]
+/// The rows of the inverse of [s t n]. No two of the vectors need be perpendicular.
+fn inverse(s: DVec3, t: DVec3, n: DVec3) -> [DVec3; 3] {
+    let size = s.dot(t.cross(n));
+    [t.cross(n) / size, n.cross(s) / size, s.cross(t) / size]
+}
+
+/// The unit normal of s and t.
+pub(super) fn normal_of(s: DVec3, t: DVec3) -> DVec3 {
+    s.cross(t).normalize_or_zero()
 }
 
 /// The curve of a surfel whose disk is `projected`.
 pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curve {
-    let [m_s, m_t, n] = inverse(seen.s, seen.t);
-    let radius = seen.s.length().max(seen.t.length());
+    let [m_s, m_t, n] = inverse(seen.s, seen.t, seen.normal);
+    let radius = seen.radius;
     let rows = [m_s, m_t, n / radius];
     // Without an anchor at its centre, U, V and W are taken past the near depth: r / z may be large
     // where a cap lies mostly behind the camera.
@@ -177,7 +184,7 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
 /// The change of a unit normal per unit of u and of v, world space: minus the gradient of the
 /// height.
 pub(super) fn normal_slopes(s: DVec3, t: DVec3, cap: Cap) -> [DVec3; 2] {
-    let [m_s, m_t, _] = inverse(s, t);
+    let [m_s, m_t, _] = inverse(s, t, normal_of(s, t));
     let [uu, uv, vv] = cap.0.map(f64::from);
     [-(m_s * uu + m_t * uv), -(m_s * uv + m_t * vv)]
 }
@@ -304,7 +311,10 @@ mod tests {
             let (center, normal) = (around(0.3) * 3.0, around(1.0).normalize());
             let disk = Surfel::disk(Vec3::ZERO, normal.as_vec3(), 0.3);
             let cap = Cap(std::array::from_fn(|_| (0.3 * height * (2.0 * random.number() - 1.0)) as f32));
-            let Some(splat) = project::reference((0, &disk, Some(project::Body::Cap(cap))), center, &camera, &design) else { continue };
+            let Some(splat) = project::reference((0, &disk, Some(project::Body::Cap(cap))), center, &camera, &design)
+            else {
+                continue;
+            };
             let ([left, top], [right, bottom]) = (splat.first, splat.last);
             within += u64::from(right - left + 1) * u64::from(bottom - top + 1);
             for (x, y) in (0..size).flat_map(|y| (0..size).map(move |x| (x, y))) {

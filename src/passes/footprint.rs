@@ -6,18 +6,15 @@ use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
 use super::{curved, facing};
 use crate::plan::pass::Pass;
-use crate::plan::{EpsilonForm, Sides};
-use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
+use crate::plan::{EpsilonForm, SceneNeeds, Sides};
+use crate::scene::{Camera, Form, Kernel, KernelShape, LowPass, Projection};
 
 /// The files of the footprint and its weight; kernels of other passes evaluate them.
 pub const PASS: Pass = Pass {
     name: "footprint",
     files: |needs| {
-        let mut files = vec![
-            match needs.projection {
-                Projection::Pinhole => "camera_pinhole.wgsl",
-                Projection::Orthographic => "camera_orthographic.wgsl",
-            },
+        let mut files = camera_files(needs);
+        files.extend([
             "footprint.wgsl",
             "side.wgsl",
             match needs.surface.shows_nearest() {
@@ -29,7 +26,7 @@ pub const PASS: Pass = Pass {
                     EpsilonForm::All => "epsilon_all.wgsl",
                 },
             },
-        ];
+        ]);
         if needs.weighs() {
             files.push("blend.wgsl");
             files.push(file_of(needs.kernel));
@@ -45,6 +42,23 @@ pub const PASS: Pass = Pass {
         constants
     },
 };
+
+/// The WGSL files of the camera.
+fn camera_files(needs: &SceneNeeds) -> Vec<&'static str> {
+    match (needs.lens, needs.projection) {
+        (None, Projection::Orthographic) => vec!["camera_orthographic.wgsl"],
+        (None, Projection::Pinhole) => vec!["perspective.wgsl", "camera_pinhole.wgsl"],
+        (Some(Form::Equirectangular), _) => {
+            vec!["perspective.wgsl", "camera_lens.wgsl", "lens_sphere.wgsl", "angle.wgsl"]
+        }
+        (Some(Form::Fisheye), _) => {
+            vec!["perspective.wgsl", "camera_lens.wgsl", "lens_fisheye.wgsl", "distortion.wgsl", "angle.wgsl"]
+        }
+        (Some(Form::Perspective), _) => {
+            vec!["perspective.wgsl", "camera_lens.wgsl", "lens_perspective.wgsl", "distortion.wgsl"]
+        }
+    }
+}
 
 /// The WGSL file of a kernel's family.
 fn file_of(shape: KernelShape) -> &'static str {

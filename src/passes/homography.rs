@@ -1,7 +1,8 @@
 //! A disk's image in one camera: the homography from pixels to the disk, and the extent of its
 //! outline.
 //!
-//! The twin of `wgsl/common/camera_pinhole.wgsl` and `wgsl/common/camera_orthographic.wgsl`.
+//! The twin of `wgsl/common/camera_pinhole.wgsl`, `wgsl/common/camera_orthographic.wgsl` and
+//! `wgsl/lenses/camera_lens.wgsl`.
 //!
 //! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies `(a,
 //! b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4). The
@@ -10,6 +11,14 @@
 //! of two pixels at column 1000 would lose nine bits of its shape to cancellation. The kernel finds
 //! that centre in doubled f32 precision (`wgsl/common/double.wgsl`), so u and v err by a few units
 //! of 2^-24, divided by the cosine of the angle between view ray and normal.
+//!
+//! **Lenses.** A lens that is no pinhole ([`Optics`](crate::scene::Optics)) is replaced, for each
+//! splat, by a pinhole that agrees with it at the splat's centre, in place and in first
+//! derivatives. Its axis is the ray through the centre, its focal length a pixel, and a vector v
+//! has the axes `(z J v, g . v)`: J is the derivative of the image, z the centre's depth and g the
+//! depth's gradient. The centre is exact, and at a distance of q pixels from it the image errs by
+//! half the lens's curvature times q². For a distorted perspective g is the camera's axis, so
+//! depths and the foreshortening of the disk are exact too, and only the distortion is linearised.
 //!
 //! **Extent.** The lines x = k that are tangent to the disk's outline solve a quadratic in k. A
 //! disk that crosses the near depth is bounded by its part in front of it.
@@ -49,6 +58,84 @@ pub(super) fn projected(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projec
 /// Half the disk's extent in depth.
 pub(super) fn slope(s: DVec3, t: DVec3) -> f64 {
     s.z.hypot(t.z)
+}
+
+/// A splat's centre as a lens sees it, and its half-axes in the axes of the splat's own pinhole
+/// ([`lens`]).
+pub(super) struct Own {
+    /// The image of the centre, pixels.
+    pub(super) image: DVec2,
+    /// The depth of the centre.
+    pub(super) depth: f64,
+    pub(super) s: DVec3,
+    pub(super) t: DVec3,
+    /// The rows of the change to these axes.
+    rows: [DVec3; 3],
+}
+
+impl Own {
+    /// A vector of camera space in these axes.
+    pub(super) fn axes(&self, v: DVec3) -> DVec3 {
+        DVec3::from_array(self.rows.map(|row| row.dot(v)))
+    }
+
+    /// The own pinhole, with the size and the near depth of `camera`.
+    pub(super) fn camera(&self, camera: &Camera) -> Camera {
+        let DVec2 { x: cx, y: cy } = self.image;
+        Camera { fx: 1.0, fy: 1.0, cx, cy, optics: None, ..camera.clone() }
+    }
+}
+
+/// The own pinhole of a splat with centre `p` and half-axes `s` and `t` (camera space); `None` if
+/// the lens does not see the centre, or the centre lies before the near depth or far outside the
+/// image.
+pub(super) fn own(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Option<Own> {
+    let reach = camera.optics.as_ref()?.reach();
+    let sight = camera.sight(p).filter(|sight| sight.depth >= camera.near && sight.radius <= reach)?;
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let image = focal * sight.plane + DVec2::new(camera.cx, camera.cy);
+    let [across, down] = [sight.steps[0] * focal.x, sight.steps[1] * focal.y];
+    let rows = [across, down, sight.axis];
+    let of = |v: DVec3| DVec3::from_array(rows.map(|row| row.dot(v)));
+    (image.abs().max_element() < FARTHEST_ANCHOR).then(|| Own { image, depth: sight.depth, s: of(s), t: of(t), rows })
+}
+
+/// Projects a disk by a pinhole of its own: one with focal lengths of a pixel, whose axis is the
+/// ray through the disk's centre, and whose image agrees with that of the lens at the centre, in
+/// place and in first derivatives.
+pub(super) fn lens(near: f64, own: &Own) -> Projected {
+    let Own { image, depth, s, t, .. } = *own;
+    let away = depth * (s.x * t.y - s.y * t.x);
+    let edge_on = away == 0.0;
+    let scale = if edge_on { 0.0 } else { 1.0 / away };
+    let a = DVec2::new(t.y, -t.x) * (depth * scale);
+    let b = DVec2::new(-s.y, s.x) * (depth * scale);
+    let c = s.cross(t).truncate() * scale;
+    let pixel = image.floor();
+    let offset = image - pixel - 0.5;
+    let slope = slope(s, t);
+    let is_whole = depth - slope >= near;
+    let (across, down, border) = match is_whole {
+        true => {
+            let along = |s: f64, t: f64| tangents([s, own.s.z], [t, own.t.z], [0.0, depth]);
+            (along(s.x, t.x), along(s.y, t.y), 0.0)
+        }
+        false => {
+            let ends = chord(s, t, depth, slope, near);
+            let along = |s: f64, t: f64| clipped_extent([s, own.s.z], [t, own.t.z], [0.0, depth], ends, near);
+            (along(s.x, t.x), along(s.y, t.y), 1.0)
+        }
+    };
+    Projected {
+        anchor: [pixel.x as i64, pixel.y as i64],
+        a: a.extend(if edge_on { 2.0 / depth } else { -a.dot(offset) }),
+        b: b.extend(-b.dot(offset)),
+        c: c.extend(1.0 / depth - c.dot(offset)),
+        low: image + DVec2::new(across.x, down.x) - border,
+        high: image + DVec2::new(across.y, down.y) + border,
+        away: away > 0.0,
+        images: is_whole.then(|| [offset, s.truncate() / depth, t.truncate() / depth]),
+    }
 }
 
 fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3) -> Projected {

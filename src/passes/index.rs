@@ -10,8 +10,8 @@
 //! picture's depth is the triangle's own.
 //!
 //! Two sweeps over the fragments find the greatest weight, then the first surfel with that weight.
-//! Both are stored in the map's words of the image. The word of a shown triangle's weight is greater
-//! than that of any weight.
+//! Both are stored in the map's words of the image. The word of a shown triangle's weight is
+//! greater than that of any weight.
 
 use super::footprint::footprint;
 use super::join::Beside;
@@ -23,7 +23,7 @@ use crate::plan::Plan;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Part, Run, Stage};
 use crate::scene::kernel::LEAST_WEIGHT;
-use crate::scene::{Map, Provenance};
+use crate::scene::{Map, Maps, Provenance};
 
 /// The map's pass.
 pub const MAP: MapPass = MapPass {
@@ -53,6 +53,11 @@ const NAME_LARGE: Kernel = Kernel::of("name_strongest_large", [TILE, TILE, 1]);
 
 /// The input and point number of an empty pixel.
 pub const NOTHING: u32 = u32::MAX;
+
+/// Whether a picture with these maps needs the map of depths to tell which triangles show.
+pub fn needs_depth(maps: Maps, triangles: u64) -> bool {
+    maps.has(Map::Index) && triangles > 0
+}
 
 /// The word of the weight of a shown triangle.
 const OF_TRIANGLE: u32 = u32::MAX;

@@ -50,9 +50,9 @@
 pub mod accumulate;
 pub mod attributes;
 pub mod branches;
+pub mod conic;
 pub mod covered;
 pub mod cull;
-pub mod conic;
 pub mod curved;
 pub mod eye_dome;
 pub mod facing;

@@ -18,7 +18,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, Settings, Sides, composited, culls_back};
 use crate::plan::{Plan, tuning};
-use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cap, Clip, Composite, Fade, Form, LowPass, Scene, Surfel, copies, has_copies};
 
 /// How a surfel extends out of its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ pub type Indexed<'a> = (u32, &'a Surfel, Option<Body>);
 ///
 /// `relative` is the surfel's centre relative to the camera's eye, world units.
 pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
-    projected(of, relative, camera, design).ok()
+    projected(of, relative, camera, design, false).ok()
 }
 
 /// Why a surfel touches no pixel.
@@ -58,40 +58,54 @@ pub(super) enum Missed {
     Between,
 }
 
-/// The splat of [`reference`], or why there is none.
+/// The splat of [`reference`], or why there is none; if `again`, the part of it beyond the border
+/// of a whole sphere.
 pub(super) fn projected(
     (index, surfel, body): Indexed<'_>,
     relative: DVec3,
     camera: &Camera,
     design: &Design,
+    again: bool,
 ) -> Result<Splat, Missed> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
-    let [mut s, mut t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
-    let mut seen = None;
-    match body {
-        Some(Body::Cap(cap)) => seen = Some(Seen { p, s, t, cap }),
-        Some(Body::Solid(third)) => {
-            let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
-            [s, t] = conic::half_axes(p, [s, t, w], camera, design.dilation);
-        }
-        None => {}
+    let [mut s, mut t] =
+        point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
+    // A lens draws no 3D Gaussians.
+    if let Some(Body::Solid(third)) = body {
+        let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
+        [s, t] = conic::half_axes(p, [s, t, w], camera, design.dilation);
     }
     let is_solid = matches!(body, Some(Body::Solid(_)));
+    let own = match camera.optics {
+        Some(_) => Some(homography::own(camera, p, s, t).ok_or(Missed::Behind)?),
+        None => None,
+    };
+    let (normal, radius) = (curved::normal_of(s, t), s.length().max(t.length()));
+    let normal = own.as_ref().map_or(normal, |own| own.axes(normal));
+    let (p, s, t) = own.as_ref().map_or((p, s, t), |own| (DVec3::Z * own.depth, own.s, own.t));
+    let cap = if let Some(Body::Cap(cap)) = body { Some(cap) } else { None };
+    let seen = cap.map(|cap| Seen { p, s, t, normal, radius, cap });
+    let pinhole = own.as_ref().map(|own| own.camera(camera));
+    let camera = pinhole.as_ref().unwrap_or(camera);
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
         return Err(Missed::Behind);
     }
-    let mut projected = homography::projected(camera, p, s, t);
+    let mut projected = match &own {
+        Some(own) => homography::lens(camera.near, own),
+        None => homography::projected(camera, p, s, t),
+    };
     let near = depths[0].max(camera.near);
     let depths = [near, depths[1].max(near)];
     let curve = seen.as_ref().map(|seen| {
         [projected.low, projected.high] = seen.extent(camera);
         Curve { slopes: curved::normal_slopes(s_world, t_world, seen.cap), ..curved::curve(camera, seen, &projected) }
     });
-    let filter = projected.images.filter(|_| !is_solid).and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
+    let filter =
+        projected.images.filter(|_| !is_solid).and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
     if let Some(filter) = &filter {
         let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
         let (low, high) = (center - filter.extent, center + filter.extent);
@@ -100,6 +114,13 @@ pub(super) fn projected(
         let beside = design.low_pass != LowPass::Ewa;
         projected.low = if beside { projected.low.min(low) } else { low };
         projected.high = if beside { projected.high.max(high) } else { high };
+    }
+    if again {
+        let width = i64::from(camera.width);
+        let turn = if 2 * projected.anchor[0] >= width { -width } else { width };
+        projected.anchor[0] += turn;
+        projected.low.x += turn as f64;
+        projected.high.x += turn as f64;
     }
     let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
     let size = DVec2::new(camera.width.into(), camera.height.into());
@@ -145,9 +166,10 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
     // Fragment lists hold every copy.
     let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
     let copies = (has_copies(scene) && once).then(|| copies(scene));
-    let project = |(index, surfel): (usize, &Surfel)| {
+    let project = |again: bool, (index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || reference((index as u32, surfel, Body::of(scene, index, options)), scene.center(index) - eye, camera, &design);
+        let of = (index as u32, surfel, Body::of(scene, index, options));
+        let splat = || projected(of, scene.center(index) - eye, camera, &design, again).ok();
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
             let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());
@@ -155,7 +177,12 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
             Splat {
                 copies,
                 fade: scene.fades.get(index).copied().unwrap_or(Fade::WHOLE),
-                clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none() && !facts.solid).unwrap_or_default(),
+                clip: scene
+                    .clips
+                    .get(index)
+                    .copied()
+                    .filter(|_| splat.point.is_none() && !facts.solid)
+                    .unwrap_or_default(),
                 outline: options.outline,
                 sides,
                 normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },
@@ -165,7 +192,12 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
         };
         splat.map(own)
     };
-    surfels.filter_map(project).collect()
+    let is_sphere = camera.optics.is_some_and(|optics| optics.form == Form::Equirectangular);
+    match is_sphere {
+        false => surfels.filter_map(|one| project(false, one)).collect(),
+        // A splat at the border of a whole sphere shows on both sides.
+        true => surfels.flat_map_iter(|one| [project(false, one), project(true, one)].into_iter().flatten()).collect(),
+    }
 }
 
 /// The pass's kernels, files and constants.

@@ -22,6 +22,8 @@ pub const PASS: Pass = Pass {
             pick(needs.surface.copies(), "copies.wgsl", "copies_absent.wgsl"),
             pick(needs.fades, "fade.wgsl", "fade_absent.wgsl"),
         ];
+        let frame = pick(needs.lens.is_some(), "frame_lens.wgsl", "frame_plain.wgsl");
+        files.extend((needs.facing.is_none() && needs.curved).then_some(frame));
         // With a cut, select_fades.wgsl reads the fades that the cut assigns.
         files.extend((needs.fades && !needs.levels).then_some("fade_own.wgsl"));
         files

@@ -88,6 +88,12 @@ pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
     let principal = DVec2::new(camera.cx, camera.cy);
     let corner = |vertex: usize| {
         let p = camera.rotation * (scene.triangles.place(vertex) - eye);
+        if camera.optics.is_some() {
+            return match camera.corner(p) {
+                Some((place, depth)) => Corner { place, w: 1.0, depth, share: 1.0 / depth },
+                None => Corner { place: DVec2::ZERO, w: 0.0, depth: 0.0, share: 0.0 },
+            };
+        }
         let plane = focal * p.truncate();
         match camera.projection {
             Projection::Orthographic => Corner { place: plane + principal, w: 1.0, depth: p.z, share: 1.0 },
@@ -294,6 +300,8 @@ fn reach(camera: &Camera, of: &[Corner; 3], (first_row, rows): (u32, u32)) -> Op
             (places[0].min(places[1]).min(places[2]) - 0.51, places[0].max(places[1]).max(places[2]) - 0.49)
         }
         [false, false, false] => return None,
+        // A corner that a lens does not see has no image, and neither have its triangles.
+        _ if camera.optics.is_some() => return None,
         _ => (DVec2::NEG_INFINITY, DVec2::INFINITY),
     };
     let (top, bottom) = (f64::from(first_row), f64::from(first_row + rows) - 1.0);
@@ -327,9 +335,10 @@ pub const PASS: Pass = Pass {
     name: "triangles",
     files: |needs| {
         let Some(mesh) = needs.mesh else { return vec!["triangles_tiles_absent.wgsl"] };
-        let corner = match needs.projection {
-            Projection::Pinhole => "corner_pinhole.wgsl",
-            Projection::Orthographic => "corner_orthographic.wgsl",
+        let corner: &[&str] = match (needs.lens, needs.projection) {
+            (Some(_), _) => &["corner_lens.wgsl", "corner_perspective.wgsl"],
+            (None, Projection::Pinhole) => &["corner_pinhole.wgsl", "corner_perspective.wgsl"],
+            (None, Projection::Orthographic) => &["corner_orthographic.wgsl"],
         };
         let visibility: &[&str] = match (needs.surface.raster(), mesh.once) {
             (Some(_), _) => &["triangles_raster.wgsl"],
@@ -342,16 +351,9 @@ pub const PASS: Pass = Pass {
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
-        let all = [
-            "corners.wgsl",
-            vertex,
-            "triangles.wgsl",
-            "triangles_tiles.wgsl",
-            "triangles_attributes.wgsl",
-            corner,
-            texture,
-        ];
-        all.into_iter().chain(visibility.iter().copied()).chain(own).collect()
+        let all =
+            ["corners.wgsl", vertex, "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", texture];
+        all.into_iter().chain(corner.iter().copied()).chain(visibility.iter().copied()).chain(own).collect()
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),

@@ -45,6 +45,7 @@ impl Unseen {
                 scene.center(index) - eye,
                 camera,
                 &design,
+                false,
             );
             let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];
             let [behind, outside, between, over] =

@@ -6,18 +6,26 @@ mod adapter;
 mod table;
 
 pub use self::adapter::{on_adapter, sums};
-use self::table::{FADES, OPTIONS, SCENES, TEXTURES, TILES};
+use self::table::{FADES, LENSES, OPTIONS, SCENES, TEXTURES, TILES};
 use super::tuning::MOST_LARGE;
 use super::{Facts, Settings, composited};
 use crate::error::{Error, Result};
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Blend, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Blend, Camera, Form, Map, Shading, options::SHININESS_RANGE};
 
 /// A combination of options that is rejected for every scene.
 struct Clash {
     /// Whether a picture has this combination. The second argument is false if the f64 reference
     /// renders, which ignores options that only devices use.
     applies: fn(&Settings, bool) -> bool,
+    /// The fault and its remedy.
+    sentence: &'static str,
+}
+
+/// A combination of a lens that is no pinhole, a scene and options that is rejected.
+struct LensClash {
+    /// As in [`SceneClash`], for a lens of this form.
+    applies: fn(Form, &Facts, &Settings, bool) -> bool,
     /// The fault and its remedy.
     sentence: &'static str,
 }
@@ -119,6 +127,16 @@ pub fn fades(options: &Settings) -> Result<()> {
 /// [`Error::Usage`].
 pub fn textured(options: &Settings, reference: bool) -> Result<()> {
     first(&TEXTURES, options, !reference)
+}
+
+/// Rejects what a camera whose lens is no pinhole does not show.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn lens(facts: &Facts, camera: &Camera, options: &Settings, reference: bool) -> Result<()> {
+    let Some(optics) = &camera.optics else { return Ok(()) };
+    let found = LENSES.iter().find(|clash| (clash.applies)(optics.form, facts, options, !reference));
+    found.map_or(Ok(()), |clash| usage(clash.sentence))
 }
 
 /// Rejects options that cannot be used with the scene that `facts` describe.

@@ -63,7 +63,8 @@ pub fn strips(camera: &Camera, rows: u32) -> Vec<Band> {
 /// is a row of a dispatch, and every adapter allows [`MOST_GROUPS`] rows. The splat's record or the
 /// surfel's attributes, whichever is larger, limits the page.
 pub fn page_surfels(adapter: &AdapterDescription, needs: &SceneNeeds) -> u64 {
-    let words = splat_words(needs).max(SurfelLayout::of(needs).words.into());
+    let splats = if needs.twice() { 2 } else { 1 };
+    let words = (splats * splat_words(needs)).max(SurfelLayout::of(needs).words.into());
     let most = adapter.page_len(4 * words as usize);
     let whole = most / u64::from(BATCH) * u64::from(BATCH);
     if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most.max(1) }

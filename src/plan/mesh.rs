@@ -31,6 +31,9 @@ const BORDER: f64 = 1.0;
 /// Whether the view of `camera` may show part of a box relative to `origin`. It shows nothing of a
 /// box that lies entirely before the near depth or beyond one side of the image.
 pub(crate) fn in_view(bounds: &Bounds, origin: DVec3, camera: &Camera) -> bool {
+    if camera.optics.is_some() {
+        return !bounds.is_empty();
+    }
     let corner = |k: usize| {
         let [x, y, z] = [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] });
         camera.to_camera(origin + DVec3::new(x, y, z))

@@ -161,7 +161,8 @@ impl Plan {
         let in_one =
             (pages == 1 || needs.surface.separate()) && (1..=page).contains(&most_together((facts, drawn), &needs));
         let gather = in_one && gathers(&needs, options, known);
-        let cull = page >= BATCH.into() && culls(drawn, &needs, camera, options);
+        // A lens has no planes at the edges of its image.
+        let cull = needs.lens.is_none() && page >= BATCH.into() && culls(drawn, &needs, camera, options);
         let individuals = if needs.surface.separate() { pages_of(&facts.individuals, page) } else { Vec::new() };
         let surface = needs.surface.sized(gather, known.veiled, known.longest_list > 0);
         let needs = SceneNeeds { surface, cull, ..needs };

@@ -6,8 +6,8 @@ use super::{
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
-    Shading,
+    Blend, Camera, Composite, Cull, Epsilon, Form, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection,
+    Samples, Shading,
 };
 
 /// The needs of a render. They select the WGSL files that are joined, and with them the bindings,
@@ -18,6 +18,8 @@ pub struct SceneNeeds {
     pub surface: Surface,
     /// The camera model.
     pub projection: Projection,
+    /// The form of a lens that is no pinhole.
+    pub lens: Option<Form>,
     /// The format of sums on the device.
     pub accumulator: Accumulator,
     /// The accumulator is `fixed` and terms may be small. Either alphas differ, so that means may
@@ -204,6 +206,7 @@ impl SceneNeeds {
         Self {
             surface,
             projection: camera.projection,
+            lens: camera.optics.map(|optics| optics.form),
             accumulator: options.accumulator,
             wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || order_free),
             atomics_u64: false,
@@ -323,6 +326,11 @@ impl SceneNeeds {
         self.surface.separate() || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
     }
 
+    /// Whether each surfel has two splats: a whole sphere shows those at its border on both sides.
+    pub fn twice(&self) -> bool {
+        self.lens == Some(Form::Equirectangular)
+    }
+
     /// Whether depths are summed.
     pub fn sums_depth(&self) -> bool {
         let among_layers = self.mesh.is_some() && self.surface.lists() == Some(Lists::Layers);
@@ -339,9 +347,10 @@ impl SceneNeeds {
 
     /// Returns the names of the needs, for people and JSON.
     pub fn names(&self) -> Vec<&'static str> {
-        let projection = match self.projection {
-            Projection::Pinhole => "pinhole",
-            Projection::Orthographic => "orthographic",
+        let projection = match (self.lens, self.projection) {
+            (Some(form), _) => form.need(),
+            (None, Projection::Pinhole) => "pinhole",
+            (None, Projection::Orthographic) => "orthographic",
         };
         let color = match self.color {
             ColorNeed::Constant => "color-constant",

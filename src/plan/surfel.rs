@@ -48,7 +48,17 @@ impl SurfelLayout {
         let normal = third + u32::from(needs.solid);
         let number = normal + if needs.own_normals { 3 } else { 0 };
         let fade = number + u32::from(needs.numbers_surfels());
-        Self { words: fade + u32::from(needs.fades && !needs.levels), copies, low, clip, cap, third, normal, number, fade }
+        Self {
+            words: fade + u32::from(needs.fades && !needs.levels),
+            copies,
+            low,
+            clip,
+            cap,
+            third,
+            normal,
+            number,
+            fade,
+        }
     }
 }
 

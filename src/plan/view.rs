@@ -101,8 +101,22 @@ impl View {
             place,
             levels: levels(camera, options),
             atlas,
+            lens: lens(camera),
         }
     }
+}
+
+/// The coefficients of a lens that is no pinhole, in the layout of the kernels; else 0.
+fn lens(camera: &Camera) -> [[f32; 4]; 7] {
+    let mut rows = [[0.0; 4]; 7];
+    if let Some(optics) = &camera.optics {
+        for (row, coefficients) in optics.coefficients().into_iter().enumerate() {
+            (rows[row], rows[row + 3]) = split_all(coefficients);
+        }
+        let [limit, reach] = [optics.limit(), optics.reach()].map(|radius| radius.min(1e18) as f32);
+        [rows[6][0], rows[6][1]] = [limit, reach];
+    }
+    rows
 }
 
 /// The nearest and farthest depth of the scene's body, in world units. They are the depths of the
@@ -129,13 +143,16 @@ pub fn farthest(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
 fn farthest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
     let corner = |corner: usize| {
         let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-        camera.rotation.row(2).dot(DVec3::new(pick(0), pick(1), pick(2)) - eye)
+        camera.depth(camera.rotation * (DVec3::new(pick(0), pick(1), pick(2)) - eye))
     };
     (0..8).map(corner).fold(0.0, f64::max)
 }
 
-/// The least depth of a corner of `bounds`, negative behind the camera; world units.
+/// The least depth of a point of `bounds`, negative behind the camera; world units.
 fn nearest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
+    if camera.depth_is_distance() {
+        return (eye.clamp(bounds.min, bounds.max) - eye).length();
+    }
     let axis = camera.rotation.row(2);
     let least = |k: usize| (axis[k] * (bounds.min[k] - eye[k])).min(axis[k] * (bounds.max[k] - eye[k]));
     least(0) + least(1) + least(2)

@@ -31,9 +31,9 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::eye_dome;
 use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
+use crate::passes::{eye_dome, index};
 use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Camera, Detail, EyeDome, KernelFaults, Map};
@@ -122,8 +122,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let (sources, options) = own::settled(backend.borrow(), options)?;
         let faults = own::faults(&options);
         let eye_dome = options.edl;
-        let names_triangles = options.maps.has(Map::Index) && facts.mesh.triangles > 0;
-        let needs_depth = eye_dome.is_some() || names_triangles;
+        let needs_depth = eye_dome.is_some() || index::needs_depth(options.maps, facts.mesh.triangles);
         let drops_depth = needs_depth && !options.maps.has(Map::Depth);
         let maps = if needs_depth { options.maps.and(&[Map::Depth]) } else { options.maps };
         let options = &encoded::of(&facts, &Settings { maps, ..options.clone() });
@@ -141,6 +140,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// [`Error::Limit`] if a limit of the adapter is too small, and any error of the device.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
         let start = Instant::now();
+        self.check_lens(camera)?;
         let detail = self.sized(camera);
         let spent = start.elapsed().as_secs_f64() * 1e3;
         let Self { source, backend, sources, faults, kept, of_maps, .. } = self;
@@ -164,6 +164,13 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             encoded::decode(&mut frame);
         }
         Ok((self.filtered(frame, camera), report))
+    }
+
+    /// Rejects what a camera whose lens is no pinhole does not show.
+    fn check_lens(&self, camera: &Camera) -> Result<()> {
+        let reference = matches!(self.backend.borrow(), Backend::Reference);
+        let options = Settings { detail: self.detail, ..self.kept.options.clone() };
+        check::lens(&self.kept.facts, camera, &options, reference)
     }
 
     /// Applies the filters of finished pictures, and removes a map that only they need.

@@ -87,6 +87,8 @@ struct Uploading {
     levels: bool,
     surfel: SurfelLayout,
     splat_words: u64,
+    /// Each surfel has two splats.
+    twice: bool,
     /// The numbers of the surfels in their source are kept on the host.
     order: bool,
     /// Triangles are uploaded.
@@ -104,6 +106,7 @@ impl Uploading {
             levels: needs.levels,
             surfel,
             splat_words,
+            twice: needs.twice(),
             order,
             mesh,
         }
@@ -218,7 +221,8 @@ impl Store {
             // Pages that were made anew have no slots. A frame that does not look for the slots
             // that it needs gets all of them.
             if !plan.needs.cull || (slots == 0 && !plan.looks_for_slots) {
-                self.grow(gpu, page, surfels.next_multiple_of(if plan.needs.cull { BATCH.into() } else { 1 }))?;
+                let splats = if plan.needs.twice() { 2 * surfels } else { surfels };
+                self.grow(gpu, page, splats.next_multiple_of(if plan.needs.cull { BATCH.into() } else { 1 }))?;
             }
         }
         if fresh {

@@ -1,7 +1,10 @@
 //! The camera: intrinsics in pixels and a rigid pose in world units.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DMat3, DVec2, DVec3};
 
+use super::optics::{Form, Optics, Sight};
 use super::{Samples, Scene, Up};
 use crate::error::{Error, Result};
 
@@ -17,7 +20,8 @@ pub enum Projection {
 /// A camera with intrinsics and pose.
 ///
 /// Camera space is x right, y down, z forward. Pixel (i, j) has its centre at (i + 0.5, j + 0.5),
-/// origin top left. Depth is camera-space z.
+/// origin top left. Depth is camera-space z; for fisheyes and whole spheres it is the distance from
+/// the eye.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Pinhole or orthographic.
@@ -40,6 +44,9 @@ pub struct Camera {
     pub rotation: DMat3,
     /// The smallest visible depth, world units, positive.
     pub near: f64,
+    /// The lens, if the projection is a pinhole's but the lens is none: `fx fy cx cy` map the plane
+    /// of [`Optics`] to pixels.
+    pub optics: Option<Optics>,
 }
 
 /// The largest image width or height: bounds of splats are stored in 16 bits.
@@ -47,6 +54,9 @@ pub const MAX_SIDE: u32 = 32_768;
 
 /// The default vertical field of view, degrees.
 pub const DEFAULT_FOV: f64 = 45.0;
+
+/// The default field of view of a fisheye across the width of its image, degrees.
+pub const DEFAULT_FISHEYE: f64 = 180.0;
 
 /// The intrinsics of a camera before its pose and image size are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +69,13 @@ pub enum Lens {
     OrthographicHeight(f64),
     /// Orthographic `[fx, fy, cx, cy]`: pixels per world unit, and pixels.
     OrthographicScale([f64; 4]),
+    /// A lens that is no pinhole, with `[fx, fy, cx, cy]` in pixels.
+    Curved(Optics, [f64; 4]),
+    /// An equidistant fisheye: the field of view across the image's width in degrees, principal
+    /// point in the centre.
+    Fisheye(f64),
+    /// The whole sphere: longitude across the image's width, latitude down its height.
+    Equirectangular,
 }
 
 impl Lens {
@@ -94,6 +111,22 @@ impl Lens {
                 (Projection::Orthographic, [f, f, 0.5 * w, 0.5 * h])
             }
             Self::OrthographicScale(values) => (Projection::Orthographic, values),
+            Self::Curved(optics, values) if optics.is_usable() => (Projection::Pinhole, values),
+            Self::Curved(..) => {
+                return Err(Error::Usage(
+                    "the lens shows nothing: its distortion folds the image at its centre".into(),
+                ));
+            }
+            Self::Fisheye(degrees) => {
+                if !(degrees > 0.0 && degrees <= 360.0) {
+                    return Err(Error::Usage(format!(
+                        "the field of view of a fisheye lies between 0 and 360 degrees, {degrees:?} does not"
+                    )));
+                }
+                let f = w / degrees.to_radians();
+                (Projection::Pinhole, [f, f, 0.5 * w, 0.5 * h])
+            }
+            Self::Equirectangular => (Projection::Pinhole, [w / TAU, h / PI, 0.5 * w, 0.5 * h]),
         };
         let [fx, fy, cx, cy] = values;
         let scale = 1.0 / LARGEST..=LARGEST;
@@ -104,6 +137,16 @@ impl Lens {
             )));
         }
         Ok((projection, values))
+    }
+
+    /// The lens beyond its intrinsics; `None` for a pinhole or an orthographic view.
+    pub fn optics(self) -> Option<Optics> {
+        match self {
+            Self::Curved(optics, _) => Some(optics),
+            Self::Fisheye(_) => Some(Optics::of(Form::Fisheye)),
+            Self::Equirectangular => Some(Optics::of(Form::Equirectangular)),
+            Self::Fov(_) | Self::Intrinsics(_) | Self::OrthographicHeight(_) | Self::OrthographicScale(_) => None,
+        }
     }
 }
 
@@ -234,7 +277,11 @@ impl Camera {
         let forward = rotation.row(2).normalize();
         let right = rotation.row(0).reject_from_normalized(forward).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-        Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near })
+        let corners = [(0.0, 0.0), (width.into(), 0.0), (0.0, height.into()), (width.into(), height.into())];
+        let radius = |(x, y): (f64, f64)| ((x - cx) / fx).hypot((y - cy) / fy);
+        let farthest = corners.map(radius).into_iter().fold(0.0, f64::max);
+        let optics = lens.optics().map(|optics| optics.within(farthest));
+        Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near, optics })
     }
 
     /// The default near depth: a millionth of the scene's extent.
@@ -249,11 +296,53 @@ impl Camera {
         self.rotation * (world - self.eye)
     }
 
+    /// A point of camera space as the lens sees it; `None` if the camera is a pinhole or
+    /// orthographic, or if the lens does not see the point.
+    pub fn sight(&self, p: DVec3) -> Option<Sight> {
+        self.optics.as_ref().and_then(|optics| optics.see(p))
+    }
+
+    /// The image point of a point of camera space, pixels, and its depth; `None` if the point has
+    /// none, because it lies before the near depth or beyond what the lens shows.
+    pub fn image(&self, p: DVec3) -> Option<(DVec2, f64)> {
+        let (plane, depth) = match (&self.optics, self.projection) {
+            (Some(optics), _) => optics.see(p).map(|sight| (sight.plane, sight.depth))?,
+            (None, Projection::Pinhole) => (p.truncate() / p.z, p.z),
+            (None, Projection::Orthographic) => (p.truncate(), p.z),
+        };
+        let (focal, principal) = (DVec2::new(self.fx, self.fy), DVec2::new(self.cx, self.cy));
+        (depth >= self.near).then(|| (focal * plane + principal, depth))
+    }
+
+    /// As [`Camera::image`], for what is drawn straight around the point: `None` far outside the
+    /// image of a lens ([`Optics::reach`]).
+    pub fn corner(&self, p: DVec3) -> Option<(DVec2, f64)> {
+        let is_near = self.optics.as_ref().is_none_or(|optics| {
+            let sight = optics.see(p);
+            sight.is_some_and(|sight| sight.radius <= optics.reach())
+        });
+        self.image(p).filter(|_| is_near)
+    }
+
+    /// Whether depth is the distance from the eye instead of camera-space z.
+    pub fn depth_is_distance(&self) -> bool {
+        self.optics.is_some_and(|optics| optics.form != Form::Perspective)
+    }
+
+    /// The depth of a point of camera space, world units.
+    pub fn depth(&self, p: DVec3) -> f64 {
+        if self.depth_is_distance() { p.length() } else { p.z }
+    }
+
     /// The world-space direction of the view ray through the image point (x, y), pixels.
     ///
-    /// It is not normalised: its camera-space z is 1. The ray starts at
-    /// [`ray_start`](Self::ray_start).
+    /// It is not normalised: its depth is 1. The ray starts at [`ray_start`](Self::ray_start).
+    /// Where a lens shows nothing, it is the camera's axis.
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
+        if let Some(optics) = &self.optics {
+            let plane = DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy);
+            return self.rotation.transpose() * optics.ray(plane).unwrap_or(DVec3::Z);
+        }
         let camera = match self.projection {
             Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),
             Projection::Orthographic => DVec3::Z,
@@ -300,6 +389,10 @@ impl Camera {
     /// `at` is its centre in camera space. The test is against the planes through the eye and the
     /// edges of the image, so it also works for a ball that reaches the plane of the eye.
     pub(crate) fn is_beside_image(&self, at: DVec3, radius: f64, margin: DVec2) -> bool {
+        // The edges of a lens's image are no planes.
+        if self.optics.is_some() {
+            return false;
+        }
         let (focal, principal) = (DVec2::new(self.fx, self.fy), DVec2::new(self.cx, self.cy));
         let size = DVec2::new(self.width.into(), self.height.into());
         let (before, after) = (principal + margin, size + margin - principal);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::camera::check_size;
 use super::side::unit;
 use super::{Bounds, Camera, Clip, Lens, Projection, Scene, Side, Surfel};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The fraction of the way from the image's middle to its edge that the surfels' centres fill.
 pub(super) const FILL: f64 = 0.95;
@@ -105,6 +105,9 @@ pub fn fitted_height(
 pub(super) fn image((width, height): (u32, u32), lens: Lens) -> Result<(bool, [[f64; 3]; 2])> {
     check_size(width, height)?;
     let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
+    if lens.optics().is_some() {
+        return Err(Error::Usage("a lens that is no pinhole does not frame a scene: give its position".into()));
+    }
     let interval = |size: u32, principal: f64, f: f64| {
         let size = f64::from(size);
         // Ending a pixel before the border leaves the border's own pixels free.

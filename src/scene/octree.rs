@@ -119,15 +119,19 @@ impl PointOctree {
             let radius = 3f64.sqrt() * self.half * shrunk;
             let reach = radius + NEIGHBOURHOOD * spacing;
             // The depth extent is that of the cube, not of its bounding sphere.
-            let deep = self.half * shrunk * camera.rotation.row(2).abs().element_sum();
-            if at.z + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE) {
+            let deep = match camera.depth_is_distance() {
+                false => self.half * shrunk * camera.rotation.row(2).abs().element_sum(),
+                true => radius,
+            };
+            let depth = camera.depth(at);
+            if depth + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE) {
                 continue;
             }
             taken.push(index);
             let pixels = camera.fx.max(camera.fy)
                 / match camera.projection {
                     // Nothing is small at the camera's plane.
-                    Projection::Pinhole => (at.z - deep).max(0.0),
+                    Projection::Pinhole => (depth - deep).max(0.0),
                     Projection::Orthographic => 1.0,
                 };
             if PI * (spacing * pixels).powi(2) >= size {

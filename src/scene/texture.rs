@@ -286,7 +286,7 @@ impl Textured {
     /// most 1.
     ///
     /// `ray` is the pixel's view ray, scaled to gain a depth of 1; it meets the plane at `depth`,
-    /// world units. The twin of `area_in_pixel` in `wgsl/common/camera_pinhole.wgsl` and
+    /// world units. The twin of `area_in_pixel` in `wgsl/common/perspective.wgsl` and
     /// `wgsl/common/camera_orthographic.wgsl`.
     pub fn part_in_pixel(&self, index: usize, camera: &Camera, ray: DVec3, depth: f64) -> f64 {
         let [u, v] = self.places[index].slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));

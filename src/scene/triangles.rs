@@ -76,18 +76,41 @@ impl Triangles {
 
     /// As [`Self::textured`]. Also returns the place of each triangle among those given.
     pub(crate) fn textured_in_order(triangles: &[Triangle], textures: &[Arc<Texture>]) -> (Self, Vec<u32>) {
+        let (made, places) = Self::numbered(triangles, textures.len());
+        let is_painted = !made.painted.is_empty();
+        let textures = textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect();
+        (Self { textures, ..made }, places)
+    }
+
+    /// Other triangles with the textures of these. Also returns the place of each triangle among
+    /// those given.
+    pub(crate) fn with(&self, triangles: &[Triangle]) -> (Self, Vec<u32>) {
+        let (made, places) = Self::numbered(triangles, self.textures.len());
+        let textures = if made.painted.is_empty() { Vec::new() } else { self.textures.clone() };
+        (Self { textures, ..made }, places)
+    }
+
+    /// A triangle as it was given, with its corners rounded as they are stored.
+    pub(crate) fn triangle(&self, index: usize) -> Triangle {
+        let painted = self.painted.get(index).filter(|painted| painted.texture != UNPAINTED);
+        Triangle {
+            corners: self.corners[index].map(|vertex| self.place(vertex as usize).to_array()),
+            normals: self.normals.get(index).copied(),
+            colors: *self.colors.get(index).unwrap_or(&self.colors[0]),
+            texture: painted.map(|painted| (painted.texture, painted.places)),
+        }
+    }
+
+    /// As [`Self::textured_in_order`], for a number of textures, without them.
+    fn numbered(triangles: &[Triangle], textures: usize) -> (Self, Vec<u32>) {
         match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
             true => Self::kept(triangles, textures, doubled),
             false => Self::kept(triangles, textures, single),
         }
     }
 
-    /// As [`Self::textured_in_order`], with positions rounded by `stored`.
-    fn kept<P: Place>(
-        triangles: &[Triangle],
-        textures: &[Arc<Texture>],
-        stored: fn([f64; 3]) -> P,
-    ) -> (Self, Vec<u32>) {
+    /// As [`Self::numbered`], with positions rounded by `stored`.
+    fn kept<P: Place>(triangles: &[Triangle], textures: usize, stored: fn([f64; 3]) -> P) -> (Self, Vec<u32>) {
         let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
         let bounds = Bounds::of(places.clone().map(Place::exact));
@@ -109,10 +132,8 @@ impl Triangles {
                 let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
                 let normals =
                     if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
-                let (texture, places) = triangle
-                    .texture
-                    .filter(|(of, _)| textures.len() > *of as usize)
-                    .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
+                let (texture, places) =
+                    triangle.texture.filter(|(of, _)| textures > *of as usize).unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
                 let record =
                     Record { corners: [a, b, c], normals, colors: triangle.colors, painted, given: given as u32 };
@@ -140,7 +161,7 @@ impl Triangles {
             normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
             painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
-            textures: textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect(),
+            textures: Vec::new(),
         };
         (made, all.iter().map(|record| record.given).collect())
     }

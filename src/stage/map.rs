@@ -39,6 +39,7 @@ impl Renderer {
             target,
             up,
             fov,
+            projection,
             ortho,
             intrinsics,
             file,
@@ -49,7 +50,11 @@ impl Renderer {
             elevation,
         } = options;
         let Some(pixel) = *pixel_size else { return usage("a map needs the size of its pixels: give --pixel-size") };
-        let lens = fov.or(*near).is_some() || ortho.is_some() || intrinsics.is_some() || size.is_some();
+        let lens = fov.or(*near).is_some()
+            || projection.is_some()
+            || ortho.is_some()
+            || intrinsics.is_some()
+            || size.is_some();
         if lens || eye.or(*target).is_some() || from.is_some() || azimuth.or(*elevation).is_some() || file.is_some() {
             return usage("--pixel-size looks from straight above: leave other options of the camera out");
         }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::in_part::{Part, Parts};
-use super::{Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, levels, memory};
+use super::{
+    Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory, refined,
+};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -258,7 +260,12 @@ impl Renderer {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
-                let rendered = renderer.frame(&camera, progress)?;
+                let bent = is_told.then(|| lens::note(scene, &camera)).flatten();
+                bent.iter().for_each(|line| progress.note(line));
+                let rendered = match refined::refined(scene, &camera) {
+                    Some(refined) => render(&refined, &camera, settings, backend, progress)?,
+                    None => renderer.frame(&camera, progress)?,
+                };
                 Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
             }
             Drawn::Parts { parts, noted } => {

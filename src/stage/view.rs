@@ -70,6 +70,9 @@ impl View {
     /// The default size of a picture, pixels.
     pub const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
 
+    /// The default size of a picture of the whole sphere, pixels.
+    pub const SPHERE_SIZE: (u32, u32) = (2048, 1024);
+
     /// Returns the view that the options describe.
     ///
     /// # Errors
@@ -82,7 +85,16 @@ impl View {
             return Err(Error::Usage("a view has no pixel size: render a map by it (Renderer::grid and map)".into()));
         }
         let (lens, option) = options.lens();
-        let size = options.size.unwrap_or(Self::DEFAULT_SIZE);
+        let default = if lens == Lens::Equirectangular { Self::SPHERE_SIZE } else { Self::DEFAULT_SIZE };
+        let size = options.size.unwrap_or(default);
+        if lens == Lens::Equirectangular && (options.fov.is_some() || options.intrinsics.is_some()) {
+            return Err(Error::Usage(
+                "--projection equirectangular shows the whole sphere: leave --fov and --intrinsics out".into(),
+            ));
+        }
+        if lens.optics().is_some() && options.eye.is_none() {
+            return Err(Error::Usage("--projection sees all around a point: give it by --eye".into()));
+        }
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_option(options)?;
         let fits = options.ortho == Some(Ortho::Fit);
@@ -123,7 +135,8 @@ impl View {
         }
         check_near_option(options)?;
         let file = file.scaled(scale.unwrap_or(1.0));
-        let size = file.size.or(options.size).unwrap_or(Self::DEFAULT_SIZE);
+        let default = if file.lens == Lens::Equirectangular { Self::SPHERE_SIZE } else { Self::DEFAULT_SIZE };
+        let size = file.size.or(options.size).unwrap_or(default);
         let near = options.near.or(file.near);
         let view = Given { size, lens: file.lens, place: Place::Pose(file.pose), near };
         view.checked().map_err(|error| said_by(path.display(), error))

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{Renderer, Scene, View};
 use crate::error::{Error, Result};
@@ -157,14 +157,13 @@ impl Eye<'_> {
     fn sees(&self, point: DVec3, own: Option<&Surfel>, normal: Option<DVec3>) -> bool {
         let camera = self.camera;
         let at = camera.to_camera(point);
+        let Some((DVec2 { x, y }, own_depth)) = camera.image(at) else { return false };
         let along = match camera.projection {
-            Projection::Pinhole => at.z,
+            Projection::Pinhole => own_depth,
             Projection::Orthographic => 1.0,
         };
-        let (x, y) = (camera.fx * at.x / along + camera.cx, camera.fy * at.y / along + camera.cy);
         // Comparisons with NaN are false.
-        let inside = at.z >= camera.near && x >= 0.0 && y >= 0.0;
-        if !(inside && x < f64::from(camera.width) && y < f64::from(camera.height)) {
+        if !(x >= 0.0 && y >= 0.0 && x < f64::from(camera.width) && y < f64::from(camera.height)) {
             return false;
         }
         let (x, y) = (x as u32, y as u32);
@@ -183,7 +182,7 @@ impl Eye<'_> {
             // A vertex stands for the triangles around it, within the steepest slope that counts.
             (None, normal) => normal.map(|normal| (normal, STEEPEST * along.abs() / camera.fx.min(camera.fy))),
         };
-        let depth = plane.map_or(at.z, |plane| self.depth_at((point, at.z), plane, (x, y)));
+        let depth = plane.map_or(own_depth, |plane| self.depth_at((point, own_depth), plane, (x, y)));
         depth <= self.epsilon.farthest((*nearest).into(), radius, camera.along_axis(x, y))
     }
 

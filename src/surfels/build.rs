@@ -209,7 +209,8 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     // Where a radius was limited, the third half-axis stays the shortest.
-    let thirds = thirds.unwrap_or_default().into_iter().zip(&surfels).map(|(third, surfel)| third.min(surfel.shorter()));
+    let thirds =
+        thirds.unwrap_or_default().into_iter().zip(&surfels).map(|(third, surfel)| third.min(surfel.shorter()));
     let of_disks = Scene { low, clips, caps, normals, thirds: thirds.collect(), ..Scene::default() };
     let mut hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin));
     hierarchy.iter_mut().for_each(|tree| tree.settle(&surfels, &of_disks.low));
@@ -340,19 +341,23 @@ impl Estimated {
     /// curvature of the surface. `sided` says whether the normals distinguish the surface's two
     /// sides.
     fn caps(&self, given: &Given<'_>, surfels: &[Surfel], sided: bool) -> Vec<Cap> {
-        let of_point = self.distinct.of_point();
-        let normals = normals_at(&self.distinct, |i| given.normal(i));
+        let given_normals = normals_at(&self.distinct, |i| given.normal(i));
         let normal = |position: u32| {
-            let given = normals.get(position as usize).copied().flatten();
-            given.unwrap_or_else(|| self.of_position[position as usize].normal()).as_dvec3()
+            let given = given_normals.get(position as usize).copied().flatten();
+            given.unwrap_or_else(|| self.of_position[position as usize].normal()).to_array()
         };
+        // Each normal is used at all neighbours.
+        let normals: Vec<[f32; 3]> = (0..self.distinct.len() as u32).into_par_iter().map(normal).collect();
+        let normal = |position: u32| DVec3::from_array(normals[position as usize].map(f64::from));
         let around = Around { distinct: &self.distinct, graph: &self.graph, normal, sided };
-        let cap = |(i, surfel): (usize, &Surfel)| match given.cap(i) {
-            Some(cap) => cap,
-            None if given.lacks_radius(i) => around.cap(of_point[i], [surfel.s, surfel.t]),
-            None => Cap::FLAT,
-        };
-        surfels.par_iter().enumerate().map(cap).collect()
+        self.distinct.map_points(|point, position| {
+            let (point, surfel) = (point as usize, &surfels[point as usize]);
+            match given.cap(point) {
+                Some(cap) => cap,
+                None if given.lacks_radius(point) => around.cap(position, [surfel.s, surfel.t]),
+                None => Cap::FLAT,
+            }
+        })
     }
 }
 

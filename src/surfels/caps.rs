@@ -24,7 +24,7 @@ pub(super) fn caps_of(
     let normal =
         |position: u32| of_positions[position as usize].map_or(DVec3::ZERO, |n| n.as_dvec3().normalize_or_zero());
     let around = Around { distinct, graph, normal, sided };
-    axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
+    distinct.map_points(|point, position| around.cap(position, axes[point as usize]))
 }
 
 /// Gives points with half-axes the caps of the surface that is tangent to their planes.

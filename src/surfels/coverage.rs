@@ -74,6 +74,16 @@ pub struct Coverage {
 ///
 /// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 surfels.
 pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverage>> {
+    coverage_among(scene, None, progress)
+}
+
+/// As [`coverage`], for the surfels whose flag in `examined` is set (all for None); the others are
+/// their neighbours.
+pub(super) fn coverage_among(
+    scene: &Scene,
+    examined: Option<&[bool]>,
+    progress: &dyn Progress,
+) -> Result<Option<Coverage>> {
     let center = |index: usize| scene.center(index).to_array();
     let centers: Vec<[f64; 3]> = (0..scene.surfels.len()).into_par_iter().map(center).collect();
     let distinct = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
@@ -84,12 +94,14 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     let of_position = disks_of(&distinct, scene);
     let at = |position: u32| of_position.of(position);
     progress.begin("looking for gaps", distinct.len() as u64);
+    let is_examined = examined.map(|examined| examined_positions(&distinct, examined));
+    let is_examined = |position: u32| is_examined.as_ref().is_none_or(|all| all[position as usize]);
     let step = distinct.len().div_ceil(MOST_ASLANT) as u32;
     let is_sampled = |position: u32| position.is_multiple_of(step);
     let mut found = vec![(0.0, Found::Closed); distinct.len()];
     NeighbourGraph::visit(
         (&distinct, NEIGHBOURS, 0),
-        |_| true,
+        |position| is_examined(position as u32),
         &mut found,
         progress,
         |position, near| {
@@ -100,8 +112,10 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     );
     progress.end();
     let count = |sampled: bool, what: &[Found]| {
-        let counted =
-            |position: &&u32| (!sampled || is_sampled(**position)) && what.contains(&found[**position as usize].1);
+        let counted = |position: &&u32| {
+            let at = **position;
+            is_examined(at) && (!sampled || is_sampled(at)) && what.contains(&found[at as usize].1)
+        };
         distinct.of_point().par_iter().filter(counted).count() as u64
     };
     let share = |sampled: bool, closed: &[Found]| match count(sampled, &Found::OF_SURFACES) {
@@ -110,8 +124,16 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     };
     let (covered, covered_aslant) = (share(false, &[Found::Closed, Found::OpenAslant]), share(true, &[Found::Closed]));
     let (open, lone) = (count(false, &[Found::Open]), count(false, &[Found::Lone]));
-    let spacing = median(&mut found.into_par_iter().map(|(spacing, _)| spacing).collect::<Vec<_>>());
+    let spacings = found.into_par_iter().zip(0..distinct.len() as u32).filter(|(_, at)| is_examined(*at));
+    let spacing = median(&mut spacings.map(|((spacing, _), _)| spacing).collect::<Vec<_>>());
     Ok(spacing.map(|spacing| Coverage { spacing, covered, open, lone, covered_aslant }))
+}
+
+/// Whether one of the points at each position is examined.
+fn examined_positions(distinct: &DistinctPositions, examined: &[bool]) -> Vec<bool> {
+    let mut all = vec![false; distinct.len()];
+    distinct.of_point().iter().zip(examined).for_each(|(position, examined)| all[*position as usize] |= *examined);
+    all
 }
 
 /// The result for a position.
@@ -165,8 +187,8 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
 
     fn found(&self, aslant: bool) -> Found {
         let normal = |other: &Neighbour| (self.at)(other.index).first().map_or(DVec3::ZERO, side);
-        let around = self.offsets.iter().copied().zip(self.near.iter().map(normal));
-        match surroundings(self.normal, around) == Surroundings::Surface {
+        let (offsets, normals) = (self.offsets.iter().copied(), self.near.iter().map(normal));
+        match surroundings(self.normal, offsets, normals) == Surroundings::Surface {
             false => Found::Lone,
             true if self.is_any_open() => Found::Open,
             true if aslant && self.is_any_open_aslant() => Found::OpenAslant,

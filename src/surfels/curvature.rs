@@ -64,13 +64,14 @@ pub(crate) fn normals_at(
 }
 
 /// Fits the cap of a surfel with the half-axes s and t, whose plane is tangent to the surface, to
-/// the offsets and unit normals of neighbours on the surface. All lengths have the same unit.
+/// the offsets and unit normals of up to [`RADIUS_NEIGHBOURS`] neighbours on the surface. All
+/// lengths have the same unit.
 ///
 /// A paraboloid is fitted by least squares to the neighbours' heights and slopes, each relative to
 /// the distance. The cap is the paraboloid times the fraction of the squares that it explains,
 /// because a poor fit would stand out of the surface. The cap is flat if it would be higher than
 /// [`Cap::HIGHEST`].
-fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]) -> Cap {
+fn fitted(near: impl Iterator<Item = (DVec3, DVec3)>, [s, t]: [DVec3; 2]) -> Cap {
     let normal = s.cross(t).normalize_or_zero();
     let (a, b) = (s / s.length_squared(), t / t.length_squared());
     let near = near.filter(|(offset, other)| is_beside(*offset, normal) && other.dot(normal) > ONE_PIECE);
@@ -91,8 +92,11 @@ fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]
             (DVec3::new(0.0, u, v) * far, rise.dot(t) * far),
         ]
     };
+    let mut all = [[(DVec3::ZERO, 0.0); 3]; RADIUS_NEIGHBOURS];
+    let count = all.iter_mut().zip(near).map(|(slot, near)| *slot = equations(near)).count();
+    let all = all[..count].as_flattened();
     let (mut matrix, mut right, mut squares) = (DMat3::ZERO, DVec3::ZERO, 0.0);
-    for (row, value) in near.clone().flat_map(equations) {
+    for &(row, value) in all {
         matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
         right += row * value;
         squares += value * value;
@@ -102,8 +106,8 @@ fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]
         return Cap::FLAT;
     }
     let found = matrix.inverse() * right;
-    let left = |(row, value): (DVec3, f64)| (row.dot(found) - value).powi(2);
-    let explained = 1.0 - near.flat_map(equations).map(left).sum::<f64>() / squares;
+    let left = |&(row, value): &(DVec3, f64)| (row.dot(found) - value).powi(2);
+    let explained = 1.0 - all.iter().map(left).sum::<f64>() / squares;
     let heights = found * (unit * explained);
     let cap = Cap(heights.as_vec3().to_array());
     if heights.is_finite() && cap.highest() <= Cap::HIGHEST * unit { cap } else { Cap::FLAT }

@@ -75,47 +75,110 @@ impl Symmetric3 {
     /// Only `+ - * / sqrt` are used, so every machine that follows IEEE 754 gets the same bits.
     /// Entries with magnitudes from 1e-150 to 1e150 (or zero) neither overflow nor underflow.
     pub fn eigen(self) -> ([f64; 3], [DVec3; 3]) {
-        let largest =
-            [self.xx, self.yy, self.zz, self.xy, self.xz, self.yz].iter().fold(0.0, |m: f64, e| m.max(e.abs()));
-        if largest == 0.0 || !largest.is_finite() {
-            return ([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
+        let [eigen] = eigen_of([self]);
+        (eigen.values, [0, 1, 2].map(|i| eigen.vector(i)))
+    }
+}
+
+/// The eigenvalues of a matrix in ascending order, and their eigenvectors.
+#[derive(Clone, Copy)]
+pub(crate) struct Eigen {
+    pub values: [f64; 3],
+    /// The eigenvectors, not normalised.
+    vectors: [DVec3; 3],
+}
+
+impl Eigen {
+    /// The unit eigenvector of value `i`.
+    pub fn vector(&self, i: usize) -> DVec3 {
+        self.vectors[i].normalize()
+    }
+}
+
+/// Computes the eigenvectors of several matrices, to the bit as [`Symmetric3::eigen`] computes
+/// those of each.
+///
+/// Every step of the rotations waits for roots and quotients of the step before; several matrices
+/// share the wait.
+pub(crate) fn eigen_of<const LANES: usize>(matrices: [Symmetric3; LANES]) -> [Eigen; LANES] {
+    let largest = matrices.map(|m| {
+        let largest = [m.xx, m.yy, m.zz, m.xy, m.xz, m.yz].iter().fold(0.0, |most: f64, e| most.max(e.abs()));
+        if largest == 0.0 || !largest.is_finite() { None } else { Some(largest) }
+    });
+    let scaled = |entry: fn(&Symmetric3) -> f64| -> Lanes<LANES> {
+        std::array::from_fn(|lane| largest[lane].map_or(0.0, |largest| entry(&matrices[lane]) / largest))
+    };
+    let diagonal = [scaled(|m| m.xx), scaled(|m| m.yy), scaled(|m| m.zz)];
+    // Entry i is the off-diagonal one outside row i and column i.
+    let off = [scaled(|m| m.yz), scaled(|m| m.xz), scaled(|m| m.xy)];
+    let (diagonal, vectors) = rotated(diagonal, off);
+    std::array::from_fn(|lane| {
+        let Some(largest) = largest[lane] else {
+            return Eigen { values: [0.0; 3], vectors: [DVec3::X, DVec3::Y, DVec3::Z] };
+        };
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| diagonal[a][lane].total_cmp(&diagonal[b][lane]));
+        let vector = |i: usize| DVec3::from_array(vectors[i].map(|axis| axis[lane]));
+        Eigen { values: order.map(|i| diagonal[i][lane] * largest), vectors: order.map(vector) }
+    })
+}
+
+/// One number for each matrix.
+type Lanes<const LANES: usize> = [f64; LANES];
+
+/// Diagonalises matrices with these entries on and off the diagonal; returns the diagonals and the
+/// eigenvectors, not normalised.
+fn rotated<const LANES: usize>(
+    mut diagonal: [Lanes<LANES>; 3],
+    mut off: [Lanes<LANES>; 3],
+) -> ([Lanes<LANES>; 3], [[Lanes<LANES>; 3]; 3]) {
+    let (zero, one) = ([0.0; LANES], [1.0; LANES]);
+    let mut vectors = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
+    // Convergence is quadratic: four or five sweeps suffice, and the bound is only a safeguard.
+    for _ in 0..30 {
+        let done: [bool; LANES] = std::array::from_fn(|lane| off.iter().all(|e| e[lane].abs() < 1e-300));
+        if done == [true; LANES] {
+            break;
         }
-        let mut diagonal = [self.xx / largest, self.yy / largest, self.zz / largest];
-        // Entry i is the off-diagonal one outside row i and column i.
-        let mut off = [self.yz / largest, self.xz / largest, self.xy / largest];
-        let mut vectors = [DVec3::X, DVec3::Y, DVec3::Z];
-        // Convergence is quadratic: four or five sweeps suffice, and the bound is only a safeguard.
-        for _ in 0..30 {
-            if off.iter().all(|e| e.abs() < 1e-300) {
-                break;
+        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+            let entry = off[r];
+            off[r] = zero;
+            let keeps: [bool; LANES] = std::array::from_fn(|lane| {
+                let [entry, p, q] = [entry[lane], diagonal[p][lane], diagonal[q][lane]].map(f64::abs);
+                done[lane] | (entry <= f64::EPSILON * 1e-3 * (p * q).sqrt()) | (entry == 0.0)
+            });
+            if keeps == [true; LANES] {
+                continue;
             }
-            for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
-                let entry = off[r];
-                if entry.abs() <= f64::EPSILON * 1e-3 * (diagonal[p].abs() * diagonal[q].abs()).sqrt() || entry == 0.0 {
-                    off[r] = 0.0;
-                    continue;
-                }
-                let theta = (diagonal[q] - diagonal[p]) / (2.0 * entry);
+            let (mut t, mut c, mut s) = (zero, zero, zero);
+            for lane in 0..LANES {
+                let theta = (diagonal[q][lane] - diagonal[p][lane]) / (2.0 * entry[lane]);
                 // The square of a large theta may overflow to infinity; t then becomes zero, which
                 // is its limit.
-                let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let c = 1.0 / (t * t + 1.0).sqrt();
-                let s = t * c;
-                diagonal[p] -= t * entry;
-                diagonal[q] += t * entry;
-                off[r] = 0.0;
-                let (pr, qr) = (off[q], off[p]);
-                off[q] = c * pr - s * qr;
-                off[p] = s * pr + c * qr;
-                let (vp, vq) = (vectors[p], vectors[q]);
-                vectors[p] = vp * c - vq * s;
-                vectors[q] = vp * s + vq * c;
+                t[lane] = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+                c[lane] = 1.0 / (t[lane] * t[lane] + 1.0).sqrt();
+                s[lane] = t[lane] * c[lane];
+            }
+            // A matrix that this rotation would not change keeps the bits of its numbers.
+            let turned = |(mut a, mut b): (Lanes<LANES>, Lanes<LANES>)| {
+                for lane in 0..LANES {
+                    let to = (a[lane] * c[lane] - b[lane] * s[lane], a[lane] * s[lane] + b[lane] * c[lane]);
+                    (a[lane], b[lane]) = if keeps[lane] { (a[lane], b[lane]) } else { to };
+                }
+                (a, b)
+            };
+            (off[q], off[p]) = turned((off[q], off[p]));
+            let (mut of_p, mut of_q) = (vectors[p], vectors[q]);
+            of_p.iter_mut().zip(&mut of_q).for_each(|(p, q)| (*p, *q) = turned((*p, *q)));
+            (vectors[p], vectors[q]) = (of_p, of_q);
+            for lane in 0..LANES {
+                let (change, keeps) = (t[lane] * entry[lane], keeps[lane]);
+                diagonal[p][lane] = if keeps { diagonal[p][lane] } else { diagonal[p][lane] - change };
+                diagonal[q][lane] = if keeps { diagonal[q][lane] } else { diagonal[q][lane] + change };
             }
         }
-        let mut order = [0, 1, 2];
-        order.sort_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b]));
-        (order.map(|i| diagonal[i] * largest), order.map(|i| vectors[i].normalize()))
     }
+    (diagonal, vectors)
 }
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ impl Ellipse {
     /// If the smallest ellipse of some points contains the others, it is the smallest ellipse of
     /// all points. So points are added one by one, each time the point that lies farthest outside.
     pub fn around_points(points: &[DVec2], least: f64) -> Self {
-        let mut some = Vec::with_capacity(points.len().min(8));
+        let mut some = Vec::new();
         loop {
             let found = Self::of_few(&some, least);
             let inverse = found.0.inverse();
@@ -63,12 +63,14 @@ impl Ellipse {
         let mut take = |shape: Option<Self>| {
             let Some(shape) = shape.filter(|shape| shape.square() < square) else { return };
             let thick = shape.at_least(least, points);
-            if thick.square() < square && points.iter().all(|point| thick.holds(*point)) {
+            if thick.square() < square && thick.holds(points) {
                 (best, square) = (thick, thick.square());
             }
         };
         for (k, a) in points.iter().enumerate() {
-            take(Some(Self(outer(*a))));
+            if !is_too_wide(*a, points, least) {
+                take(Some(Self(outer(*a))));
+            }
             for (l, b) in points.iter().enumerate().skip(k + 1) {
                 take(Some(Self(outer(*a) + outer(*b))));
                 points[l + 1..].iter().for_each(|c| take(Self::through([*a, *b, *c])));
@@ -90,6 +92,9 @@ impl Ellipse {
     /// The ellipse with half-axes of at least the length `least`. If the shorter half-axis is
     /// lengthened, the longer one keeps its direction and becomes as short as `points` permit.
     fn at_least(self, least: f64, points: &[DVec2]) -> Self {
+        if self.is_surely_thick(least) {
+            return self;
+        }
         let [major, minor] = self.half_axes();
         if minor.length() >= least {
             return self;
@@ -102,9 +107,21 @@ impl Ellipse {
         Self(outer(along * length) + outer(along.perp() * least))
     }
 
-    /// Whether a point lies inside, up to rounding.
-    fn holds(&self, point: DVec2) -> bool {
-        point.dot(self.0.inverse() * point) <= HELD
+    /// Whether the shorter half-axis is longer than `least` by more than any rounding error. This
+    /// takes no angle, unlike the half-axes.
+    fn is_surely_thick(&self, least: f64) -> bool {
+        /// A bound of the relative rounding errors, here and in the half-axes.
+        const ROUNDING: f64 = 1e-9;
+        let [a, b, c] = [self.0.x_axis.x, self.0.x_axis.y, self.0.y_axis.y];
+        let (mean, apart) = (0.5 * (a + c), 0.5 * (a - c));
+        let squared = mean - (apart * apart + b * b).sqrt();
+        squared > least * least * (1.0 + ROUNDING) + mean * ROUNDING
+    }
+
+    /// Whether all points lie inside, up to rounding.
+    fn holds(&self, points: &[DVec2]) -> bool {
+        let inverse = self.0.inverse();
+        points.iter().all(|point| point.dot(inverse * *point) <= HELD)
     }
 
     /// The product of the half-axes.
@@ -121,6 +138,13 @@ impl Ellipse {
         let length = |d: DVec2| d.dot(self.0 * d).max(0.0).sqrt();
         [along * length(along), along.perp() * length(along.perp())]
     }
+}
+
+/// Whether a point lies so far from the line through the origin and `a` that no ellipse along that
+/// line with a shorter half-axis of `least` contains it: by 1 %, far more than [`HELD`] allows.
+fn is_too_wide(a: DVec2, points: &[DVec2], least: f64) -> bool {
+    let limit = 1.02 * least * least * a.length_squared();
+    points.iter().any(|point| a.perp_dot(*point).powi(2) > limit)
 }
 
 /// The largest eigenvalue of a matrix whose eigenvalues are real.
@@ -148,7 +172,7 @@ mod tests {
         for round in 0..200 {
             let points: Vec<DVec2> = (0..1 + round % 9).map(|_| DVec2::new(next(), 0.3 * next())).collect();
             let found = Ellipse::around_points(&points, 0.1);
-            assert!(points.iter().all(|point| found.holds(*point)), "{points:?}");
+            assert!(found.holds(&points), "{points:?}");
             assert!(found.half_axes()[1].length() >= 0.1 - 1e-9);
             // By trial: directions of the longer half-axis, and ratios of the two, with the least
             // length that contains the points.

@@ -3,9 +3,8 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::eigen::Symmetric3;
 use super::graph::NeighbourGraph;
-use super::neighbours::Neighbour;
+use super::planes::{Neighbourhoods, TOGETHER};
 use super::positions::DistinctPositions;
 use super::sizes::{Rough, cell_ellipse, grown, local_limits, lone_radius};
 use crate::Progress;
@@ -29,6 +28,9 @@ pub(crate) const LONE_RADIUS: f64 = 0.5;
 /// The smallest and largest radius of a surfel, world units: products of half-axes are normal f32
 /// numbers.
 pub(crate) const RADIUS_RANGE: (f64, f64) = (1e-18, 1e18);
+
+/// The number of positions that a thread processes at a time; a multiple of [`TOGETHER`].
+const CHUNK: usize = 4096;
 
 /// The estimate at a position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,15 +90,25 @@ pub(crate) fn estimate(
     progress: &dyn Progress,
 ) -> Estimates {
     let wanted = |index: usize| wanted.is_none_or(|flags| flags.get(index).copied().unwrap_or(false));
-    progress.begin("estimating normals and radii", distinct.len() as u64);
-    let mut of_position = vec![Estimate::default(); distinct.len()];
-    let graph = NeighbourGraph::visit(
-        (distinct, NORMAL_NEIGHBOURS, NORMAL_NEIGHBOURS),
-        wanted,
-        &mut of_position,
-        progress,
-        |index, neighbours| estimate_at(distinct, index, neighbours, up),
-    );
+    let count = distinct.len();
+    progress.begin("finding neighbours", count as u64);
+    let degree = (distinct, NORMAL_NEIGHBOURS, NORMAL_NEIGHBOURS);
+    let graph = NeighbourGraph::visit(degree, wanted, &mut vec![(); count], progress, |_, _| ());
+    progress.end();
+    progress.begin("estimating normals and radii", count as u64);
+    let mut of_position = vec![Estimate::default(); count];
+    of_position.par_chunks_mut(CHUNK).zip((0..count).into_par_iter().step_by(CHUNK)).for_each(|(chunk, first)| {
+        for (group, first) in chunk.chunks_mut(TOGETHER).zip((first..).step_by(TOGETHER)) {
+            let last = first + group.len() - 1;
+            if (first..=last).any(wanted) {
+                let indices = std::array::from_fn(|lane| (first + lane).min(last) as u32);
+                let estimates = estimates_at((distinct, &graph), indices, up);
+                let each = (first..).zip(group.iter_mut().zip(estimates));
+                each.filter(|(index, _)| wanted(*index)).for_each(|(_, (slot, estimate))| *slot = estimate);
+            }
+        }
+        progress.advance(chunk.len() as u64);
+    });
     progress.end();
     if distinct.len() < 2 {
         let limited = vec![false; distinct.len()];
@@ -128,18 +140,22 @@ pub(crate) fn estimate(
     Estimates { of_position, median_spacing, limited, graph }
 }
 
-fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour], up: DVec3) -> Estimate {
-    let center = distinct.position(index);
-    let mut offsets = [DVec3::ZERO; NORMAL_NEIGHBOURS + 1];
-    let mut count = 1;
-    // The first offset stays zero: it is the position itself.
-    for (offset, neighbour) in offsets.iter_mut().skip(1).zip(neighbours) {
-        *offset = distinct.position(neighbour.index) - center;
-        count += 1;
-    }
-    let offsets = &offsets[..count];
-    let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
-    let Some(nearest) = neighbours.first() else {
+/// The estimates at several positions.
+fn estimates_at(
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+    indices: [u32; TOGETHER],
+    up: DVec3,
+) -> [Estimate; TOGETHER] {
+    let near = Neighbourhoods::around((distinct, graph), indices);
+    let normals = near.normals(up);
+    std::array::from_fn(|lane| estimate_at(near.of_neighbours(lane), normals[lane], (up, distinct.scale())))
+}
+
+/// The estimate at a position with the unit normal `normal`, from the offsets of its neighbours, the
+/// nearest first; `scale` is in scaled units per world unit.
+fn estimate_at(offsets: &[DVec3], normal: DVec3, (up, scale): (DVec3, f64)) -> Estimate {
+    let world = |length: f64| (length / scale).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
+    let Some(nearest) = offsets.first() else {
         let (s, t) = up.any_orthonormal_pair();
         return Estimate {
             axes: [s, t].map(|axis| (axis * LONE_RADIUS).as_vec3().to_array()),
@@ -147,39 +163,12 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
             rough: Rough::default(),
         };
     };
-    let normal = fitted_normal(offsets, up);
-    let axes = cell_ellipse(&offsets[1..], normal);
+    let axes = cell_ellipse(offsets, normal);
     Estimate {
         axes: axes.map(|axis| (axis.normalize() * world(axis.length())).as_vec3().to_array()),
-        spacing: world(nearest.squared_distance.sqrt()) as f32,
-        rough: Rough::of(&offsets[1..], normal),
+        spacing: world(nearest.length()) as f32,
+        rough: Rough::of(offsets, normal),
     }
-}
-
-/// The direction in which the offsets vary least, in the half-space of the unit vector `up`. For
-/// offsets on a line it is the direction perpendicular to the line that is nearest to `up`; if all
-/// are equal, it is `up`.
-pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
-    let largest = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs().max_element()));
-    if largest == 0.0 {
-        return up;
-    }
-    // Offsets are scaled to about 1, so the squares below are equally exact in dense and sparse
-    // parts.
-    let mean = offsets.iter().map(|o| o / largest).sum::<DVec3>() / offsets.len() as f64;
-    let covariance = Symmetric3::scatter(offsets.iter().map(|o| o / largest - mean));
-    let (values, vectors) = covariance.eigen();
-    let across_line = |line: DVec3| {
-        // Up comes first; the other axes serve a line along up.
-        let candidates = [up, DVec3::X, DVec3::Y].map(|axis| axis - line * axis.dot(line));
-        candidates.into_iter().find(|c| c.length_squared() > 1e-12).map_or(up, DVec3::normalize)
-    };
-    // A width of a millionth of the length is only the rounding of the coordinates.
-    let normal = if values[1] <= 1e-12 * values[2] { across_line(vectors[2]) } else { vectors[0] };
-    let side = normal.dot(up);
-    let flip =
-        side < 0.0 || (side == 0.0 && normal.to_array().into_iter().find(|c| *c != 0.0).is_some_and(|c| c < 0.0));
-    if flip { -normal } else { normal }
 }
 
 /// The median (the upper one of two middle values); None without values.
@@ -188,28 +177,32 @@ pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
+/// The median (the upper one of two middle values) of a few numbers, without a branch.
+pub(crate) fn median_of_few<const COUNT: usize>(mut values: [f64; COUNT]) -> f64 {
+    // Neighbours are put in order, in as many rounds as there are values.
+    for round in 0..COUNT {
+        for k in (round % 2..COUNT - 1).step_by(2) {
+            let (a, b) = (values[k], values[k + 1]);
+            (values[k], values[k + 1]) = if b < a { (b, a) } else { (a, b) };
+        }
+    }
+    values[COUNT / 2]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn degenerate_neighbourhoods_have_a_normal() {
-        let up = DVec3::Z;
-        assert_eq!(fitted_normal(&[DVec3::ZERO; 5], up), up);
-        for size in [1e-150, 1.0, 1e150] {
-            let line: Vec<_> = (0..13).map(|i| DVec3::new(i as f64, 0.0, i as f64) * size).collect();
-            let normal = fitted_normal(&line, up);
-            assert!(normal.distance(DVec3::new(-1.0, 0.0, 1.0).normalize()) < 1e-12, "{normal}");
-            let upright: Vec<_> = (0..13).map(|i| DVec3::new(0.0, 0.0, i as f64) * size).collect();
-            assert!(fitted_normal(&upright, up).distance(DVec3::X) < 1e-12);
-            let wall: Vec<_> = (0..13).map(|i| DVec3::new(0.0, (i % 4) as f64, (i / 4) as f64) * size).collect();
-            assert!(fitted_normal(&wall, up).distance(DVec3::X) < 1e-12);
-        }
-    }
-
-    #[test]
     fn median_is_the_middle() {
         assert_eq!(median(&mut []), None);
         assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
+        let mut random = crate::random::Random::stream(2, 0);
+        for _ in 0..1000 {
+            let mut few: [f64; 9] = std::array::from_fn(|_| (8.0 * random.number()).floor());
+            let [first, eight @ ..] = few;
+            assert_eq!((Some(median_of_few(few)), first >= 0.0), (median(&mut few), true));
+            assert_eq!(Some(median_of_few(eight)), median(&mut { eight }));
+        }
     }
 }

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 
 use super::caps::caps_of;
 use super::creases::clips;
-use super::estimate::{NORMAL_NEIGHBOURS, fitted_normal};
+use super::estimate::NORMAL_NEIGHBOURS;
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
 use super::orient::{self, Orientation};
 use super::outliers::drop_outliers;
+use super::planes::{Neighbourhoods, TOGETHER};
 use super::positions::DistinctPositions;
 use super::sheets;
 use super::sizes::{RADIUS_NEIGHBOURS, Size, measure_triangles, offsets, open_radius};
@@ -290,15 +291,15 @@ fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
 
 /// The normal of the plane fitted to each position and its neighbours, on the side of `up`.
 fn fit_normals(distinct: &DistinctPositions, graph: &NeighbourGraph, up: DVec3) -> Vec<[f32; 3]> {
-    (0..distinct.len() as u32)
-        .into_par_iter()
-        .map_init(Vec::new, |near, index| {
-            near.clear();
-            near.push(DVec3::ZERO);
-            near.extend(offsets(distinct, graph, index, NORMAL_NEIGHBOURS));
-            fitted_normal(near, up).as_vec3().to_array()
-        })
-        .collect()
+    let groups = (0..distinct.len()).into_par_iter().step_by(TOGETHER);
+    let mut normals = vec![[0.0; 3]; distinct.len()];
+    normals.par_chunks_mut(TOGETHER).zip(groups).with_min_len(1024).for_each(|(group, first)| {
+        let last = first + group.len() - 1;
+        let indices: [u32; TOGETHER] = std::array::from_fn(|lane| (first + lane).min(last) as u32);
+        let fitted = Neighbourhoods::around((distinct, graph), indices).normals(up);
+        group.iter_mut().zip(fitted).for_each(|(slot, normal)| *slot = normal.as_vec3().to_array());
+    });
+    normals
 }
 
 /// The median distance to the nearest other position, world units; None if there is only one

@@ -21,20 +21,15 @@ pub(crate) fn is_beside(offset: DVec3, normal: DVec3) -> bool {
 }
 
 /// The largest number of corners of a cell; a cell that would exceed it is not cut further.
-const MOST_CORNERS: usize = 32;
-
-/// A corner of a cell, and the neighbour across the edge from it to the next corner; None for an
-/// edge of the initial square.
-#[derive(Clone, Copy, Default)]
-struct Corner {
-    at: DVec2,
-    across: Option<DVec2>,
-}
+pub(crate) const MOST_CORNERS: usize = 32;
 
 /// The Voronoi cell of a point in its tangent plane, bounded by its nearest neighbours.
 pub(crate) struct Cell {
-    corners: [Corner; MOST_CORNERS],
+    corners: [DVec2; MOST_CORNERS],
     count: usize,
+    /// One bit per corner: whether a neighbour bounds the edge from it to the next corner, and not
+    /// the initial square.
+    bounded: u32,
     /// The axes of the plane.
     basis: [DVec3; 2],
 }
@@ -47,11 +42,11 @@ impl Cell {
     /// `enough` is not cut further.
     pub fn new(offsets: &[DVec3], normal: DVec3, (reach, enough): (f64, f64)) -> Self {
         let (e1, e2) = normal.any_orthonormal_pair();
-        let mut corners = [Corner::default(); MOST_CORNERS];
+        let mut corners = [DVec2::ZERO; MOST_CORNERS];
         for (corner, (x, y)) in corners.iter_mut().zip([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]) {
-            corner.at = DVec2::new(x, y) * reach;
+            *corner = DVec2::new(x, y) * reach;
         }
-        let mut cell = Self { corners, count: 4, basis: [e1, e2] };
+        let mut cell = Self { corners, count: 4, bounded: 0, basis: [e1, e2] };
         let mut farthest = 2.0 * reach * reach;
         for offset in offsets {
             let (neighbour, squared) = (DVec2::new(offset.dot(e1), offset.dot(e2)), offset.length_squared());
@@ -59,50 +54,63 @@ impl Cell {
                 break;
             }
             if is_beside(*offset, normal) && cell.clip(neighbour) {
-                farthest = cell.corners().iter().fold(0.0, |m: f64, corner| m.max(corner.at.length_squared()));
+                farthest = cell.corners().iter().fold(0.0, |m: f64, corner| m.max(corner.length_squared()));
             }
         }
         cell
     }
 
-    fn corners(&self) -> &[Corner] {
+    fn corners(&self) -> &[DVec2] {
         &self.corners[..self.count]
+    }
+
+    /// Whether a neighbour bounds the edge from corner `k` to the next one.
+    fn is_bounded(&self, k: usize) -> bool {
+        self.bounded >> k & 1 != 0
     }
 
     /// Cuts off the part that is nearer to `neighbour` than to the point; returns whether there was
     /// such a part.
     fn clip(&mut self, neighbour: DVec2) -> bool {
         let half = 0.5 * neighbour.length_squared();
-        let beyond = |corner: &Corner| corner.at.dot(neighbour) - half;
-        if self.count + 1 >= MOST_CORNERS || self.corners().iter().all(|corner| beyond(corner) <= 0.0) {
+        let mut beyond = [0.0; MOST_CORNERS];
+        let mut farthest = f64::NEG_INFINITY;
+        for (beyond, corner) in beyond.iter_mut().zip(self.corners()) {
+            *beyond = corner.dot(neighbour) - half;
+            farthest = if *beyond > farthest { *beyond } else { farthest };
+        }
+        if self.count + 1 >= MOST_CORNERS || farthest <= 0.0 {
             return false;
         }
-        let (before, count) = (self.corners, self.count);
-        self.count = 0;
+        let (count, bounded) = (self.count, self.bounded);
+        let mut before = [DVec2::ZERO; MOST_CORNERS];
+        before[..count].copy_from_slice(self.corners());
+        (self.count, self.bounded) = (0, 0);
         for k in 0..count {
-            let (from, to) = (before[k], before[if k + 1 < count { k + 1 } else { 0 }]);
-            let (a, b) = (beyond(&from), beyond(&to));
-            let crossing = || from.at + (to.at - from.at) * (a / (a - b));
+            let next = if k + 1 < count { k + 1 } else { 0 };
+            let (from, to, a, b) = (before[k], before[next], beyond[k], beyond[next]);
+            let crossing = || from + (to - from) * (a / (a - b));
             if a <= 0.0 {
-                self.push(from);
+                self.push(from, bounded >> k & 1 != 0);
                 if b > 0.0 {
-                    self.push(Corner { at: crossing(), across: Some(neighbour) });
+                    self.push(crossing(), true);
                 }
             } else if b <= 0.0 {
-                self.push(Corner { at: crossing(), across: from.across });
+                self.push(crossing(), bounded >> k & 1 != 0);
             }
         }
         true
     }
 
-    fn push(&mut self, corner: Corner) {
+    fn push(&mut self, corner: DVec2, bounded: bool) {
         self.corners[self.count] = corner;
+        self.bounded |= u32::from(bounded) << self.count;
         self.count += 1;
     }
 
     /// Whether neighbours bound the cell on all sides.
     pub fn is_closed(&self) -> bool {
-        self.corners().iter().all(|corner| corner.across.is_some())
+        (0..self.count).all(|k| self.is_bounded(k))
     }
 
     /// The unit vectors x and y of the tangent plane; x × y is its normal.
@@ -113,10 +121,9 @@ impl Cell {
     /// The corners where the edges of two neighbours meet, as (x, y) in the tangent plane relative
     /// to the point. Corners of the initial square are left out.
     pub fn closed(&self) -> impl Iterator<Item = DVec2> {
-        let corners = self.corners();
-        let before = |k: usize| corners[if k > 0 { k - 1 } else { corners.len() - 1 }].across;
-        let closed = move |(k, corner): (usize, &Corner)| before(k).and(corner.across).map(|_| corner.at);
-        corners.iter().enumerate().filter_map(closed)
+        let before = |k: usize| self.is_bounded(if k > 0 { k - 1 } else { self.count - 1 });
+        let closed = move |(k, corner): (usize, &DVec2)| (before(k) && self.is_bounded(k)).then_some(*corner);
+        self.corners().iter().enumerate().filter_map(closed)
     }
 
     /// The corners of [`Self::closed`] in space, relative to the point.

@@ -31,6 +31,7 @@ mod orient;
 mod outliers;
 mod painting;
 pub mod part;
+mod planes;
 mod positions;
 mod preparation;
 pub mod sampling;
@@ -39,6 +40,7 @@ pub mod simplify;
 mod sizes;
 pub mod smooth;
 mod spacing;
+mod survey;
 #[cfg(test)]
 mod tests;
 mod texture;
@@ -58,6 +60,7 @@ pub use self::orient::Orientation;
 pub use self::painting::build_painted;
 pub use self::preparation::Preparation;
 pub use self::sizes::{Size, Triangle};
+pub use self::survey::{Sample, Survey, survey};
 pub use self::triangles::{MeshPreparation, with_triangles};
 
 use self::estimate::RADIUS_RANGE;

@@ -1,6 +1,8 @@
 //! The distinct positions of a cloud, in an order that does not depend on that of the points.
 
 use std::cmp::Ordering;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,6 +23,8 @@ pub(crate) struct DistinctPositions {
     positions: Vec<[f64; 3]>,
     /// For each point, the index of its position.
     of_point: Vec<u32>,
+    /// The points in the order of their positions.
+    in_order: Vec<u32>,
     /// A power of two that scales the scene's extent to about one, so squares neither overflow nor
     /// underflow.
     scale: f64,
@@ -64,29 +68,55 @@ impl DistinctPositions {
                 morton_order(cell(&a), cell(&b)).then_with(lexicographic)
             })
         });
-        let mut positions: Vec<[f64; 3]> = Vec::with_capacity(points.len());
-        let mut of_point = vec![0; points.len()];
-        for &(_, index) in &order {
-            let position = place(&points[index as usize]);
-            if positions.last() != Some(&position) {
-                positions.push(position);
-            }
-            of_point[index as usize] = (positions.len() - 1) as u32;
-        }
-        Ok(Self { positions, of_point, scale })
+        let sorted: Vec<[f64; 3]> = order.par_iter().map(|&(_, index)| place(&points[index as usize])).collect();
+        let in_order: Vec<u32> = order.into_par_iter().map(|(_, index)| index).collect();
+        let mut number = 0;
+        let of_place: Vec<u32> = (0..sorted.len())
+            .map(|place| {
+                number += u32::from(place > 0 && sorted[place] != sorted[place - 1]);
+                number
+            })
+            .collect();
+        let of_point = scattered(&in_order, &of_place);
+        let mut positions = sorted;
+        positions.dedup();
+        Ok(Self { positions, of_point, in_order, scale })
     }
 
     /// Keeps only the positions whose flag in `keep` is set, and the points at them.
     pub fn retain(&mut self, keep: &[bool]) {
-        let mut numbers = Vec::with_capacity(keep.len());
-        let mut kept = 0;
-        for &keep in keep {
-            numbers.push(kept);
-            kept += u32::from(keep);
-        }
+        let numbers = |flags: &[bool]| -> Vec<u32> {
+            let mut kept = 0;
+            let number = |keep: &bool| {
+                kept += u32::from(*keep);
+                kept - u32::from(*keep)
+            };
+            flags.iter().map(number).collect()
+        };
+        let of_position = numbers(keep);
+        let keeps: Vec<bool> = self.of_point.par_iter().map(|position| keep[*position as usize]).collect();
+        let of_point = numbers(&keeps);
+        self.in_order.retain(|point| keeps[*point as usize]);
+        self.in_order.par_iter_mut().for_each(|point| *point = of_point[*point as usize]);
         self.of_point.retain(|&position| keep[position as usize]);
-        self.of_point.par_iter_mut().for_each(|position| *position = numbers[*position as usize]);
+        self.of_point.par_iter_mut().for_each(|position| *position = of_position[*position as usize]);
         retain(&mut self.positions, keep);
+    }
+
+    /// Calls `make` with each point and its position, and returns the results in the order of the
+    /// points.
+    ///
+    /// The calls are in the order of the positions. Neighbours in space are then near each other in
+    /// memory, whatever the order of the points, so `make` reads what it needs several times as
+    /// fast.
+    pub fn map_points<T: Copy + Send + Sync>(&self, make: impl Fn(u32, u32) -> T + Sync) -> Vec<T> {
+        let at = |&point: &u32| make(point, self.of_point[point as usize]);
+        let values: Vec<T> = self.in_order.par_iter().map(at).collect();
+        if self.positions.len() == self.of_point.len() {
+            return self.of_point.par_iter().map(|place| values[*place as usize]).collect();
+        }
+        let places: Vec<u32> = (0..values.len() as u32).into_par_iter().collect();
+        scattered(&self.in_order, &places).into_par_iter().map(|place| values[place as usize]).collect()
     }
 
     /// The number of distinct positions.
@@ -120,6 +150,13 @@ impl DistinctPositions {
     pub fn scale(&self) -> f64 {
         self.scale
     }
+}
+
+/// A list with each of `values` at its place in `places`, which are all places of the list.
+fn scattered(places: &[u32], values: &[u32]) -> Vec<u32> {
+    let list: Vec<AtomicU32> = (0..places.len()).into_par_iter().map(|_| AtomicU32::new(0)).collect();
+    places.par_iter().zip(values).for_each(|(place, value)| list[*place as usize].store(*value, Relaxed));
+    list.into_par_iter().map(AtomicU32::into_inner).collect()
 }
 
 /// The largest e with 2^e <= x, for x > 0; at least -1000.

@@ -8,8 +8,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::estimate::fitted_normal;
 use super::graph::NeighbourGraph;
+use super::planes::fitted_normal;
 use super::positions::DistinctPositions;
 
 /// The sine of the point's elevation over a neighbour's plane at which the neighbour's weight falls

@@ -108,12 +108,8 @@ fn seen(one: &Gaussian, camera: &Camera, rules: Rules) -> Option<Seen> {
         }
     };
     let entry = |a: usize, b: usize| jacobian[a].dot(in_camera * jacobian[b]);
-    let covariance = DMat2::from_cols_array(&[
-        entry(0, 0) + rules.dilation,
-        entry(0, 1),
-        entry(1, 0),
-        entry(1, 1) + rules.dilation,
-    ]);
+    let covariance =
+        DMat2::from_cols_array(&[entry(0, 0) + rules.dilation, entry(0, 1), entry(1, 0), entry(1, 1) + rules.dilation]);
     let direction = match camera.projection {
         Projection::Pinhole => (center - camera.eye).normalize(),
         Projection::Orthographic => camera.rotation.row(2),

@@ -10,7 +10,7 @@ use epsplat::low_level::plan::{
     ACCUMULATORS, Accumulator, BlendFormat, ColorNeed, Facts, Known, Organisation, Plan, Raster, RasterDepth,
     SceneNeeds, Settings, Splats, Surface, check,
 };
-use epsplat::low_level::scene::{Camera, Detail, KernelShape, LevelFacts, Scene};
+use epsplat::low_level::scene::{Camera, Detail, Form, KernelShape, LevelFacts, Optics, Projection, Scene};
 
 use super::any_options::{self, pick};
 use super::any_scene::{self, Sampled};
@@ -29,22 +29,28 @@ const REGULAR: usize = 20;
 /// of them also occurs here.
 pub fn all_needs() -> &'static [SceneNeeds] {
     static ALL: LazyLock<Vec<SceneNeeds>> = LazyLock::new(|| {
-        let (mut kept, mut known, mut pairs) = (Vec::new(), HashSet::new(), HashSet::new());
+        let (mut kept, mut known, mut pairs) = (Vec::new(), HashSet::new(), [HashSet::new(), HashSet::new()]);
         let mut drawn = 0;
         for seed in SEEDS {
-            let mut random = Random(seed);
+            let (mut random, mut lenses) = (Random(seed), Random(seed + 1_000_000));
             let Sampled { scene, camera, .. } = any_scene::sampled(&mut random);
             let facts = Facts::of(&scene);
             for _ in 0..PICTURES {
-                let Some(needs) = picture(&scene, facts.clone(), &camera, &mut random) else { continue };
+                let both = picture(&scene, facts.clone(), &camera, (&mut random, &mut lenses));
+                let Some((plain, lensed)) = both else { continue };
                 drawn += 1;
-                let values = values(&needs);
-                let mut news = 0;
-                for (k, a) in values.iter().enumerate() {
-                    news += values[..k].iter().filter(|b| pairs.insert((a.clone(), (*b).clone()))).count();
-                }
-                if (news > 0 || drawn % REGULAR == 0) && known.insert(needs) {
-                    kept.push(needs);
+                // Pictures through lenses have pairs of their own, and add to the others.
+                let each = [(Some(plain), REGULAR), (lensed, 10 * REGULAR)];
+                for ((needs, regular), pairs) in each.into_iter().zip(&mut pairs) {
+                    let Some(needs) = needs else { continue };
+                    let values = values(&needs);
+                    let mut news = 0;
+                    for (k, a) in values.iter().enumerate() {
+                        news += values[..k].iter().filter(|b| pairs.insert((a.clone(), (*b).clone()))).count();
+                    }
+                    if (news > 0 || drawn % regular == 0) && known.insert(needs) {
+                        kept.push(needs);
+                    }
                 }
             }
         }
@@ -81,8 +87,14 @@ fn values(needs: &SceneNeeds) -> Vec<String> {
     set.chain(left_out).chain(alternatives).collect()
 }
 
-/// The needs of a random render of a scene; `None` if its options are refused.
-fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random) -> Option<SceneNeeds> {
+/// The needs of a random render of a scene, and of some again through a lens or as 3D Gaussians;
+/// `None` if its options are refused.
+fn picture(
+    scene: &Scene,
+    mut facts: Facts,
+    camera: &Camera,
+    (random, lenses): (&mut Random, &mut Random),
+) -> Option<(SceneNeeds, Option<SceneNeeds>)> {
     let mut options = Settings {
         organisation: pick(random, &[Organisation::Auto, Organisation::Tile, Organisation::Scatter]),
         ..any_options::sampled(scene, random)
@@ -100,7 +112,24 @@ fn picture(scene: &Scene, mut facts: Facts, camera: &Camera, random: &mut Random
     change(&mut facts, &mut options, random);
     check::options(&options, false).ok()?;
     check::scene(&facts, &options, false).ok()?;
-    Plan::of(&facts, &adapter(random), camera, &options, &sizes(random)).ok().map(|plan| plan.needs)
+    let (adapter, sizes) = (adapter(random), sizes(random));
+    let needs = |facts: &Facts, camera: &Camera| {
+        Plan::of(facts, &adapter, camera, &options, &sizes).ok().map(|plan| plan.needs)
+    };
+    let of = |camera: &Camera| needs(&facts, camera);
+    let through = lensed(camera, lenses).filter(|camera| check::lens(&facts, camera, &options, false).is_ok());
+    // Where 3D Gaussians may be drawn, they take the place of a lens.
+    let solid = Facts { solid: true, ..facts.clone() };
+    let as_solid = || check::scene(&solid, &options, false).ok().and_then(|()| needs(&solid, camera));
+    Some((of(camera)?, through.as_ref().and_then(of).or_else(as_solid)))
+}
+
+/// The camera with a lens, in one of four renders.
+fn lensed(camera: &Camera, random: &mut Random) -> Option<Camera> {
+    let forms = [Form::Perspective, Form::Fisheye, Form::Equirectangular];
+    let form = pick(random, &forms);
+    let optics = Some(Optics::of(form).with_radial([-0.1, 0.0, 0.0, 0.0]));
+    (random.one_in(4) && camera.projection == Projection::Pinhole).then(|| Camera { optics, ..camera.clone() })
 }
 
 /// Gives the facts what small scenes do not have: many surfels, levels of detail, fades, and low

@@ -103,8 +103,8 @@ fn order_and_repetition_do_not_change_a_bit() {
     }
 }
 
-/// `fixed` computes the same sums with 64-bit atomics as without. A plain run draws every third hard
-/// case.
+/// `fixed` computes the same sums with 64-bit atomics as without. A plain run draws every third
+/// hard case.
 #[test]
 fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let Some(with) = common::gpu() else { return };

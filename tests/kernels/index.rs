@@ -193,7 +193,7 @@ fn triangles_are_named_by_their_faces() {
     let Some(gpu) = common::gpu() else { return };
     let device = Backend::gpu(gpu);
     let count = meshes::sphere(3, false).triangles.len();
-    assert!(count > 256 && count % 7 != 0);
+    assert!(count > 256 && !count.is_multiple_of(7));
     let own: Vec<usize> = (0..count).collect();
     let turned: Vec<usize> = (0..count).map(|k| (k * 7 + 3) % count).collect();
     let unlit = Settings { shading: Shading::Unlit, maps: Maps::of(&[Map::Index]), ..Settings::default() };

@@ -159,7 +159,7 @@ fn the_device_filters_as_the_reference_does() {
     for (low_pass, file, from, to) in [
         (LowPass::Max, "lowpass_max.wgsl", "1.0 / FILTER_RADIUS", "1.01 / FILTER_RADIUS"),
         (LowPass::Ewa, "filter.wgsl", "filter_.r_yy * x.y", "1.001 * filter_.r_yy * x.y"),
-        (LowPass::Max, "camera_pinhole.wgsl", "clamp(abc.z, 1.0 / high, 1.0 / low)", "abc.z"),
+        (LowPass::Max, "perspective.wgsl", "clamp(abc.z, 1.0 / high, 1.0 / low)", "abc.z"),
     ] {
         let Some(gpu) = common::gpu() else { return };
         let sources = Sources::default().replace(file, from, to).unwrap();

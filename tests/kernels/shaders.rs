@@ -436,12 +436,17 @@ fn absent_parts_have_their_partners_signatures() {
     alike_in("oit", oit.to_vec(), &["weight_before"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray", "seen_at"];
-    let (pinhole, orthographic) =
-        (signatures(text_of("camera_pinhole.wgsl")), signatures(text_of("camera_orthographic.wgsl")));
-    for function in shared {
-        assert!(pinhole.contains_key(function));
-        assert_eq!(pinhole.get(function), orthographic.get(function));
+    let orthographic = signatures(text_of("camera_orthographic.wgsl"));
+    for camera in ["camera_pinhole.wgsl", "camera_lens.wgsl"] {
+        let mut own = signatures(text_of("perspective.wgsl"));
+        own.extend(signatures(text_of(camera)));
+        for function in shared {
+            assert!(own.contains_key(function), "{camera}");
+            assert_eq!(own.get(function), orthographic.get(function), "{camera}");
+        }
     }
+    alike("lens_", &["see_plane", "plane_ray"]);
+    alike("frame_", &["frame_of", "frame_rows", "frame_normal", "frame_holds_center"]);
 }
 
 /// The names in a kernel's code, in order, without comments.

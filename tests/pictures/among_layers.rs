@@ -65,6 +65,10 @@ fn settings(composite: Composite) -> Settings {
     Settings { composite, shading: Shading::Unlit, kernel: "constant".parse().unwrap(), maps, ..Settings::default() }
 }
 
+/// The depth and the straight colour of a triangle, how it is composited with the sheets, the straight
+/// colours of the layers from front to back, and a depth that one of them has.
+type Case = (f64, [f32; 4], Composite, Vec<[f32; 4]>, f32);
+
 /// An opaque triangle hides the sheets behind it and shows through those before it; a translucent
 /// one shows what is behind it. It counts as one of the nearest layers.
 #[test]
@@ -84,7 +88,7 @@ fn a_triangle_is_a_surface_like_all_others() {
     let Colors::Linear(colors) = sheets(&before_and_behind).colors else { unreachable!() };
     let [a, b, c] = [colors[0], colors[1], colors[2]];
     let all = Composite::Layers(ALL_LAYERS);
-    let cases: [(f64, [f32; 4], Composite, Vec<[f32; 4]>, f32); 10] = [
+    let cases: [Case; 10] = [
         (7.0, TRIANGLE, all, vec![a, b, TRIANGLE], 7.0),
         (7.0, TRIANGLE, Composite::Sorted, vec![a, b, TRIANGLE], 7.0),
         (2.0, TRIANGLE, all, vec![TRIANGLE], 2.0),

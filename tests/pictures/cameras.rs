@@ -199,7 +199,9 @@ fn sets_that_cannot_be_rendered_end_in_a_sentence() {
     render(&wide, &[], 1, &["wide.json", "frame 1", "camera_angle_x must lie between 0 and pi"]);
     let nested = folder.file("nested.json", transforms(LENS, &[good("x"), good("b"), good("x.png/y")]));
     render(&nested, &[], 2, &["views/x.png/y.png would lie in", "views/x.png, which is a file"]);
-    render(&distorted, &[], 1, &["distorted.json", "k1 = 0.01", "--ignore-distortion"]);
+    let unknown = transforms(&format!(r#"{LENS}, "camera_model": "RAD_TAN_THIN_PRISM_FISHEYE""#), &[good("a")]);
+    let unknown = folder.file("unknown.json", unknown);
+    render(&unknown, &[], 1, &["unknown.json", "RAD_TAN_THIN_PRISM_FISHEYE, is not rendered", "--ignore-distortion"]);
     let set = set(LENS, &[good("a")]);
     render(&set, &["--size", "9x9"], 2, &["contradicts", "64x48"]);
     render(&set, &["--scale", "0"], 2, &["positive"]);

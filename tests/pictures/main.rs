@@ -18,6 +18,7 @@ mod hard_cases;
 mod images;
 mod invariance;
 mod layers;
+mod lenses;
 mod materials;
 mod matrix;
 mod nearest;

@@ -18,9 +18,7 @@ use epsplat::low_level::metrics::DECISION_MARGIN;
 use epsplat::low_level::plan::{Facts, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::color::linear_to_srgb;
-use epsplat::low_level::scene::{
-    Camera, Colors, Composite, Lens, LowPass, Map, Maps, Samples, Scene, Shading, Up, gaussian,
-};
+use epsplat::low_level::scene::{Camera, Composite, Lens, LowPass, Map, Maps, Samples, Scene, Shading, Up, gaussian};
 use epsplat::low_level::surfels::build;
 use glam::DVec3;
 
@@ -86,9 +84,8 @@ fn errors(expected: &[([f64; 4], bool)], shown: &Frame) -> (f64, f64) {
         // Codes above 1 are clamped.
         (0..4).map(move |k| (shown[k] - expected.0[k].min(f64::from(u8::from(k == 3)).max(shown[3]))).abs())
     });
-    let (sum, count, most) = errors.fold((0.0, 0, 0.0f64), |(sum, count, most), error| {
-        (sum + error * error, count + 1, most.max(error))
-    });
+    let (sum, count, most) =
+        errors.fold((0.0, 0, 0.0f64), |(sum, count, most), error| (sum + error * error, count + 1, most.max(error)));
     ((sum / f64::from(count)).sqrt(), most)
 }
 
@@ -159,7 +156,12 @@ fn device_and_twin_agree() {
             Settings { low_pass: LowPass::None, ..options() },
             Settings { samples: Samples::FOUR, ..options() },
         ] {
-            let twin = frame(&scene, &camera, &Settings { maps: Maps::of(&[Map::Decision]), ..of.clone() }, &Backend::Reference);
+            let twin = frame(
+                &scene,
+                &camera,
+                &Settings { maps: Maps::of(&[Map::Decision]), ..of.clone() },
+                &Backend::Reference,
+            );
             let shown = frame(&scene, &camera, &of, &backend);
             let margins = twin.map(Map::Decision).unwrap();
             let (mut sum, mut count) = (0.0, 0);
@@ -188,9 +190,9 @@ fn order_and_memory_do_not_show() {
     let scene = scene(&gaussians);
     let small = |bytes| Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), bytes));
     let core = common::core_gpu().map(Backend::gpu).unwrap();
-    let above = Camera::look_at(
-        (96, 96), Lens::Fov(45.0), DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, Some(DVec3::Y), Up::Y, 0.05,
-    ).unwrap();
+    let above =
+        Camera::look_at((96, 96), Lens::Fov(45.0), DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, Some(DVec3::Y), Up::Y, 0.05)
+            .unwrap();
     for camera in [above, cameras()[2].1.clone()] {
         let first = bits(&frame(&scene, &camera, &options(), &backend));
         for seed in [1, 2] {
@@ -243,7 +245,10 @@ fn a_file_is_drawn_without_an_option() {
     let camera = toward((96, 96), Lens::Fov(45.0), [1.6, -2.9, 2.1]);
     let (rmse, _) = errors(&picture(&gaussians, &camera, Rules::PUBLISHED), &io::exr::read(&output).unwrap());
     assert!(rmse < 1e-6, "{rmse:e}");
-    succeeds(&[&["render", text(&path), "-o", text(&output), "--aov", "depth,transmittance,layers,index"], &view[..]].concat());
+    succeeds(
+        &[&["render", text(&path), "-o", text(&output), "--aov", "depth,transmittance,layers,index"], &view[..]]
+            .concat(),
+    );
     let other = folder.path("other.exr");
     let refused: [(&[&str], i32, &str); 12] = [
         (&["--composite", "opaque"], 2, "no surface"),
@@ -251,7 +256,7 @@ fn a_file_is_drawn_without_an_option() {
         (&["--composite", "moments"], 2, "no surface"),
         (&["--blend", "nearest"], 2, "no surface"),
         (&["--backend", "raster"], 2, "rasteriser"),
-        (&["--lod", "4px"], 2, "no levels of detail"),
+        (&["--lod", "4px"], 2, "levels of detail"),
         (&["--kernel", "constant"], 2, "kernel of their own"),
         (&["--lowpass", "ewa"], 2, "--lowpass gaussians"),
         (&["--outline", "6"], 2, "--outline"),

@@ -437,7 +437,7 @@ fn kernels_and_twins_paint_alike() {
         broken("textures.wgsl", "0.5 * log2(max(texels, 1.0))", "0.6 * log2(max(texels, 1.0))"),
         broken("textures.wgsl", "1.0 - place.y", "place.y"),
         broken("triangles_texture.wgsl", "number == 0u", "number != 0u"),
-        broken("corner_pinhole.wgsl", "a * b * c / of_depth", "a * b / of_depth"),
+        broken("corner_perspective.wgsl", "a * b * c / of_depth", "a * b / of_depth"),
     ];
     for (number, lens) in [Lens::Fov(60.0), Lens::OrthographicHeight(2.4)].into_iter().enumerate() {
         let camera = Camera::look_at((160, 120), lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Up::Y, 0.01).unwrap();

@@ -1,6 +1,6 @@
 // Stage 3 for small splats, one invocation each. Same interface as accumulate_spread.wgsl.
 // #import accumulate::{accumulate_splat}
-// #import cull::{slot_of, surfel_in}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{is_large, reach}

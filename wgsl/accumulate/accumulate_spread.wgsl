@@ -7,7 +7,7 @@
 // #import *::{front_at}
 // #import blend|winner::{Attributes, attributes_of}
 // #import blend|winner_second::{blend}
-// #import cull::{surfel_in}
+// #import cull|cull_absent|cull_twice::{surfel_in}
 // #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{footprint, is_large, pixel_index, reach}

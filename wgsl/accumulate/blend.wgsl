@@ -1,7 +1,7 @@
 // Adds an accepted fragment to its pixel's sums, in the attribute pass of the compute path
 // (accumulate.wgsl) or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
 // #import *::{Term, accumulate_depth, quantise, settle}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import color_*::{accumulate_color, color_of}
 // #import copies::{hold_copies}
 // #import count::{accumulate_count}

@@ -4,7 +4,7 @@
 // Twin: src/scene/harmonics.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x8f3393ef138ea48e
 // #import attributes::{attribute_vector, attribute_word}
-// #import camera_*::{ray_to}
+// #import camera_orthographic|perspective::{ray_to}
 // #import center|center_doubled::{relative_center}
 // #import words|words_long::{surfel_at}
 

@@ -1,7 +1,7 @@
 // Splats are lit, each at its centre, and the lit colours are blended ("complete per-vertex
 // illumination", paper 000, section 5.3). No normals are summed. Same interface as lit_pixels.wgsl.
 // Twin: src/passes/lit.rs.
-// #import camera_*::{ray_to}
+// #import camera_orthographic|perspective::{ray_to}
 // #import center|center_doubled::{relative_center}
 // #import layout::{AWAY, Splat}
 // #import normal_*::{surfel_normal}

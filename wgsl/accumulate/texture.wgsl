@@ -3,7 +3,8 @@
 // Twin: src/scene/texture.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0x37656be3471cf966
 // #import *::{Term, add, add_pair, sum_at, term}
-// #import camera_*::{area_in_pixel, seen_at}
+// #import camera_*::{seen_at}
+// #import camera_orthographic|perspective::{area_in_pixel}
 // #import color_textured::{color_part}
 // #import layout::{held, held_band}
 // #import textures::{seen_texture}

@@ -207,8 +207,8 @@ fn most_slope() -> vec2<f32> {
     return vec2<f32>(0.0);
 }
 
-fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
-    return x * held.intrinsics.xy;
+fn image_step(x: vec2<f32>, depths: vec2<f32>, focal: vec2<f32>) -> vec2<f32> {
+    return x * focal;
 }
 
 fn third_row(depth: f32) -> f32 {

@@ -63,6 +63,10 @@ struct View {
     // The layout of textures in their common plane (src/scene/atlas.rs). xy: its corner; z: the
     // side of a cell; w: the number of cells in a row.
     atlas: vec4<f32>,
+    // A lens that is no pinhole (src/scene/optics.rs); else 0. Its coefficients: the leading parts
+    // of k1 to k4, of k5 to k7 and the widening, and of p1, p2, s1 and s2; then their trailing
+    // parts; then x: the largest radius before the distortion, y: the largest of a splat's centre.
+    lens: array<vec4<f32>, 7>,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.

@@ -4,7 +4,8 @@
 // Twin: src/passes/select.rs.
 // #import axes_*::{growth}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
-// #import camera_*::{axis_image, ball_sine, is_beside, ray_to}
+// #import camera_*::{axis_image, ball_sine, is_beside}
+// #import camera_orthographic|perspective::{ray_to}
 // #import layout::{Surfel, TreeNode, held}
 // #import project::{CULL_BACK, rotate_plain}
 // #import select_fades::{ALL_CUTS, cuts_that_divide}

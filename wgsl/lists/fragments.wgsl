@@ -8,8 +8,8 @@
 // #import accumulator_raster|visibility::{nearest}
 // #import blend::{fragment_weight}
 // #import blend|winner::{Attributes, attributes_of}
-// #import camera_*::{Fragment}
-// #import cull::{slot_of, surfel_in}
+// #import camera_orthographic|perspective::{Fragment}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{TILE, band_pixels, footprint, is_large, large_splat, pixel_index, reach}
 // #import fragments_*::{is_listed, with_rank}

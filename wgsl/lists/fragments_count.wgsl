@@ -1,7 +1,7 @@
 // Visibility pass that counts the fragments of each pixel, for the pixels' lists. Same interface as
 // nearest_depth.wgsl. Host side: src/passes/fragments.rs.
 // #import accumulator_raster|visibility::{nearest}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import layout::{NOTHING}
 
 fn mark_of(surfel: u32) -> u32 {

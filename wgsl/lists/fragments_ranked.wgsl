@@ -1,7 +1,7 @@
 // Fragments of the same depth are sorted by the ranks of their surfels: their order in the stored
 // scene, or in the tree. Ranks depend on the surfels' values, not on their positions in files. Same
 // interface as fragments_untied.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import fragments::{FRAGMENT_ROWS, Record, fragments}
 // #import fragments_*::{is_before_end}
 // #import select::{rank_of}

@@ -1,6 +1,6 @@
 // Fragments of the same depth may come in any order, because no result depends on it. Same
 // interface as fragments_ranked.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import fragments::{Record}
 
 const TIES: bool = false;

@@ -7,7 +7,7 @@
 // All loops end, by 1 of src/gpu/loops.rs: 0x9b37ce054ecaded7
 // #import accumulator_raster|visibility::{nearest}
 // #import blend::{fragment_weight}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import color_*::{surfel_alpha}
 // #import footprint::{band_pixels}
 // #import fragments::{list_starts, pixels_start, starts}

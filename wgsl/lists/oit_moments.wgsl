@@ -6,7 +6,7 @@
 // #import *::{front_at}
 // #import accumulator_raster|visibility::{nearest}
 // #import blend::{fragment_weight}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import color_*::{surfel_alpha}
 // #import layout::{kept_depth}
 // #import oit::{depth_fraction, held_back}

@@ -4,7 +4,8 @@
 // Same interface as axes_own.wgsl.
 // Twin: src/passes/conic.rs.
 // #import attributes::{attribute_word}
-// #import camera_*::{most_slope, slope_in_view, widening}
+// #import camera_*::{most_slope, slope_in_view}
+// #import camera_orthographic|perspective::{widening}
 // #import layout::{Surfel, held}
 // #import project::{rotate_plain}
 // #import vectors::{cross3, unit3}

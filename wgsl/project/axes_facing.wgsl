@@ -1,7 +1,7 @@
 // The half-axes of a point that faces the camera: to the right and down in the image. Same
 // interface as axes_own.wgsl.
 // Twin: src/passes/facing.rs.
-// #import camera_*::{widening}
+// #import camera_orthographic|perspective::{widening}
 // #import layout::{Surfel, held}
 // #import vectors::{norm3}
 

@@ -4,7 +4,7 @@
 // (outline.wgsl).
 // Same interface as clip_absent.wgsl. Twins: src/scene/clip.rs, src/passes/footprint.rs.
 // #import attributes::{attribute_word}
-// #import camera_*::{Fragment, homogeneous}
+// #import camera_orthographic|perspective::{Fragment, homogeneous}
 // #import filter|lowpass_none::{FILTER_ROWS}
 // #import outline::{beyond_outline}
 // #import records::{SplatRecord}

@@ -1,5 +1,5 @@
 // Disks end at their rims only. Same interface as clip.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import records::{SplatRecord}
 
 struct Clip {

@@ -5,11 +5,12 @@
 // (src/passes/curved.rs).
 // Same interface as flat.wgsl. Twins: src/scene/cap.rs, src/passes/curved.rs.
 // #import attributes::{attribute_word}
-// #import camera_*::{Fragment, holds_center, image_step, shear, spread_of, third_row, toward}
-// #import camera_*::{widening}
+// #import camera_orthographic|perspective::{Fragment, image_step, shear, spread_of, third_row}
+// #import camera_orthographic|perspective::{toward, widening}
 // #import clip::{CLIP_ROWS, cuts}
 // #import double::{Double}
 // #import filter|lowpass_none::{FILTERED, FILTER_ROWS, Filter}
+// #import frame_*::{Frame, frame_holds_center, frame_normal, frame_of, frame_rows}
 // #import layout::{AWAY, Splat, held}
 // #import lowpass_*::{filtered}
 // #import project::{CULL_BACK}
@@ -77,17 +78,19 @@ fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
 // Returns the cap of the surfel whose disk has the homography h, and replaces rows, extent and
 // depths in h by those of the cap.
 fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
-    let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
-    let r = max(norm3(s), norm3(t));
+    let frame = frame_of(center, s, t);
+    let p = frame.p;
+    let r = frame.radius;
     // In units of r, so that no product under- or overflows.
-    let unit_s = s / r;
-    let unit_t = t / r;
-    let m = inverse_of(unit_s, unit_t);
+    let unit_s = frame.s / r;
+    let unit_t = frame.t / r;
+    let m = frame_rows(frame, unit_s, unit_t);
+    let normal = frame_normal(frame, m);
     let heights = world_heights(index) * (held.unit / r);
     let height = extremes(heights) * r;
-    let slope = norm2(vec2<f32>(s.z, t.z));
-    let low_shift = m[2] * height.x;
-    let high_shift = m[2] * height.y;
+    let slope = norm2(vec2<f32>(frame.s.z, frame.t.z));
+    let low_shift = normal * height.x;
+    let high_shift = normal * height.y;
     // The rounding of these sums is less than 4 * 2^-24 of the magnitudes, a quarter of this
     // margin.
     let blur = 1e-6 * (abs(p.z) + slope + height.y - height.x);
@@ -102,7 +105,7 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
         (*h).centered = false;
         return Cap(vec3<f32>(0.0), 0.0, 0.0, 0.0, 0.0);
     }
-    let centered = holds_center(*h);
+    let centered = frame_holds_center(*h);
     (*h).centered = centered;
     let depth = select(max(held.near, depths.y), p.z, centered);
     let scale = widening(depth) / r;
@@ -111,11 +114,11 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     }
     // The step per pixel on the plane at that depth, and the point of the anchor's ray there
     // relative to the centre, both in units of r.
-    let per_pixel = scale / held.intrinsics.xy;
+    let per_pixel = scale / frame.focal;
     var start = -(*h).offset * per_pixel;
     var start_z = 0.0;
     if (!centered) {
-        let ray = (vec2<f32>((*h).anchor) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
+        let ray = (vec2<f32>((*h).anchor) + 0.5 - frame.principal) / frame.focal;
         start = (ray * depth - p.xy) / r;
         start_z = (depth - p.z) / r;
     }
@@ -125,7 +128,7 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     // D, the part of the rays' advance that all pixels share.
     let forward = toward(p, depth);
     (*h).a_low = vec3<f32>(dot3(forward, m[0]), dot3(forward, m[1]), dot3(forward, m[2]));
-    let extent = box_extent(*h, array<vec3<f32>, 5>(p, s, t, low_shift, high_shift), depths);
+    let extent = box_extent(*h, frame, array<vec3<f32>, 5>(p, frame.s, frame.t, low_shift, high_shift), depths);
     (*h).low = extent.xy;
     (*h).high = extent.zw;
     (*h).depth_low = depths.x;
@@ -136,9 +139,9 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
 // The first and the last point of the image (xy, zw) that two sheared boxes around the cap have in
 // common (Seen::extent in the twin). `disk` is p, s, t and the displacements of the centre to the
 // cap's lowest and highest point; `depths` is the range of the cap's depths.
-fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
-    let along_ray = sheared_extent(h, disk, depths, shear(disk[0]), h.centered);
-    let straight = sheared_extent(h, disk, depths, vec2<f32>(0.0), false);
+fn box_extent(h: Homography, frame: Frame, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
+    let along_ray = sheared_extent(h, frame, disk, depths, shear(disk[0]), h.centered);
+    let straight = sheared_extent(h, frame, disk, depths, vec2<f32>(0.0), false);
     return vec4<f32>(max(along_ray.xy, straight.xy), min(along_ray.zw, straight.zw));
 }
 
@@ -146,6 +149,7 @@ fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> ve
 // through the cap's centre.
 fn sheared_extent(
     h: Homography,
+    frame: Frame,
     disk: array<vec3<f32>, 5>,
     depths: vec2<f32>,
     ratio: vec2<f32>,
@@ -163,14 +167,14 @@ fn sheared_extent(
     let last = rest + half + max(low, high);
     let before = max(depths, vec2<f32>(held.near));
     let middle = select(
-        ratio * held.intrinsics.xy + held.intrinsics.zw,
+        ratio * frame.focal + frame.principal,
         vec2<f32>(h.anchor) + 0.5 + h.offset,
         centered,
     );
     let margin = select(1.0, 0.0, centered);
     return vec4<f32>(
-        middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0))) - margin,
-        middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0))) + margin,
+        middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0)), frame.focal) - margin,
+        middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0)), frame.focal) + margin,
     );
 }
 

@@ -2,7 +2,7 @@
 // around an axis along the view (Schuetz and Wimmer 2015, section III). Same interface as
 // flat.wgsl.
 // Twin: src/passes/facing.rs.
-// #import camera_*::{Fragment, homogeneous, intersect, nearest_between}
+// #import camera_orthographic|perspective::{Fragment, homogeneous, intersect, nearest_between}
 // #import double::{Double}
 // #import filter|lowpass_none::{Filter}
 // #import layout::{Splat, held}

@@ -2,7 +2,7 @@
 // that contain it (src/scene/fade.rs). A fragment's weight is multiplied by the fraction of the
 // cuts in that range. Depths have no weights, so each sample takes the nearest depth of one cut.
 // Same interface as fade_absent.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import clip::{CLIP_ROWS}
 // #import curved|facing|flat::{CAP_ROWS}
 // #import epsilon_*::{farthest_shown}

@@ -1,5 +1,5 @@
 // Every splat is in all cuts. Same interface as fade.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import records::{SplatRecord}
 
 struct Fade {

@@ -1,6 +1,6 @@
 // Flat surfels: disks, intersected by their homographies. Scans without radii are curved instead.
 // Same interface as curved.wgsl and facing.wgsl. Twin: `met` in src/passes/footprint.rs.
-// #import camera_*::{Fragment, intersect, nearest_between}
+// #import camera_orthographic|perspective::{Fragment, intersect, nearest_between}
 // #import clip::{clipped}
 // #import double::{Double}
 // #import filter|lowpass_none::{Filter}

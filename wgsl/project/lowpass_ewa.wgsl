@@ -4,7 +4,7 @@
 // Gaussian kernel if the disk's image is approximated by the affine one at its centre. Same
 // interface as lowpass_max.wgsl.
 // Twin: src/passes/lowpass.rs.
-// #import camera_*::{Fragment, plane_depth}
+// #import camera_orthographic|perspective::{Fragment, plane_depth}
 // #import filter::{filter_rho2}
 // #import filter|lowpass_none::{Filter}
 // #import layout::{held}

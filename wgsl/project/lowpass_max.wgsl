@@ -1,7 +1,7 @@
 // The larger of the object-space kernel and a round screen-space one, which is the one of smaller
 // rho (Botsch et al. 2005, section 4.2). Same interface as lowpass_ewa.wgsl.
 // Twin: src/passes/lowpass.rs.
-// #import camera_*::{Fragment, plane_depth}
+// #import camera_orthographic|perspective::{Fragment, plane_depth}
 // #import filter::{filter_rho2}
 // #import filter|lowpass_none::{Filter}
 // #import layout::{held}

@@ -1,6 +1,6 @@
 // No low-pass: a pixel's centre is in the disk or not. Same interface as filter.wgsl with
 // lowpass_max.wgsl or lowpass_ewa.wgsl.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import records::{SplatRecord}
 // #import rows::{Homography}
 

@@ -4,13 +4,14 @@
 // need not wait. Where project_draws.wgsl is part of the module, the invocation also draws the
 // splat's nearest depths, which is stage 2.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xcef1f98530961466
+// All loops end, by 1 of src/gpu/loops.rs: 0xf75e6d161ada379d
+// #import around::{around, is_again}
 // #import axes_*::{half_axes}
-// #import camera_*::{homography}
+// #import camera_orthographic|perspective::{homography}
 // #import center|center_doubled::{relative_center}
 // #import clip::{clip_of}
 // #import copies::{copies_of}
-// #import cull::{place_for, slot_of}
+// #import cull|cull_absent|cull_twice::{place_for, slot_of}
 // #import curved|facing|flat::{curve, is_back}
 // #import double::{Double, product, sum}
 // #import fade::{fade_of}
@@ -124,6 +125,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     }
     let cap = curve(&h, index, center, axes.s, axes.t);
     let filter_ = low_pass(&h);
+    around(&h, slot);
 
     // The bounds are conservative: the margin covers the rounding of the extent, and the footprint
     // decides which pixels are covered.
@@ -156,7 +158,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     }
     splats[slot] = splat_record(splat, place, filter_);
     draw_projected(splat, filter_, index);
-    return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
+    return select(OUT_OF_VIEW, IN_VIEW, visible || !exists || is_again(slot));
 }
 
 // Counts the surfels out of view, because they are fewer than those in view. Copies count too.

@@ -2,7 +2,7 @@
 // cap and its fade (filter.wgsl, clip.wgsl, curved.wgsl, fade.wgsl). If slots are not in the order
 // of the surfels, spare bits of the anchor store the surfel's batch (cull.wgsl).
 // #import clip::{CLIP_ROWS, clip_in, with_clip}
-// #import cull::{anchor_of, anchor_words}
+// #import cull|cull_absent|cull_twice::{anchor_of, anchor_words}
 // #import curved|facing|flat::{CAP_ROWS, cap_in, with_cap}
 // #import fade::{FADE_ROWS, fade_in, with_fade}
 // #import filter|lowpass_none::{FILTER_ROWS, Filter, with_filter}

@@ -34,3 +34,7 @@ fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
 fn shared_depth(corner: Corner) -> Double {
     return corner.depth;
 }
+
+fn has_image(triangle: Triangle) -> bool {
+    return true;
+}

@@ -4,7 +4,7 @@
 // Host side and the meaning of the variants: src/passes/raster.rs.
 // #import blend::{attributes_without_place}
 // #import blend|winner::{Attributes, attributes_of}
-// #import camera_*::{Fragment, homogeneous_row}
+// #import camera_orthographic|perspective::{Fragment, homogeneous_row}
 // #import clip::{clip_in}
 // #import curved|facing|flat::{Bend, FACES, cap_in}
 // #import fade::{fade_in}

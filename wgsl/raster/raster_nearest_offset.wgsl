@@ -1,7 +1,7 @@
 // One pass with the rasteriser's depth test alone, by interpolated depths: the fastest use of the
 // rasteriser. Same interface as raster_nearest_exact.wgsl.
 // #import blend|winner_second::{blend}
-// #import camera_*::{depth_of, depth_order}
+// #import camera_orthographic|perspective::{depth_of, depth_order}
 // #import layout::{Splat}
 // #import raster::{ShapeCorner, carried, fragment_of}
 // #import raster_targets_*::{Targets, targets}

@@ -3,7 +3,7 @@
 // depth tests, but the decisions of these tests are not exact. `depth_order` is linear over the
 // image of a plane and largest in front.
 // #import blend|winner_second::{blend}
-// #import camera_*::{depth_of, depth_order}
+// #import camera_orthographic|perspective::{depth_of, depth_order}
 // #import epsilon_*::{farthest_shown, radius_of}
 // #import footprint::{pixel_index}
 // #import layout::{Splat}

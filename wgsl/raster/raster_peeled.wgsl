@@ -1,6 +1,6 @@
 // Depth peeling (Everitt 2001): fragments that belong to earlier layers are not drawn again.
 // Host side: src/passes/peel.rs.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import epsilon_*::{radius_of}
 // #import footprint::{pixel_index}
 // #import peeled::{PEELED_FRONTS, PEELED_WORDS}

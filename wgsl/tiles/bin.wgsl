@@ -6,7 +6,7 @@
 // Host side: src/passes/tiles.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xce41422d9aa244b7
 // #import covered::{TILE_ROWS, TILE_WIDTH}
-// #import cull::{slot_of, surfel_in}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{filter_in}
 // #import footprint::{Rectangle, is_large, large_splat, reach}

@@ -10,7 +10,7 @@
 // #import blend|winner::{Attributes, attributes_of}
 // #import column::{Column, all_listed, column_at, front_of, gather, large_listed, listed_slot}
 // #import covered::{covered_tile, tiles_across}
-// #import cull::{surfel_in}
+// #import cull|cull_absent|cull_twice::{surfel_in}
 // #import epsilon_*::{deepest_accepted}
 // #import fade::{takes_sample}
 // #import filter|lowpass_none::{Filter, filter_in}

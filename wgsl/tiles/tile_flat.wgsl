@@ -1,5 +1,5 @@
 // Disks in tiles. Same interface as tile_curved.wgsl.
-// #import camera_*::{rim}
+// #import camera_orthographic|perspective::{rim}
 // #import filter|lowpass_none::{Filter}
 // #import footprint::{Rectangle}
 // #import layout::{Splat}

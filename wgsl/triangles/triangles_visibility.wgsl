@@ -1,8 +1,8 @@
 // The visibility pass of triangles: the nearest one at every pixel; at equal depths, the one with
 // the greatest index. One invocation per triangle; one workgroup for each large triangle, and for
 // each rare one, for which f32 is not enough. Twin: src/passes/triangles.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xbcd81421c0e56bd5
-// #import corner_*::{homogeneous_depth, is_before}
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x5ceb1bca6abfb79f
+// #import corner_*::{has_image, homogeneous_depth, is_before}
 // #import corners::{Corner}
 // #import footprint::{QUEUE_START, Rectangle, TILE, pixel_index}
 // #import layout::{WORKGROUP, held, held_band, hold, kept_depth, linear_index}
@@ -68,7 +68,7 @@ fn reach_of(triangle: Triangle) -> Rectangle {
     let first = clamp(ceil(vec2<f32>(across.x, down.x) - 0.5), low, high + 1.0);
     let last = clamp(floor(vec2<f32>(across.y, down.y) - 0.5), low - 1.0, high);
     // Negated, so that NaN gives an empty range.
-    if (!all(first <= last)) {
+    if (!(all(first <= last) && has_image(triangle))) {
         return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
     }
     return Rectangle(vec2<u32>(first), vec2<u32>(last));

@@ -2,10 +2,10 @@
 // epsilon of the nearest depth, and the place in the scene of the surfel that has this weight. A
 // first pass over the fragments finds the weights, a second pass the surfels.
 // Twin: src/passes/index.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x0e36003a44d83c69
 // #import *::{front_at}
 // #import blend::{fragment_weight}
-// #import cull::{slot_of, surfel_in}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import epsilon_*::{radius_of}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{TILE, footprint, is_large, large_splat, pixel_index, reach}
@@ -25,6 +25,11 @@ override INDEX_IMAGE: u32;
 // round the same weight differently.
 const AS_GREAT: u32 = 4u;
 
+// The first of the two words of a pixel of the band.
+fn index_word(pixel: u32) -> u32 {
+    return pixel * IMAGE_WORDS + INDEX_IMAGE;
+}
+
 // Enters a fragment in the map: its weight or, if `names` is set and the weight is the greatest,
 // the place of its surfel. Positive weights order as their bits. Places are stored as 2^32 - 1 -
 // place, so that among equal weights the first surfel wins, and a cleared word means no surfel.
@@ -35,7 +40,7 @@ fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool)
         return;
     }
     let weight = bitcast<u32>(fragment_weight(fragment));
-    let at = pixel * IMAGE_WORDS + INDEX_IMAGE;
+    let at = index_word(pixel);
     if (!names) {
         atomicMax(&indexed[at], weight);
     } else if (weight + AS_GREAT >= atomicLoad(&indexed[at])) {

@@ -1,7 +1,7 @@
 // The index map where a triangle shows: a word that is greater than any weight, then the triangle's
 // number. Twin: src/passes/index.rs.
 // #import footprint::{band_pixels}
-// #import index::{INDEX_IMAGE, indexed}
+// #import index::{index_word, indexed}
 // #import layout::{WORKGROUP, held, held_band, hold, linear_index}
 // #import maps::{DEPTH_IMAGE}
 // #import resolve::{IMAGE_WORDS}
@@ -30,9 +30,10 @@ fn index_triangles(
     }
     // The image has the depth of the surface that shows, which is the triangle's or another.
     let depth = beside[2u * pixel + 1u].w;
-    let out = pixel * IMAGE_WORDS;
-    if (depth > 0.0 && bitcast<f32>(atomicLoad(&indexed[out + DEPTH_IMAGE])) == depth * held.world) {
-        atomicStore(&indexed[out + INDEX_IMAGE], OF_TRIANGLE);
-        atomicStore(&indexed[out + INDEX_IMAGE + 1u], nearest_triangle(pixel, x, row + held_band.first_row).x);
+    let shown = bitcast<f32>(atomicLoad(&indexed[pixel * IMAGE_WORDS + DEPTH_IMAGE]));
+    if (depth > 0.0 && shown == depth * held.world) {
+        let at = index_word(pixel);
+        atomicStore(&indexed[at], OF_TRIANGLE);
+        atomicStore(&indexed[at + 1u], nearest_triangle(pixel, x, row + held_band.first_row).x);
     }
 }

@@ -3,7 +3,7 @@
 // depth test). Needs 64-bit atomics. Same interface as nearest_depth.wgsl.
 // #import accumulator_raster|visibility::{nearest}
 // #import attributes::{attribute_word}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import layout::{kept_depth}
 
 // The nearest fragment of each pixel: kept_depth() in the high word and colour in the low word. A

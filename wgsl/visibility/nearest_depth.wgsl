@@ -1,7 +1,7 @@
 // Visibility pass that stores only the nearest depth of each pixel. Same interface as
 // nearest_color.wgsl.
 // #import accumulator_raster|visibility::{nearest}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import layout::{kept_depth}
 
 fn mark_of(surfel: u32) -> u32 {

@@ -1,7 +1,7 @@
 // A pixel shows one side of a surface: that of its nearest fragment. Fragments within epsilon
 // behind it that show the other side, at an outline or in a thin part, are left out.
 // Twin: src/passes/accumulate.rs.
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 // #import epsilon_*::{farthest_shown}
 // #import fade::{meets_front}
 

@@ -5,7 +5,7 @@
 // Twin: src/passes/visibility.rs.
 // All loops end, by 1, 2 of src/gpu/loops.rs: 0x276af496a9cf6f78
 // #import *::{keep_nearest, mark_of}
-// #import cull::{slot_of, surfel_in}
+// #import cull|cull_absent|cull_twice::{slot_of, surfel_in}
 // #import fade::{takes_sample}
 // #import filter|lowpass_none::{Filter, filter_in}
 // #import footprint::{TILE, footprint, is_large, large_splat, pixel_index, reach}

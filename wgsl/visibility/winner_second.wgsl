@@ -2,7 +2,7 @@
 // nearest depth; among several such fragments, the colour whose word is greatest. Both passes
 // evaluate the same footprint, so the nearest fragment has exactly the stored depth.
 // #import blend|winner::{Attributes}
-// #import camera_*::{Fragment}
+// #import camera_orthographic|perspective::{Fragment}
 
 // The colour of each pixel's nearest fragment; cleared before.
 @group(0) @binding(43) var<storage, read_write> winners: array<atomic<u32>>;

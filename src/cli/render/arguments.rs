@@ -110,7 +110,7 @@ pub(super) struct ViewArguments {
     /// nerfstudio, cameras.json that of 3D Gaussian Splatting. COLMAP's model is binary or text, in
     /// the folder itself or in its sparse/0. Each picture is named after its camera's image,
     /// folders included
-    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "ortho", "intrinsics", "pixel_size"])]
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "eye", "from", "azimuth", "elevation", "target", "up", "fov", "projection", "ortho", "intrinsics", "pixel_size"])]
     pub(super) cameras: Option<PathBuf>,
     /// N pictures around the scene, from the elevation of the default view or the side of --from
     ///

@@ -166,8 +166,8 @@ fn tell(arguments: &Arguments, views: Vec<Written>, writers: NonZeroUsize, start
 ///
 /// # Errors
 ///
-/// [`Error::Malformed`] if a lens is distorted, unless `--ignore-distortion` is given, or an error
-/// of a view that the arguments contradict.
+/// [`Error::Malformed`] if a lens is of a model that is not rendered, unless `--ignore-distortion`
+/// is given, or an error of a view that the arguments contradict.
 fn views(arguments: &Arguments, path: &Path, target: &Target) -> Result<Vec<(PathBuf, View)>> {
     let cameras = arguments.views.lens.read(path, arguments.camera.size)?;
     let view = |camera: cameras::NamedCamera| {

@@ -7,7 +7,6 @@ mod splats;
 mod transforms;
 
 use std::collections::HashMap;
-use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -27,35 +26,9 @@ pub struct NamedCamera {
     pub name: String,
     /// Lens and pose.
     pub camera: CameraFile,
-    /// The first reason why the lens is no pinhole; None if it is one. [`camera`](Self::camera)
-    /// ignores distortion.
-    pub distortion: Option<Distortion>,
-}
-
-/// A reason why a lens is no pinhole.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Distortion {
-    /// A coefficient that is not 0: its name and value.
-    Coefficient(&'static str, f64),
-    /// A model of fisheye lenses, or the key that says so. Even without coefficients the distance
-    /// from the principal point grows with the angle and not with its tangent.
-    Fisheye(&'static str),
-}
-
-impl Distortion {
-    /// Returns the distortion of a coefficient; None if it is 0.
-    fn of(name: &'static str, value: f64) -> Option<Self> {
-        (value != 0.0).then_some(Self::Coefficient(name, value))
-    }
-}
-
-impl fmt::Display for Distortion {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Coefficient(name, value) => write!(formatter, "{name} = {value}"),
-            Self::Fisheye(name) => write!(formatter, "{name}: a fisheye lens"),
-        }
-    }
+    /// The name of a model whose lens is not drawn: [`camera`](Self::camera) is then a pinhole with
+    /// its focal lengths.
+    pub undrawn: Option<&'static str>,
 }
 
 /// Reads the cameras of a JSON file, given the default size of pictures.
@@ -84,8 +57,9 @@ const READ: &str = "its kind is not known; cameras are a transforms.json, a list
 /// - `transforms.json`, as NeRF, instant-ngp and nerfstudio write it. `transform_matrix` is
 ///   camera-to-world with the axes of OpenGL (x right, y up, z back). The lens is `fl_x fl_y cx cy`
 ///   in pixels of a picture of `w` x `h`, or `camera_angle_x` (the horizontal field of view,
-///   radians); a frame's own values take precedence over those for all frames. `file_path` is the
-///   name. A list of camera files may stand in place of the frames.
+///   radians), with the distortion `k1 k2 k3 k4 p1 p2` of a `camera_model`; a frame's own values
+///   take precedence over those for all frames. `file_path` is the name. A list of camera files may
+///   stand in place of the frames.
 /// - `cameras.json` of 3D Gaussian Splatting: a list of objects with `img_name`, `width`, `height`,
 ///   `position`, `rotation` (camera-to-world with x right, y down, z forward), `fx` and `fy`.
 /// - `camera_path.json` of nerfstudio: `camera_to_world` with the axes of OpenGL, `fov` (vertical,
@@ -99,8 +73,8 @@ const READ: &str = "its kind is not known; cameras are a transforms.json, a list
 /// # Errors
 ///
 /// [`Error::Read`] if the system cannot read,
-/// [`Error::Malformed`] if a file violates its format, a lens is not a
-/// pinhole even without its distortion, there is no camera, or two have the same name.
+/// [`Error::Malformed`] if a file violates its format, a lens is of no known model, there is no
+/// camera, or two have the same name.
 pub fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
     let (path, cameras) = if path.is_dir() { colmap::read(path)? } else { (path.to_owned(), of_file(path, size)?) };
     check_names(&cameras).map_err(|fault| fault.of(&path))?;

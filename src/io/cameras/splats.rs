@@ -51,7 +51,7 @@ fn camera(index: usize, entry: &Value) -> Result<NamedCamera, String> {
         pose: Pose::Rigid(to_camera, DVec3::from_array(raw.position)),
         near: None,
     };
-    Ok(NamedCamera { name, camera, distortion: None })
+    Ok(NamedCamera { name, camera, undrawn: None })
 }
 
 #[cfg(test)]

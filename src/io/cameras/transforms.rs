@@ -6,13 +6,19 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use super::colmap::Model;
-use super::{Distortion, NamedCamera, name_of};
+use super::colmap::{Model, bent};
+use super::{NamedCamera, name_of};
 use crate::io::camera::{CameraFile, Pose, of_value, rigid};
 use crate::io::values::shown;
-use crate::scene::Lens;
+use crate::scene::{Form, Lens, Optics};
 
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
+/// The name of a whole sphere's camera model.
+const SPHERE: &str = "EQUIRECTANGULAR";
+
+/// The name of the camera model whose coefficients from k4 on are a denominator's.
+const RATIONAL: &str = "FULL_OPENCV";
 
 /// Keys of a pose in a camera file.
 const POSES: [&str; 4] = ["eye", "target", "camera_to_world", "world_to_camera"];
@@ -56,45 +62,52 @@ impl Frame<'_> {
             Some(path) => path.as_str().and_then(name_of).ok_or("its file_path is not a valid file name")?,
         };
         if let Some(camera) = self.of_camera_file() {
-            return Ok(NamedCamera { name, camera: camera?, distortion: None });
+            return Ok(NamedCamera { name, camera: camera?, undrawn: None });
         }
-        let distortion = self.distortion()?;
         let given = match (self.pixels("w")?, self.pixels("h")?) {
             (Some(width), Some(height)) => Some((width, height)),
             (None, None) => None,
             _ => return Err("a size is both w and h".into()),
         };
         let (width, height) = given.unwrap_or(size);
-        let camera = CameraFile {
-            size: given,
-            lens: self.lens(f64::from(width), f64::from(height), given.is_some())?,
-            pose: self.pose()?,
-            near: None,
-        };
-        Ok(NamedCamera { name, camera, distortion })
+        let (lens, undrawn) = self.bent_lens(f64::from(width), f64::from(height), given.is_some())?;
+        let camera = CameraFile { size: given, lens, pose: self.pose()?, near: None };
+        Ok(NamedCamera { name, camera, undrawn })
     }
 
-    /// The first reason why the lens is no pinhole.
-    fn distortion(&self) -> Result<Option<Distortion>, String> {
-        if let Some(value) = self.value("camera_model") {
-            let name = value.as_str().unwrap_or_default();
-            match Model::of_name(name) {
-                Some(model) if model.fisheye => return Ok(Some(Distortion::Fisheye(model.name))),
-                Some(_) => {}
-                None => {
-                    let name = shown(name.as_bytes());
-                    return Err(format!("the camera_model '{name}' is not a pinhole; undistort the pictures first"));
-                }
-            }
+    /// The lens with its distortion, and the name of its model if that is not drawn.
+    fn bent_lens(&self, width: f64, height: f64, sized: bool) -> Result<(Lens, Option<&'static str>), String> {
+        let named = self.value("camera_model").map(|value| value.as_str().unwrap_or_default());
+        if named == Some(SPHERE) {
+            return Ok((Lens::Equirectangular, None));
         }
-        if self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false)) {
-            return Ok(Some(Distortion::Fisheye("is_fisheye")));
+        let is_fisheye = self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false));
+        let model = match named {
+            Some(name) => Some(Model::of_name(name).ok_or_else(|| {
+                let name = shown(name.as_bytes());
+                format!("the camera_model '{name}' is not drawn; undistort the pictures first")
+            })?),
+            None => None,
+        };
+        let intrinsics = self.intrinsics(width, height, sized)?;
+        if let Some(model) = model.filter(|model| model.is_undrawn()) {
+            return Ok((Lens::Intrinsics(intrinsics), Some(model.name)));
         }
-        let mut distortion = None;
-        for key in DISTORTIONS {
-            distortion = distortion.or(self.number(key)?.and_then(|value| Distortion::of(key, value)));
+        let mut values = [0.0; 8];
+        for (value, key) in values.iter_mut().zip(DISTORTIONS) {
+            *value = self.number(key)?.unwrap_or(0.0);
         }
-        Ok(distortion)
+        let [k1, k2, k3, k4, k5, k6, p1, p2] = values;
+        let form =
+            if is_fisheye || model.is_some_and(|model| model.fisheye) { Form::Fisheye } else { Form::Perspective };
+        let plain = Optics::of(form).with_tangential([p1, p2]);
+        // OpenCV's model with eight coefficients has a denominator.
+        let is_rational = model.is_some_and(|model| model.name == RATIONAL) || k5 != 0.0 || k6 != 0.0;
+        let optics = match is_rational {
+            true => plain.with_radial([k1, k2, k3, 0.0]).with_denominator([k4, k5, k6]),
+            false => plain.with_radial([k1, k2, k3, k4]),
+        };
+        Ok((bent(optics, intrinsics), None))
     }
 
     /// The camera of a frame that has the keys of a camera file; `None` for other frames.
@@ -125,9 +138,9 @@ impl Frame<'_> {
         Some(of_value(Value::Object(object)))
     }
 
-    /// The lens from focal lengths in pixels, or else from angles. Pixels are square if only one of
-    /// fx and fy is known.
-    fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
+    /// `[fx, fy, cx, cy]` from focal lengths in pixels, or else from angles. Pixels are square if
+    /// only one of fx and fy is known.
+    fn intrinsics(&self, width: f64, height: f64, sized: bool) -> Result<[f64; 4], String> {
         let of_angle = |key: &str, side: f64| match self.number(key)? {
             Some(angle) if !(angle > 0.0 && angle < PI) => {
                 Err(format!("its {key} must lie between 0 and pi (radians), but it is {angle:?}"))
@@ -143,7 +156,7 @@ impl Frame<'_> {
         let fy = if fl_y.is_some() { fl_y } else { of_angle("camera_angle_y", height)? };
         let fx = fx.or(fy).ok_or("it gives neither fl_x nor camera_angle_x")?;
         let (cx, cy) = (cx.unwrap_or(0.5 * width), cy.unwrap_or(0.5 * height));
-        Ok(Lens::Intrinsics([fx, fy.unwrap_or(fx), cx, cy]))
+        Ok([fx, fy.unwrap_or(fx), cx, cy])
     }
 
     fn pose(&self) -> Result<Pose, String> {
@@ -202,7 +215,7 @@ mod tests {
     #[test]
     fn poses_are_camera_to_world_with_y_up_and_z_back() {
         let camera = one(r#""camera_angle_x": 1.5707963267948966,"#, "").unwrap();
-        assert_eq!((camera.name.as_str(), camera.camera.size, camera.distortion), ("train/r_7", None, None));
+        assert_eq!((camera.name.as_str(), camera.camera.size, camera.undrawn), ("train/r_7", None, None));
         let Pose::Rigid(rotation, eye) = camera.camera.pose else { panic!() };
         assert_eq!(eye, DVec3::new(3.0, 4.0, 5.0));
         // Up in the picture (the camera's y) is the world's z; the view (its -z) is the world's y.
@@ -219,12 +232,23 @@ mod tests {
         assert_eq!(lens("").size, Some((800, 600)));
         let own = lens(r#""fl_x": 700, "fl_y": 710, "cy": 310, "w": 640, "cx": null,"#);
         assert_eq!((own.lens, own.size), (Lens::Intrinsics([700.0, 710.0, 390.5, 310.0]), Some((640, 600))));
-        assert_eq!(one(shared, r#""p2": -0.5,"#).unwrap().distortion, Distortion::of("p2", -0.5));
-        for (own, model) in
-            [(r#""camera_model": "OPENCV_FISHEYE","#, "OPENCV_FISHEYE"), (r#""is_fisheye": true,"#, "is_fisheye")]
-        {
-            assert_eq!(one(shared, own).unwrap().distortion, Some(Distortion::Fisheye(model)));
+        let intrinsics = [500.0, 500.0, 390.5, 300.0];
+        let bent = |optics: Optics| Lens::Curved(optics, intrinsics);
+        let plain = Optics::of(Form::Perspective);
+        let tangential = plain.with_tangential([0.0, -0.5]);
+        assert_eq!(lens(r#""p2": -0.5,"#).lens, bent(tangential));
+        assert_eq!(lens(r#""k1": 0.1, "k4": 0.2,"#).lens, bent(plain.with_radial([0.1, 0.0, 0.0, 0.2])));
+        let rational = plain.with_radial([0.1, 0.0, 0.0, 0.0]).with_denominator([0.2, 0.0, 0.0]);
+        assert_eq!(lens(r#""k1": 0.1, "k4": 0.2, "camera_model": "FULL_OPENCV","#).lens, bent(rational));
+        for own in [r#""camera_model": "OPENCV_FISHEYE", "k1": 0.25,"#, r#""is_fisheye": true, "k1": 0.25,"#] {
+            assert_eq!(lens(own).lens, bent(Optics::of(Form::Fisheye).with_radial([0.25, 0.0, 0.0, 0.0])));
         }
+        assert_eq!(lens(r#""camera_model": "EQUIRECTANGULAR","#).lens, Lens::Equirectangular);
+        let undrawn = one(shared, r#""camera_model": "RAD_TAN_THIN_PRISM_FISHEYE","#).unwrap();
+        assert_eq!(
+            (undrawn.camera.lens, undrawn.undrawn),
+            (Lens::Intrinsics(intrinsics), Some("RAD_TAN_THIN_PRISM_FISHEYE"))
+        );
     }
 
     #[test]
@@ -256,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_set_of_pinholes_is_said() {
+    fn what_is_no_set_of_cameras_is_said() {
         for (shared, own, said) in [
             ("", "", "neither fl_x nor camera_angle_x"),
             (r#""fl_x": 5,"#, "", "needs w and h"),
@@ -264,7 +288,7 @@ mod tests {
             (r#""w": 8, "h": 7.5, "fl_x": 5,"#, "", "h is not a number of pixels"),
             (r#""w": -8, "h": 7, "fl_x": 5,"#, "", "w is not a number of pixels"),
             (r#""camera_angle_x": "wide","#, "", "camera_angle_x is not a number"),
-            (r#""camera_angle_x": 1, "camera_model": "EQUIRECTANGULAR","#, "", "'EQUIRECTANGULAR'"),
+            (r#""camera_angle_x": 1, "camera_model": "FISHEYE624","#, "", "'FISHEYE624'"),
             (r#""camera_angle_x": 3.2,"#, "", "camera_angle_x must lie between 0 and pi (radians), but it is 3.2"),
             (r#""camera_angle_x": 0,"#, "", "camera_angle_x must lie between 0 and pi"),
             (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y must lie between 0 and pi"),

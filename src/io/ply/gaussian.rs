@@ -1,5 +1,5 @@
 //! Vertices that are Gaussians: 2D Gaussian splatting (Huang et al. 2024), and 3D Gaussian
-//! splatting (Kerbl et al. 2023) where its Gaussians are flat.
+//! splatting (Kerbl et al. 2023), whose Gaussians are surfels where they are flat.
 //!
 //! The file holds the parameters as they are trained. `scale_0`, `scale_1` and, in three
 //! dimensions, `scale_2` are logarithms of standard deviations. `rot_0` (w) to `rot_3` are a

@@ -1,9 +1,9 @@
 //! The rows of rejected combinations, each with what to do instead.
 
-use super::{Clash, SceneClash};
+use super::{Clash, LensClash, SceneClash};
 use crate::plan::{Accumulator, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, Settings};
 use crate::scene::composite::ALL_LAYERS;
-use crate::scene::{Blend, Composite, Cull, Join, KernelShape, LowPass, Map, Shading, Tail};
+use crate::scene::{Blend, Composite, Cull, Form, Join, KernelShape, LowPass, Map, Shading, Tail};
 
 /// The largest number of layers that the rasteriser peels.
 const MOST_PEELED: u32 = 64;
@@ -340,5 +340,30 @@ pub(super) const SCENES: [SceneClash; 19] = [
         applies: |facts, options, _| facts.colors != ColorNeed::Textured && options.maps.has(Map::TexZ),
         sentence: "the map texz holds texture coordinates of painted surfels, on the nearest surface only: paint them by \
                    --texture and leave --composite out, or leave the map out",
+    },
+];
+
+/// Combinations that a camera does not show if its lens is no pinhole.
+pub(super) const LENSES: [LensClash; 5] = [
+    LensClash {
+        applies: |_, facts, _, _| facts.solid,
+        sentence: "3D Gaussians are drawn by pinholes: take --flatten with a lens, or --ignore-distortion",
+    },
+    LensClash {
+        applies: |_, _, options, device| device && options.raster.is_some(),
+        sentence: "the rasteriser draws by pinholes: take --backend gpu with a lens, or --ignore-distortion",
+    },
+    LensClash {
+        applies: |_, facts, options, _| facts.nodes_of(options).is_some(),
+        sentence: "levels of detail are chosen by pinholes: leave --lod and --splats out with a lens, or take \
+                   --ignore-distortion",
+    },
+    LensClash {
+        applies: |_, _, options, _| options.facing.is_some(),
+        sentence: "points that face the camera are drawn by pinholes: leave --facing out with a lens",
+    },
+    LensClash {
+        applies: |form, facts, _, _| form == Form::Equirectangular && has_triangles(facts),
+        sentence: "triangles across the border of an equirectangular image are not drawn: take --mesh surfels",
     },
 ];

@@ -7,10 +7,9 @@ use super::{FromPoints, HalfAxes, longer};
 use crate::Progress;
 use crate::surfels::estimate::{LONE_RADIUS, RADIUS_RANGE};
 use crate::surfels::graph::NeighbourGraph;
+use crate::surfels::planes::Neighbourhoods;
 use crate::surfels::positions::DistinctPositions;
-use crate::surfels::sizes::{
-    RADIUS_NEIGHBOURS, Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius, offsets,
-};
+use crate::surfels::sizes::{Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius};
 
 /// The sizes of the surfels at positions, in the units of [`DistinctPositions`].
 pub(super) struct Sizes {
@@ -138,8 +137,8 @@ fn roughened(
     axes: Vec<[DVec3; 2]>,
 ) -> Vec<[DVec3; 2]> {
     let at = |index: u32| {
-        let near: Vec<DVec3> = offsets(distinct, graph, index, RADIUS_NEIGHBOURS).collect();
-        Rough::of(&near, DVec3::from_array(normals[index as usize].map(f64::from)).normalize())
+        let near = Neighbourhoods::around((distinct, graph), [index]);
+        Rough::of(near.of_neighbours(0), DVec3::from_array(normals[index as usize].map(f64::from)).normalize())
     };
     let rough: Vec<Rough> = (0..distinct.len() as u32).into_par_iter().map(at).collect();
     let own = axes.into_par_iter().zip(0..distinct.len() as u32);

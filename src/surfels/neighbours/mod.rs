@@ -120,24 +120,19 @@ impl<'a> NeighbourSearch<'a> {
     pub fn nearest(&self, index: u32, found: &mut Vec<Neighbour>) {
         found.clear();
         let index = index as usize;
-        let mut query = Query { search: self, index, at: self.positions[index], found, reach: f64::MAX };
-        // The search goes outward from the query's own leaf, where most neighbours are found; most
-        // of the rest of the tree is then out of reach.
-        let mut home = index / FAN;
-        query.visit_leaf(home);
-        for level in 0..self.levels.len() {
-            let node = home / FAN;
-            query.visit_node(level, node, Some(home % FAN));
-            home = node;
-        }
+        let query = Query { search: self, index, at: self.positions[index], found, reach: f64::MAX };
+        query.go_outward(index);
     }
 
     /// Fills `found` with the nearest positions to `at`, scaled units, in the same order.
-    pub fn nearest_to(&self, at: DVec3, found: &mut Vec<Neighbour>) {
+    ///
+    /// The search goes outward from position `from`, and is fast if that is near; the result does
+    /// not depend on it.
+    pub fn nearest_to(&self, at: DVec3, from: u32, found: &mut Vec<Neighbour>) {
         found.clear();
         // No position has this index, so none is excluded.
-        let mut query = Query { search: self, index: usize::MAX, at: at.to_array(), found, reach: f64::MAX };
-        query.visit_node(self.levels.len() - 1, 0, None);
+        let query = Query { search: self, index: usize::MAX, at: at.to_array(), found, reach: f64::MAX };
+        query.go_outward(from as usize);
     }
 }
 
@@ -153,6 +148,18 @@ struct Query<'a> {
 }
 
 impl Query<'_> {
+    /// Searches outward from the leaf of position `from`, where most neighbours are found; most of
+    /// the rest of the tree is then out of reach.
+    fn go_outward(mut self, from: usize) {
+        let mut home = from / FAN;
+        self.visit_leaf(home);
+        for level in 0..self.search.levels.len() {
+            let node = home / FAN;
+            self.visit_node(level, node, Some(home % FAN));
+            home = node;
+        }
+    }
+
     fn visit_leaf(&mut self, leaf: usize) {
         let first = leaf * FAN;
         let end = self.search.positions.len().min(first + FAN);

@@ -8,7 +8,7 @@ use super::surface::{MeshSurface, Place};
 use crate::error::Result;
 use crate::progress::Progress;
 use crate::scene::color::mean_color;
-use crate::surfels::neighbours::NeighbourSearch;
+use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 use crate::surfels::positions::DistinctPositions;
 use crate::truth::nearest::closest_weights;
 
@@ -33,8 +33,10 @@ impl Cells {
             sample_at[position as usize] = sample as u32;
         }
         let search = NeighbourSearch::new(&distinct, 1);
-        let nearest = |found: &mut Vec<_>, candidate: &Candidate| {
-            search.nearest_to(candidate.point(surface) * distinct.scale(), found);
+        // Most candidates lie near the one before.
+        let nearest = |found: &mut Vec<Neighbour>, candidate: &Candidate| {
+            let before = found.first().map_or(0, |nearest| nearest.index);
+            search.nearest_to(candidate.point(surface) * distinct.scale(), before, found);
             found.first().map_or(0, |nearest| sample_at[nearest.index as usize])
         };
         let owners: Vec<u32> = candidates.par_iter().map_init(|| Vec::with_capacity(1), nearest).collect();

@@ -132,13 +132,13 @@ impl<'a> Voronoi<'a> {
         triangle: &Facet,
         may: impl Fn(u32) -> bool,
         searches: &[&NeighbourSearch<'_>],
-        Scratch { found, seen, open }: &mut Scratch,
+        Scratch { found, seen, open, last }: &mut Scratch,
     ) -> Option<Vec<(u32, Vec<DVec3>)>> {
         let corners = triangle.corners.map(|corner| corner * self.distinct.scale());
-        let mut nearest_to = |at: DVec3| {
+        let mut nearest_to = |at: DVec3, from: u32| {
             let mut farthest = f64::INFINITY;
             for search in searches {
-                search.nearest_to(at, found);
+                search.nearest_to(at, from, found);
                 if let Some(nearest) = found.iter().find(|neighbour| may(neighbour.index)) {
                     return (nearest.squared_distance <= farthest).then_some(nearest.index);
                 }
@@ -151,7 +151,8 @@ impl<'a> Voronoi<'a> {
         let mut parts = Vec::new();
         seen.clear();
         open.clear();
-        open.push(nearest_to((corners[0] + corners[1] + corners[2]) / 3.0)?);
+        *last = nearest_to((corners[0] + corners[1] + corners[2]) / 3.0, *last)?;
+        open.push(*last);
         seen.extend(&*open);
         while let Some(sample) = open.pop() {
             let center = self.distinct.position(sample);
@@ -173,7 +174,7 @@ impl<'a> Voronoi<'a> {
             while !is_whole && !cell.corners.is_empty() {
                 let mut beyond = None;
                 for &corner in &cell.corners {
-                    let other = nearest_to(corner)?;
+                    let other = nearest_to(corner, sample)?;
                     let distance = self.distinct.position(other).distance(corner);
                     if other != sample && distance < corner.distance(center) * (1.0 - NEARER) {
                         beyond = Some(other);
@@ -197,6 +198,8 @@ struct Scratch {
     /// The samples whose cells are done or in `open`.
     seen: HashSet<u32>,
     open: Vec<u32>,
+    /// The sample nearest to the middle of the triangle before, which often is beside the next one.
+    last: u32,
 }
 
 /// A convex polygon in a triangle's plane.

@@ -1,9 +1,9 @@
 //! The ellipse that holds a point's Voronoi cell in its tangent plane.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::surfels::ellipse::Ellipse;
-use crate::surfels::gaps::{Cell, is_beside};
+use crate::surfels::gaps::{Cell, MOST_CORNERS, is_beside};
 
 /// The number of neighbours whose mean distance is the unit of sizes: the first two rings of a
 /// square grid.
@@ -77,10 +77,12 @@ pub(crate) fn cell_ellipse(offsets: &[DVec3], normal: DVec3) -> [DVec3; 2] {
     let cell = Cell::new(offsets, normal, (reach, LEAST * mean / MOST_PAST_CORNER));
     let past_corner = past_corner(near, normal, &cell, mean);
     // Corners are in mean distances, so that squares of areas neither overflow nor underflow.
-    let corners = cell.closed().map(|corner| (past_corner / mean * corner).clamp_length_max(LARGEST));
+    let mut corners = [DVec2::ZERO; MOST_CORNERS];
+    let reached = cell.closed().map(|corner| (past_corner / mean * corner).clamp_length_max(LARGEST));
+    let count = corners.iter_mut().zip(reached).map(|(slot, corner)| *slot = corner).count();
     let least = if cell.is_closed() { LEAST } else { LEAST_OPEN };
     let [x, y] = cell.basis();
-    let ellipse = Ellipse::around_points(&corners.collect::<Vec<_>>(), least);
+    let ellipse = Ellipse::around_points(&corners[..count], least);
     ellipse.half_axes().map(|axis| (x * axis.x + y * axis.y) * mean)
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::RADIUS_NEIGHBOURS;
-use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, median};
+use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, median, median_of_few};
 use crate::surfels::graph::NeighbourGraph;
 
 /// Returns the largest radius of each position's disk, in the unit of `radii`.
@@ -25,16 +25,19 @@ pub(crate) fn local_limits(
     let mut any: Vec<f64> = radii.par_iter().copied().filter(|radius| *radius > 0.0).collect();
     let ratio = if factor.is_finite() { LARGEST_MEDIAN_RATIO } else { factor };
     let global = median(&mut any).map_or(f64::INFINITY, |median| median * ratio);
+    let of_near = |index: u32| {
+        let mut near = [0.0; RADIUS_NEIGHBOURS];
+        let of_near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
+        let of_near = of_near.filter(|radius| *radius > 0.0);
+        let count = near.iter_mut().zip(of_near).map(|(slot, radius)| *slot = radius).count();
+        if count == near.len() { Some(median_of_few(near)) } else { median(&mut near[..count]) }
+    };
     (0..radii.len() as u32)
         .into_par_iter()
-        .map_init(Vec::new, |near, index| {
-            near.clear();
-            if radii[index as usize] > 0.0 {
-                let of_near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
-                near.extend(of_near.filter(|radius| *radius > 0.0));
-            }
+        .map(|index| {
+            let near = if radii[index as usize] > 0.0 { of_near(index) } else { None };
             let own = if factor.is_finite() && radii[index as usize] > 0.0 { lone(index) } else { None };
-            median(near).map_or(f64::INFINITY, |median| median * factor).min(global).min(own.unwrap_or(f64::INFINITY))
+            near.map_or(f64::INFINITY, |median| median * factor).min(global).min(own.unwrap_or(f64::INFINITY))
         })
         .collect()
 }

@@ -45,9 +45,9 @@ pub(crate) fn lone_radius(
 ) -> Option<f64> {
     let near = graph.of(index);
     let all = offsets(distinct, graph, index, near.len());
-    let around = all.clone().zip(near.iter().map(|other| normal(*other)));
+    let part = surroundings(normal(index), all.clone(), near.iter().map(|other| normal(*other))).part()?;
     let mean = all.take(RADIUS_NEIGHBOURS).map(DVec3::length).sum::<f64>() / RADIUS_NEIGHBOURS as f64;
-    surroundings(normal(index), around).part().map(|part| part * mean)
+    Some(part * mean)
 }
 
 /// The surroundings of a point.
@@ -75,11 +75,15 @@ impl Surroundings {
 
 /// Classifies the surroundings of a point from its unit normal `own` and the offsets and unit
 /// normals of its neighbours, the nearest first. Normals have either sign, and are zero if unknown.
-pub(crate) fn surroundings(own: DVec3, around: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Surroundings {
-    let around = around.take(NORMAL_NEIGHBOURS);
-    let Some((farthest, _)) = around.clone().nth(NORMAL_NEIGHBOURS - 1) else { return Surroundings::Surface };
+pub(crate) fn surroundings(
+    own: DVec3,
+    offsets: impl Iterator<Item = DVec3> + Clone,
+    normals: impl Iterator<Item = DVec3>,
+) -> Surroundings {
+    let offsets = offsets.take(NORMAL_NEIGHBOURS);
+    let Some(farthest) = offsets.clone().nth(NORMAL_NEIGHBOURS - 1) else { return Surroundings::Surface };
     let most = (LINE * farthest.length_squared()).powi(2);
-    if around.clone().all(|(offset, _)| offset.cross(farthest).length_squared() <= most) {
+    if offsets.clone().all(|offset| offset.cross(farthest).length_squared() <= most) {
         return Surroundings::Line;
     }
     let on_surface = |(offset, other): &(DVec3, DVec3)| {
@@ -87,7 +91,9 @@ pub(crate) fn surroundings(own: DVec3, around: impl Iterator<Item = (DVec3, DVec
         let agrees = own.dot(*other).abs() > ONE_SURFACE && other.dot(*offset).abs() < low;
         own.dot(*offset).abs() < low && (agrees || *other == DVec3::ZERO)
     };
-    if around.filter(on_surface).count() <= MOST_BESIDE { Surroundings::Volume } else { Surroundings::Surface }
+    // On a surface, the first few neighbours suffice.
+    let more_beside = offsets.zip(normals).filter(on_surface).nth(MOST_BESIDE);
+    if more_beside.is_none() { Surroundings::Volume } else { Surroundings::Surface }
 }
 
 #[cfg(test)]
@@ -96,7 +102,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
     use crate::scene::Bounds;
-    use crate::surfels::estimate::fitted_normal;
+    use crate::surfels::planes::fitted_normal;
     use rayon::prelude::*;
 
     /// The fraction of lone points among 2,000 in a unit cube that is flattened to this height,
@@ -141,7 +147,7 @@ mod tests {
             let at = |k: i32| DVec3::new(spacing[0] * f64::from(k / 99 - 9), spacing[1] * f64::from(k % 99 - 49), 0.0);
             let mut offsets: Vec<DVec3> = (0..19 * 99).map(at).filter(|offset| *offset != DVec3::ZERO).collect();
             offsets.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-            surroundings(DVec3::Z, offsets.into_iter().map(|offset| (offset, DVec3::Z)))
+            surroundings(DVec3::Z, offsets.into_iter(), std::iter::repeat(DVec3::Z))
         };
         assert_eq!([1.0, 3.0, 7.0, 12.0].map(|apart| of([apart, 1.0])), {
             use Surroundings::{Line, Surface};

@@ -20,8 +20,8 @@ pub(crate) use self::limit::local_limits;
 pub(crate) use self::lone::{Surroundings, lone_radius, surroundings};
 pub(crate) use self::qsplat::measure as measure_triangles;
 pub(crate) use self::rough::{Rough, grown};
-use super::estimate::NORMAL_NEIGHBOURS;
 use super::graph::NeighbourGraph;
+use super::planes::Neighbourhoods;
 use super::positions::DistinctPositions;
 use crate::{Error, Result};
 
@@ -109,9 +109,10 @@ pub(crate) fn half_axes_at(
     normal: [f32; 3],
 ) -> [DVec3; 2] {
     let normal = DVec3::from_array(normal.map(f64::from)).normalize();
-    let near: Vec<DVec3> = offsets(distinct, graph, index, NORMAL_NEIGHBOURS).collect();
+    let near = Neighbourhoods::around((distinct, graph), [index]);
+    let near = near.of_neighbours(0);
     match size {
-        Size::Knn if !near.is_empty() => cell_ellipse(&near, normal),
+        Size::Knn if !near.is_empty() => cell_ellipse(near, normal),
         Size::Ellipse => match bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal) {
             // All neighbours lie along the normal, so only their distances determine a size.
             [DVec3::ZERO, _] => {

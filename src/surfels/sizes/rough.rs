@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec3};
 
 use super::RADIUS_NEIGHBOURS;
-use crate::surfels::estimate::median;
+use crate::surfels::estimate::{median, median_of_few};
 use crate::surfels::gaps::is_beside;
 use crate::surfels::graph::NeighbourGraph;
 
@@ -84,11 +84,15 @@ impl Rough {
     /// returns the roughness of a position.
     pub(crate) fn growth(graph: &NeighbourGraph, index: u32, at: impl Fn(u32) -> Self) -> f64 {
         let own = at(index);
-        let around = || std::iter::once(index).chain(graph.of(index).iter().copied().take(RADIUS_NEIGHBOURS)).map(&at);
+        let near = graph.of(index);
+        let around = || std::iter::once(own).chain(near.iter().take(RADIUS_NEIGHBOURS).map(|&other| at(other)));
         let of = |value: fn(Self) -> f32| {
             let mut values = [0.0; RADIUS_NEIGHBOURS + 1];
             let count = values.iter_mut().zip(around()).map(|(slot, rough)| *slot = value(rough).into()).count();
-            median(&mut values[..count]).unwrap_or(0.0)
+            match count == values.len() {
+                true => median_of_few(values),
+                false => median(&mut values[..count]).unwrap_or(0.0),
+            }
         };
         let (heights, left) = (of(|rough| rough.heights), of(|rough| rough.left));
         if heights == 0.0 {

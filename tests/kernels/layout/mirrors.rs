@@ -101,6 +101,7 @@ pub fn mirrors() -> BTreeMap<&'static str, Struct> {
             place,
             levels,
             atlas,
+            lens,
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),

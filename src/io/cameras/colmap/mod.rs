@@ -17,13 +17,12 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, DVec3};
 
 use self::models::Camera;
-pub(super) use self::models::Model;
+pub(super) use self::models::{Model, bent};
 use super::{NamedCamera, name_of};
 use crate::error::{Error, Result};
 use crate::io::camera::{CameraFile, Pose};
 use crate::io::fault::Fault;
 use crate::io::input::check_regular;
-use crate::scene::Lens;
 
 /// Folders of a project in which programs store its model. The first one with a model is read.
 const PLACES: [&str; 4] = ["", "sparse/0", "sparse", "colmap/sparse/0"];
@@ -118,12 +117,8 @@ impl Lenses {
         }
         let rotation = DMat3::from_quat(quaternion.normalize());
         let eye = -(rotation.transpose() * DVec3::new(tx, ty, tz));
-        let camera = CameraFile {
-            size: Some(lens.size),
-            lens: Lens::Intrinsics(lens.intrinsics),
-            pose: Pose::Rigid(rotation, eye),
-            near: None,
-        };
-        Ok(NamedCamera { name, camera, distortion: lens.distortion })
+        let camera =
+            CameraFile { size: Some(lens.size), lens: lens.lens, pose: Pose::Rigid(rotation, eye), near: None };
+        Ok(NamedCamera { name, camera, undrawn: lens.undrawn })
     }
 }

@@ -1,6 +1,6 @@
 //! COLMAP's camera models: names, numbers and parameters.
 
-use super::super::Distortion;
+use crate::scene::{Form, Lens, Optics};
 
 /// A camera model. Its parameters are one focal length or two, the principal point and the
 /// coefficients of distortion.
@@ -43,11 +43,15 @@ const MODELS: [Model; 12] = [
     ),
 ];
 
+/// The model whose lens is not drawn.
+const UNDRAWN: &str = "RAD_TAN_THIN_PRISM_FISHEYE";
+
 /// A camera without its pose.
 pub(super) struct Camera {
     pub size: (u32, u32),
-    pub intrinsics: [f64; 4],
-    pub distortion: Option<Distortion>,
+    pub lens: Lens,
+    /// The name of the model if its lens is not drawn; `lens` is then a pinhole.
+    pub undrawn: Option<&'static str>,
 }
 
 impl Model {
@@ -57,6 +61,11 @@ impl Model {
 
     pub(super) fn of_number(number: i32) -> Option<&'static Self> {
         MODELS.iter().find(|model| model.number == number)
+    }
+
+    /// Whether the lens is not drawn.
+    pub(in crate::io::cameras) fn is_undrawn(&self) -> bool {
+        self.name == UNDRAWN
     }
 
     /// The number of parameters.
@@ -77,10 +86,39 @@ impl Model {
             [f, cx, cy] => [f, f, cx, cy],
             _ => return Err("its parameters are not a lens's".into()),
         };
-        let distortion = match self.fisheye {
-            true => Some(Distortion::Fisheye(name)),
-            false => distortions.iter().zip(rest).find_map(|(name, value)| Distortion::of(name, *value)),
+        let undrawn = self.is_undrawn().then_some(self.name);
+        let lens = match undrawn {
+            Some(_) => Lens::Intrinsics(intrinsics),
+            None => self.lens(intrinsics, rest),
         };
-        Ok(Camera { size, intrinsics, distortion })
+        Ok(Camera { size, lens, undrawn })
     }
+
+    /// The lens of focal lengths and principal point, with the values of the model's coefficients.
+    pub(in crate::io::cameras) fn lens(&self, intrinsics: [f64; 4], values: &[f64]) -> Lens {
+        let of = |name: &str| {
+            let place = self.distortions.iter().position(|own| *own == name);
+            place.and_then(|place| values.get(place)).copied().unwrap_or(0.0)
+        };
+        let form = if self.fisheye { Form::Fisheye } else { Form::Perspective };
+        let plain = Optics::of(form).with_tangential([of("p1"), of("p2")]).with_prism([of("sx1"), of("sy1")]);
+        match self.name {
+            "FOV" if of("omega") != 0.0 => {
+                let (omega, [fx, fy, cx, cy]) = (of("omega"), intrinsics);
+                let optics = Optics::of(Form::Fisheye).widened(2.0 * (0.5 * omega).tan());
+                Lens::Curved(optics, [fx / omega, fy / omega, cx, cy])
+            }
+            // In this model the coefficients from k4 on are those of the denominator.
+            "FULL_OPENCV" => {
+                let optics = plain.with_radial([of("k1"), of("k2"), of("k3"), 0.0]);
+                bent(optics.with_denominator([of("k4"), of("k5"), of("k6")]), intrinsics)
+            }
+            _ => bent(plain.with_radial([of("k1") + of("k"), of("k2"), of("k3"), of("k4")]), intrinsics),
+        }
+    }
+}
+
+/// A lens of these optics; a pinhole if they bend nothing.
+pub(in crate::io::cameras) fn bent(optics: Optics, intrinsics: [f64; 4]) -> Lens {
+    if optics.is_pinhole() { Lens::Intrinsics(intrinsics) } else { Lens::Curved(optics, intrinsics) }
 }

@@ -148,8 +148,7 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
     use crate::io::camera::Pose;
-    use crate::io::cameras::Distortion;
-    use crate::scene::Lens;
+    use crate::scene::{Form, Lens, Optics};
     use glam::{DMat3, DVec3};
 
     const LENSES: &str = "# Camera list\n1 PINHOLE 640 480 500 510 320 240.5\n\n  2 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
@@ -179,8 +178,9 @@ mod tests {
         assert_eq!(rotation * eye + DVec3::new(1.0, 2.0, 3.0), DVec3::ZERO);
         assert_eq!(pose(&images[2]), (DMat3::IDENTITY, DVec3::new(-6e6, 0.0, 0.0)));
         assert_eq!(images[0].camera.lens, Lens::Intrinsics([500.0, 510.0, 320.0, 240.5]));
-        assert_eq!((images[1].camera.size, images[1].distortion), (Some((64, 48)), Distortion::of("k", 0.1)));
-        assert_eq!(images[1].camera.lens, Lens::Intrinsics([50.0, 50.0, 32.0, 24.0]));
+        let optics = Optics::of(Form::Perspective).with_radial([0.1, 0.0, 0.0, 0.0]);
+        assert_eq!(images[1].camera.size, Some((64, 48)));
+        assert_eq!(images[1].camera.lens, Lens::Curved(optics, [50.0, 50.0, 32.0, 24.0]));
     }
 
     #[test]

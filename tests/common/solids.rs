@@ -91,7 +91,7 @@ fn seen(one: &Gaussian, camera: &Camera, rules: Rules) -> Option<Seen> {
             (image, [DVec3::X * camera.fx, DVec3::Y * camera.fy])
         }
         Projection::Pinhole => {
-            // tan_fovx and limx of the method's code, for a principal point that may lie off centre.
+            // tan_fovx and limx of the method's code; the principal point may lie off centre.
             let limit = |slope: f64, size: u32, focal: f64, principal: f64| {
                 let tan = 0.5 * f64::from(size) / focal;
                 let off_center = (0.5 * f64::from(size) - principal) / focal;

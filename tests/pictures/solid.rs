@@ -209,7 +209,7 @@ fn order_and_memory_do_not_show() {
     }
 }
 
-/// Half a million pixels away or in front of the eye, sizes of all magnitudes: every pixel is finite.
+/// Gaussians of sizes of all magnitudes, in front of the eye and far away, have finite pixels.
 #[test]
 fn sizes_of_all_magnitudes_are_drawn() {
     let mut gaussians = cloud(400, 0, 11);

@@ -325,16 +325,21 @@ fn held(text: &mut String, info: &Info) {
         None => "none, estimated from neighbours".to_owned(),
     };
     // Writing to a string cannot fail.
-    if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations: [longer, shorter] }) =
-        info.gaussians
-    {
+    if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations, thickness }) = info.gaussians {
+        let [longer, shorter] = deviations;
         let changes = match degree {
             0 => "colours the same from every side".to_owned(),
             _ => format!("colours change with the view by harmonics of degree {degree}"),
         };
-        let _ = writeln!(text, "  kind      Gaussian surfels: {changes}");
+        let kind = if thickness.is_some() { "3D Gaussians" } else { "Gaussian surfels" };
+        let _ = writeln!(text, "  kind      {kind}: {changes}");
         let _ = writeln!(text, "  opacity   {least:.3} to {greatest:.3}, half of them below {median:.3}");
-        let _ = writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)");
+        let _ = match thickness {
+            None => writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)"),
+            Some(least) => {
+                writeln!(text, "  sizes     standard deviations of {longer:.4}, {shorter:.4} and {least:.4} (medians)")
+            }
+        };
     } else {
         let _ = writeln!(text, "  normals   {}", given(info.normals, info.points_with_normals));
         let _ = writeln!(text, "  radii     {}", given(info.radii, info.points_with_radii));

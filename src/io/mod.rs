@@ -73,6 +73,9 @@ pub struct ReadOptions {
     /// surfels. If false, a file is an error if many of its Gaussians are thicker than a tenth of
     /// their width.
     pub flatten: bool,
+    /// Keep the shortest axes of such a file's Gaussians instead ([`Points::thirds`]), so that it
+    /// is no error. [`flatten`](Self::flatten) has precedence.
+    pub solid: bool,
     /// Opacities by class, for the points of laser scans (LAS files).
     pub classes: ClassOpacities,
     /// Ignore the alphas of colours, but not the opacities of Gaussians.

@@ -31,6 +31,9 @@ pub struct Points {
     pub clips: Option<Vec<Clip>>,
     /// Curvature of the disks with these half-axes.
     pub caps: Option<Vec<Cap>>,
+    /// The third half-axis of each point, perpendicular to these half-axes, world units: the points
+    /// are 3D Gaussians.
+    pub thirds: Option<Vec<f32>>,
     /// Colours: [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
     pub colors: Option<Colors>,
     /// Colours and intensities as they are in the file, until
@@ -185,6 +188,7 @@ impl Points {
         self.axes.iter_mut().for_each(|all| retain(all, keep));
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.caps.iter_mut().for_each(|all| retain(all, keep));
+        self.thirds.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.texture_numbers.iter_mut().for_each(|all| retain(all, keep));
         self.texture_slopes.iter_mut().for_each(|all| retain(all, keep));

@@ -79,6 +79,7 @@ impl InputOptions {
             format: self.file.input_format,
             keep_withheld: self.keep_withheld,
             flatten: self.flatten,
+            solid: false,
             classes: self.class_opacity.unwrap_or_default(),
             ignore_alpha: self.file.ignore_alpha,
             describe: false,

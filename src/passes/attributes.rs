@@ -51,6 +51,7 @@ pub const PASS: Pass = Pass {
             ("LOW_WORD", surfel.low.into()),
             ("CLIP_WORD", surfel.clip.into()),
             ("CAP_WORD", surfel.cap.into()),
+            ("THIRD_WORD", surfel.third.into()),
             ("NORMAL_WORD", surfel.normal.into()),
             ("NUMBER_WORD", surfel.number.into()),
             ("FADE_WORD", surfel.fade.into()),

@@ -311,7 +311,10 @@ mod tests {
             let (center, normal) = (around(0.3) * 3.0, around(1.0).normalize());
             let disk = Surfel::disk(Vec3::ZERO, normal.as_vec3(), 0.3);
             let cap = Cap(std::array::from_fn(|_| (0.3 * height * (2.0 * random.number() - 1.0)) as f32));
-            let Some(splat) = project::reference((0, &disk, Some(cap)), center, &camera, &design) else { continue };
+            let Some(splat) = project::reference((0, &disk, Some(project::Body::Cap(cap))), center, &camera, &design)
+            else {
+                continue;
+            };
             let ([left, top], [right, bottom]) = (splat.first, splat.last);
             within += u64::from(right - left + 1) * u64::from(bottom - top + 1);
             for (x, y) in (0..size).flat_map(|y| (0..size).map(move |x| (x, y))) {

@@ -14,7 +14,9 @@ use crate::scene::{Camera, Projection, Samples, Surfel};
 pub const PASS: Pass = Pass {
     name: "facing",
     files: |needs| {
-        let Some(shape) = needs.facing else { return vec!["axes_own.wgsl"] };
+        let Some(shape) = needs.facing else {
+            return vec![if needs.solid { "axes_conic.wgsl" } else { "axes_own.wgsl" }];
+        };
         let rise = match shape {
             PointShape::Square | PointShape::Circle => "shape_flat.wgsl",
             PointShape::Sphere => "shape_sphere.wgsl",

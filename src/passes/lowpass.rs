@@ -19,6 +19,7 @@
 
 use glam::DVec2;
 
+use super::conic;
 use super::facing::Faced;
 use super::splat::{Filter, Intersection, Splat};
 use crate::plan::Settings;
@@ -82,6 +83,8 @@ pub struct Design {
     pub radius: f64,
     /// How points face the camera; `None` if surfels are drawn as disks.
     pub facing: Option<Faced>,
+    /// The half-axes of the pixel's Gaussian, with which 3D Gaussians are convolved, samples.
+    pub dilation: DVec2,
 }
 
 impl Design {
@@ -97,6 +100,7 @@ impl Design {
             blur,
             radius,
             facing: options.facing.map(|facing| Faced::new(facing, options.samples)),
+            dilation: conic::dilation(options),
         }
     }
 }

@@ -50,6 +50,7 @@
 pub mod accumulate;
 pub mod attributes;
 pub mod branches;
+pub mod conic;
 pub mod covered;
 pub mod cull;
 pub mod curved;
@@ -186,11 +187,12 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module includes.
-const PASSES: [&Pass; 25] = [
+const PASSES: [&Pass; 26] = [
     &shared::PASS,
     &select::PASS,
     &project::PASS,
     &facing::PASS,
+    &conic::PASS,
     &cull::PASS,
     &lowpass::PASS,
     &footprint::PASS,

@@ -7,6 +7,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::conic;
 use super::curved::{self, Curve, Seen};
 use super::homography::{self, Projected, slope};
 use super::lowpass::{self, Design};
@@ -19,8 +20,25 @@ use crate::plan::{Facts, Settings, Sides, composited, culls_back};
 use crate::plan::{Plan, tuning};
 use crate::scene::{Camera, Cap, Clip, Composite, Fade, Form, LowPass, Scene, Surfel, copies, has_copies};
 
-/// A surfel with its index, and with its cap if some surfel of the scene curves.
-pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
+/// How a surfel extends out of its plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Body {
+    /// By a cap.
+    Cap(Cap),
+    /// As a 3D Gaussian with this third half-axis, world units.
+    Solid(f32),
+}
+
+impl Body {
+    /// The body of the surfel at `index`; None if it is flat.
+    pub fn of(scene: &Scene, index: usize, options: &Settings) -> Option<Self> {
+        let third = scene.thirds.get(index).map(|third| Self::Solid(*third));
+        third.or_else(|| scene.caps.get(index).filter(|_| options.draws_caps()).map(|cap| Self::Cap(*cap)))
+    }
+}
+
+/// A surfel with its index, and with its body if some surfel of the scene has one.
+pub type Indexed<'a> = (u32, &'a Surfel, Option<Body>);
 
 /// The f64 twin of `wgsl/project/project.wgsl` for one surfel; `None` if it can touch no pixel.
 ///
@@ -43,7 +61,7 @@ pub(super) enum Missed {
 /// The splat of [`reference`], or why there is none; if `again`, the part of it beyond the border
 /// of a whole sphere.
 pub(super) fn projected(
-    (index, surfel, cap): Indexed<'_>,
+    (index, surfel, body): Indexed<'_>,
     relative: DVec3,
     camera: &Camera,
     design: &Design,
@@ -53,7 +71,14 @@ pub(super) fn projected(
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
-    let [s, t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
+    let [mut s, mut t] =
+        point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
+    // A lens draws no 3D Gaussians.
+    if let Some(Body::Solid(third)) = body {
+        let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
+        [s, t] = conic::half_axes(p, [s, t, w], camera, design.dilation);
+    }
+    let is_solid = matches!(body, Some(Body::Solid(_)));
     let own = match camera.optics {
         Some(_) => Some(homography::own(camera, p, s, t).ok_or(Missed::Behind)?),
         None => None,
@@ -61,6 +86,7 @@ pub(super) fn projected(
     let (normal, radius) = (curved::normal_of(s, t), s.length().max(t.length()));
     let normal = own.as_ref().map_or(normal, |own| own.axes(normal));
     let (p, s, t) = own.as_ref().map_or((p, s, t), |own| (DVec3::Z * own.depth, own.s, own.t));
+    let cap = if let Some(Body::Cap(cap)) = body { Some(cap) } else { None };
     let seen = cap.map(|cap| Seen { p, s, t, normal, radius, cap });
     let pinhole = own.as_ref().map(|own| own.camera(camera));
     let camera = pinhole.as_ref().unwrap_or(camera);
@@ -78,7 +104,8 @@ pub(super) fn projected(
         [projected.low, projected.high] = seen.extent(camera);
         Curve { slopes: curved::normal_slopes(s_world, t_world, seen.cap), ..curved::curve(camera, seen, &projected) }
     });
-    let filter = projected.images.and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
+    let filter =
+        projected.images.filter(|_| !is_solid).and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
     if let Some(filter) = &filter {
         widen(&mut projected, filter, design.low_pass);
     }
@@ -104,7 +131,7 @@ pub(super) fn projected(
         b: projected.b,
         c: projected.c,
         // A point that faces the camera shows no back.
-        away: projected.away && point.is_none(),
+        away: projected.away && point.is_none() && !is_solid,
         sides: Sides::None,
         normal,
         filter,
@@ -148,10 +175,9 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
     // Fragment lists hold every copy.
     let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
     let copies = (has_copies(scene) && once).then(|| copies(scene));
-    let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
     let project = |again: bool, (index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let of = (index as u32, surfel, cap(index));
+        let of = (index as u32, surfel, Body::of(scene, index, options));
         let splat = || projected(of, scene.center(index) - eye, camera, &design, again).ok();
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
@@ -160,7 +186,12 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &Settings) -> Vec<
             Splat {
                 copies,
                 fade: scene.fades.get(index).copied().unwrap_or(Fade::WHOLE),
-                clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none()).unwrap_or_default(),
+                clip: scene
+                    .clips
+                    .get(index)
+                    .copied()
+                    .filter(|_| splat.point.is_none() && !facts.solid)
+                    .unwrap_or_default(),
                 outline: options.outline,
                 sides,
                 normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },

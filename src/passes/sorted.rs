@@ -51,7 +51,7 @@ pub fn reference(strip: &Strip<'_>, beside: &Beside<'_>, frame: &mut Frame) {
     // the surfels decides which fragment comes first.
     let place = |f: &Fragment| {
         let surfel = f.surfel as usize;
-        (scene.surfels[surfel], scene.low.get(surfel), scene.caps.get(surfel))
+        (scene.surfels[surfel], scene.low.get(surfel), scene.caps.get(surfel), scene.thirds.get(surfel))
     };
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);

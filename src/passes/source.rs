@@ -277,6 +277,9 @@ impl ScenePage<'_> {
         if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
             write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
+        if let (true, Some(third)) = (self.needs.solid, self.scene.thirds.get(index)) {
+            write(&[*third], &mut into[self.layout.third as usize..]);
+        }
         // In a tree a fade belongs to a cut, not to a surfel.
         if let Some(fade) = into.get_mut(self.layout.fade as usize) {
             *fade = self.scene.fades.get(index).copied().unwrap_or(Fade::WHOLE).word();

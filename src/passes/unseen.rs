@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::lowpass::Design;
-use super::project::{Missed, projected};
+use super::project::{Body, Missed, projected};
 use crate::frame::Frame;
 use crate::plan::{Facts, Settings, culls_back};
 use crate::scene::{Camera, Cut, Fade, Scene, Surfel};
@@ -41,7 +41,7 @@ impl Unseen {
         let cull_back = culls_back(&Facts::of(scene), camera, options);
         let look = |(index, surfel): (usize, &Surfel)| {
             let seen = projected(
-                (0, surfel, scene.caps.get(index).copied().filter(|_| options.draws_caps())),
+                (0, surfel, Body::of(scene, index, options)),
                 scene.center(index) - eye,
                 camera,
                 &design,

@@ -64,6 +64,8 @@ pub struct Facts {
     pub clips: bool,
     /// Whether disks are curved, [`Scene::caps`].
     pub caps: bool,
+    /// Whether surfels are 3D Gaussians, [`Scene::thirds`].
+    pub solid: bool,
     /// Whether surfels have normals of their own, [`Scene::normals`].
     pub own_normals: bool,
     /// Whether surfels belong to fading cuts, [`Scene::fades`].
@@ -126,6 +128,7 @@ impl Facts {
             closed: scene.closed,
             clips: has.clips,
             caps: has.caps,
+            solid: !scene.thirds.is_empty(),
             own_normals: has.normals,
             fades: !scene.fades.is_empty(),
             doubled: has.low,

@@ -77,6 +77,8 @@ pub struct SceneNeeds {
     pub outline: bool,
     /// Disks are curved; neither the rasteriser nor the ellipse of `ewa` supports that.
     pub curved: bool,
+    /// Surfels are 3D Gaussians, drawn as their images.
+    pub solid: bool,
     /// Surfels are drawn as points of this shape that face the camera.
     pub facing: Option<PointShape>,
     /// Samples per pixel. The pixels of kernels are samples, except those of the resolved image.
@@ -150,7 +152,7 @@ fn may_be_small(options: &Settings) -> bool {
 /// Whether surfels that face away are culled.
 pub fn culls_back(facts: &Facts, camera: &Camera, options: &Settings) -> bool {
     match options.cull {
-        _ if options.facing.is_some() => false,
+        _ if options.facing.is_some() || facts.solid => false,
         Cull::None => false,
         Cull::Back => facts.oriented,
         // Back faces show through the surfaces in front of them.
@@ -181,7 +183,7 @@ impl Sides {
     /// Returns which sides of surfels a picture can show.
     pub fn of(facts: &Facts, camera: &Camera, options: &Settings) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
-        let both = options.facing.is_none() && !culls_back(facts, camera, options);
+        let both = options.facing.is_none() && !facts.solid && !culls_back(facts, camera, options);
         let of_one_surface = tells_nearest && Oit::of(options).is_none();
         match facts.oriented && both && options.blend == Blend::Weighted {
             true if of_one_surface => Self::Nearest,
@@ -218,7 +220,8 @@ impl SceneNeeds {
             draws_projected: false,
             mesh: mesh(facts, camera, options),
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
-            low_pass: options.low_pass,
+            // 3D Gaussians are convolved with the pixel when they are projected.
+            low_pass: if facts.solid { LowPass::None } else { options.low_pass },
             epsilon: match blends {
                 _ if order_free => EpsilonForm::All,
                 true => EpsilonForm::of(options.epsilon, camera),
@@ -234,11 +237,12 @@ impl SceneNeeds {
             alpha: low[3] != high[3],
             normal: (lit && !options.lights_splats()) || options.maps.has(Map::Normal),
             sides: Sides::of(facts, camera, options),
-            own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
+            own_normals: facts.own_normals && !facts.solid && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
-            clips: (facts.clips || options.outline.is_some()) && options.facing.is_none(),
+            clips: (facts.clips || options.outline.is_some()) && options.facing.is_none() && !facts.solid,
             outline: options.outline.is_some(),
-            curved: node_caps || (facts.caps && options.draws_caps()),
+            curved: node_caps || (facts.caps && options.draws_caps() && !facts.solid),
+            solid: facts.solid,
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
@@ -399,6 +403,7 @@ impl SceneNeeds {
             (self.clips, "clips"),
             (self.outline, "outline"),
             (self.curved, "curved"),
+            (self.solid, "solid"),
             (self.facing.is_some(), "facing"),
             (self.surface.shows_nearest(), "nearest"),
             (self.surface.peels().is_some(), "peels"),

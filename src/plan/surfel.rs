@@ -19,6 +19,8 @@ pub struct SurfelLayout {
     pub clip: u32,
     /// The first of the three words of the curvature (cap).
     pub cap: u32,
+    /// The third half-axis.
+    pub third: u32,
     /// The first of the three words of the surfel's own normal.
     pub normal: u32,
     /// The surfel's place in the octree.
@@ -42,10 +44,21 @@ impl SurfelLayout {
         let low = copies + u32::from(needs.surface.copies());
         let clip = low + if needs.doubled { 3 } else { 0 };
         let cap = clip + if needs.clips { 6 } else { 0 };
-        let normal = cap + if needs.curved { 3 } else { 0 };
+        let third = cap + if needs.curved { 3 } else { 0 };
+        let normal = third + u32::from(needs.solid);
         let number = normal + if needs.own_normals { 3 } else { 0 };
         let fade = number + u32::from(needs.numbers_surfels());
-        Self { words: fade + u32::from(needs.fades && !needs.levels), copies, low, clip, cap, normal, number, fade }
+        Self {
+            words: fade + u32::from(needs.fades && !needs.levels),
+            copies,
+            low,
+            clip,
+            cap,
+            third,
+            normal,
+            number,
+            fade,
+        }
     }
 }
 

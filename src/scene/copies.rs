@@ -67,6 +67,9 @@ pub(crate) fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
         .cmp(&bits(b))
         .then_with(|| clip(a).cmp(&clip(b)))
         .then_with(|| cap(a).cmp(&cap(b)))
+        .then_with(|| {
+            scene.thirds.get(a).map(|third| third.to_bits()).cmp(&scene.thirds.get(b).map(|third| third.to_bits()))
+        })
         .then_with(|| scene.fades.get(a).map(|fade| fade.word()).cmp(&scene.fades.get(b).map(|fade| fade.word())))
         .then_with(|| color(a).cmp(&color(b)))
 }

@@ -34,6 +34,10 @@ pub const KERNEL: Kernel = Kernel::Gaussian { sigma: 1.0 / EXTENT };
 /// Standard deviation of the low-pass Gaussian `exp(-d^2)`, pixels.
 pub const LOW_PASS_SIGMA: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
+/// The variance that the image of a 3D Gaussian gains, pixels squared
+/// ([`conic`](crate::passes::conic)).
+pub const SOLID_VARIANCE: f64 = 0.3;
+
 /// Fragments with a lower alpha are left out.
 pub const LEAST_ALPHA: f64 = 1.0 / 255.0;
 

@@ -27,6 +27,7 @@ impl Scene {
             low: at(&self.low, indices),
             clips: at(&self.clips, indices),
             caps: at(&self.caps, indices),
+            thirds: at(&self.thirds, indices),
             normals: at(&self.normals, indices),
             fades: at(&self.fades, indices),
             colors: match &self.colors {
@@ -53,6 +54,7 @@ impl Scene {
         reorder(&mut self.low, indices);
         reorder(&mut self.clips, indices);
         reorder(&mut self.caps, indices);
+        reorder(&mut self.thirds, indices);
         reorder(&mut self.normals, indices);
         reorder(&mut self.fades, indices);
         match &mut self.colors {

@@ -62,6 +62,9 @@ pub struct Scene {
     pub clips: Vec<Clip>,
     /// The curvature of each disk; empty if all are flat.
     pub caps: Vec<Cap>,
+    /// The third half-axis of each surfel, perpendicular to the two others, world units: the
+    /// surfels are 3D Gaussians. Empty if there are none.
+    pub thirds: Vec<f32>,
     /// The unit normal of each surfel for shading; empty if these are the normals of the disks'
     /// planes.
     pub normals: Vec<[f32; 3]>,

@@ -90,6 +90,7 @@ fn sampled(points: &Points, step: usize) -> Points {
         axes: points.axes.as_ref().map(|all| each(all, step)),
         clips: points.clips.as_ref().map(|all| each(all, step)),
         caps: points.caps.as_ref().map(|all| each(all, step)),
+        thirds: points.thirds.as_ref().map(|all| each(all, step)),
         colors,
         encoded: points.encoded,
         up: points.up,

@@ -188,15 +188,22 @@ impl Files {
     /// The errors of [`io::read`], and [`Error::Usage`] if standard input is named twice, or if
     /// opacities are given for classes that no file has.
     pub fn read(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
-        self.read_with(None, progress)
+        self.read_with(None, false, progress)
     }
 
-    /// Reads the points of each file with the attribute `column`.
-    pub(super) fn read_with(&self, column: Option<String>, progress: &dyn Progress) -> Result<Vec<Points>> {
+    /// Reads the points of each file with the attribute `column`; `solid` is
+    /// [`ReadOptions::solid`].
+    pub(super) fn read_with(
+        &self,
+        column: Option<String>,
+        solid: bool,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Points>> {
         if self.paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read only once: give - once".into()));
         }
-        let read = |path: &Path| io::read_raw(path, self.options.with_column(column.clone()), progress);
+        let options = ReadOptions { solid, ..self.options.with_column(column) };
+        let read = |path: &Path| io::read_raw(path, options.clone(), progress);
         let (mut inputs, left_out) = self.each(read, || Some(Points::default()))?;
         // An unreadable file has an entry without points, so that indices of inputs stay those of
         // `paths`.
@@ -213,7 +220,7 @@ impl Files {
     ///
     /// The errors of [`Files::read`].
     pub fn described(path: &Path, options: &InputOptions, progress: &dyn Progress) -> Result<Points> {
-        let mut reading = ReadOptions { describe: true, ..options.of_file() };
+        let mut reading = ReadOptions { describe: true, solid: true, ..options.of_file() };
         reading.wanted.spans = true;
         let points = io::read_with(path, reading, progress)?;
         check_classes(options, std::slice::from_ref(&points))?;

@@ -179,7 +179,9 @@ impl Request<'_> {
         if pipe && self.scene.pipe_read.swap(true, Ordering::Relaxed) {
             return Err(Error::Usage("standard input was read before and cannot be read again: open a file".into()));
         }
-        self.files().read_with(self.scene.options.colors.column(), progress)
+        // Sizes that are estimated anew, and points that face the camera, are those of surfels.
+        let solid = self.surfels().size.is_none() && self.options.points.facing.is_none();
+        self.files().read_with(self.scene.options.colors.column(), solid, progress)
     }
 
     /// Fails for options of triangles if the scene has none.

@@ -202,13 +202,16 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     preparation.rounding = rounding(&surfels, &low, relative);
     let normals = own_normals(&given, &surfels);
     let Gathered { points, provenance, .. } = gathered;
-    let Points { colors, encoded, closed, clips, texture, texture_slopes, tree, .. } = points;
+    let Points { colors, encoded, closed, clips, thirds, texture, texture_slopes, tree, .. } = points;
     let (centers, slopes) = (texture.unwrap_or_default(), texture_slopes.unwrap_or_default());
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no clipped disk, and then no list of clip lines.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
+    // Where a radius was limited, the third half-axis stays the shortest.
+    let thirds =
+        thirds.unwrap_or_default().into_iter().zip(&surfels).map(|(third, surfel)| third.min(surfel.shorter()));
+    let of_disks = Scene { low, clips, caps, normals, thirds: thirds.collect(), ..Scene::default() };
     let mut hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin));
     hierarchy.iter_mut().for_each(|tree| tree.settle(&surfels, &of_disks.low));
     let hierarchy = hierarchy.map(Arc::new);

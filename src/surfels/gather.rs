@@ -82,6 +82,7 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.axes, before, input.axes, count);
     append(&mut all.clips, before, input.clips, count);
     append(&mut all.caps, before, input.caps, count);
+    append(&mut all.thirds, before, input.thirds, count);
     append(&mut all.texture, before, input.texture, count);
     append(&mut all.texture_numbers, before, input.texture_numbers, count);
     all.tree = input.tree.filter(|_| before == 0).or(all.tree.take().filter(|_| count == 0));

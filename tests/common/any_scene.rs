@@ -96,6 +96,7 @@ pub fn taken(scene: &Scene, indices: &[usize]) -> Scene {
         low: of(&scene.low, indices),
         clips: of(&scene.clips, indices),
         caps: of(&scene.caps, indices),
+        thirds: of(&scene.thirds, indices),
         normals: of(&scene.normals, indices),
         colors,
         ..scene.clone()

@@ -112,6 +112,19 @@ pub fn harmonic(l: i32, m: i32, direction: DVec3) -> f64 {
     }
 }
 
+/// The colour of a Gaussian, in sRGB codes, along a direction of unit length from the eye.
+pub fn seen_color(gaussian: &Gaussian, direction: DVec3) -> [f64; 3] {
+    let terms = gaussian.rest.len() / 3;
+    [0, 1, 2].map(|channel| {
+        let mut value = 0.5 + harmonic(0, 0, direction) * f64::from(gaussian.base[channel]);
+        let orders = (1..4).flat_map(|l| (-l..=l).map(move |m| (l, m)));
+        for ((l, m), rest) in orders.zip(&gaussian.rest[channel * terms..(channel + 1) * terms]) {
+            value += f64::from(*rest) * harmonic(l, m, direction);
+        }
+        value.max(0.0)
+    })
+}
+
 /// A Gaussian prepared for the oracle's camera.
 struct Seen {
     center: DVec3,
@@ -138,15 +151,7 @@ impl Seen {
         let axes = [turn * DVec3::X, turn * DVec3::Y];
         let sigmas = [0, 1].map(|k| f64::from(gaussian.scales[k]).exp());
         let direction = (center - camera.eye).normalize();
-        let terms = gaussian.rest.len() / 3;
-        let color = [0, 1, 2].map(|channel| {
-            let mut value = 0.5 + harmonic(0, 0, direction) * f64::from(gaussian.base[channel]);
-            let orders = (1..4).flat_map(|l| (-l..=l).map(move |m| (l, m)));
-            for ((l, m), rest) in orders.zip(&gaussian.rest[channel * terms..(channel + 1) * terms]) {
-                value += f64::from(*rest) * harmonic(l, m, direction);
-            }
-            value.max(0.0)
-        });
+        let color = seen_color(gaussian, direction);
         let seen = camera.to_camera(center);
         let image = [camera.fx * seen.x / seen.z + camera.cx, camera.fy * seen.y / seen.z + camera.cy];
         let along = |k: usize| extent() * sigmas[k] * camera.rotation.row(2).dot(axes[k]);
@@ -198,7 +203,8 @@ pub fn picture(gaussians: &[Gaussian], camera: &Camera) -> Vec<([f64; 4], bool)>
     lists.into_iter().map(composited).collect()
 }
 
-fn composited(mut list: Vec<(f64, f64, [f64; 3], bool)>) -> ([f64; 4], bool) {
+/// Composites fragments of depth, alpha, colour and certainty from front to back.
+pub fn composited(mut list: Vec<(f64, f64, [f64; 3], bool)>) -> ([f64; 4], bool) {
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut certain = list.iter().all(|fragment| fragment.3);
     certain &= list.windows(2).all(|pair| pair[1].0 / pair[0].0 - 1.0 > 2e-6);

@@ -15,6 +15,7 @@ pub mod meshes;
 pub mod modules;
 mod random;
 pub mod scenes;
+pub mod solids;
 pub mod variants;
 
 pub use random::Random;

@@ -220,9 +220,10 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
     let low = order.iter().filter_map(|&k| scene.low.get(k).copied()).collect();
     let clips = order.iter().filter_map(|&k| scene.clips.get(k).copied()).collect();
     let caps = order.iter().filter_map(|&k| scene.caps.get(k).copied()).collect();
+    let thirds = order.iter().filter_map(|&k| scene.thirds.get(k).copied()).collect();
     let normals = order.iter().filter_map(|&k| scene.normals.get(k).copied()).collect();
     let surfels = order.iter().map(|&k| scene.surfels[k]).collect();
-    Scene { surfels, low, clips, caps, normals, colors, ..scene.clone() }
+    Scene { surfels, low, clips, caps, thirds, normals, colors, ..scene.clone() }
 }
 
 /// Scenes with many fragments on a pixel, with 8-bit and with f32 colours.

@@ -87,8 +87,8 @@ fn values(needs: &SceneNeeds) -> Vec<String> {
     set.chain(left_out).chain(alternatives).collect()
 }
 
-/// The needs of a random render of a scene, and of some again through a lens; `None` if its options
-/// are refused.
+/// The needs of a random render of a scene, and of some again through a lens or as 3D Gaussians;
+/// `None` if its options are refused.
 fn picture(
     scene: &Scene,
     mut facts: Facts,
@@ -113,9 +113,15 @@ fn picture(
     check::options(&options, false).ok()?;
     check::scene(&facts, &options, false).ok()?;
     let (adapter, sizes) = (adapter(random), sizes(random));
-    let of = |camera: &Camera| Plan::of(&facts, &adapter, camera, &options, &sizes).ok().map(|plan| plan.needs);
+    let needs = |facts: &Facts, camera: &Camera| {
+        Plan::of(facts, &adapter, camera, &options, &sizes).ok().map(|plan| plan.needs)
+    };
+    let of = |camera: &Camera| needs(&facts, camera);
     let through = lensed(camera, lenses).filter(|camera| check::lens(&facts, camera, &options, false).is_ok());
-    Some((of(camera)?, through.as_ref().and_then(of)))
+    // Where 3D Gaussians may be drawn, they take the place of a lens.
+    let solid = Facts { solid: true, ..facts.clone() };
+    let as_solid = || check::scene(&solid, &options, false).ok().and_then(|()| needs(&solid, camera));
+    Some((of(camera)?, through.as_ref().and_then(of).or_else(as_solid)))
 }
 
 /// The camera with a lens, in one of four renders.

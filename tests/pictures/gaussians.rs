@@ -296,8 +296,8 @@ fn the_oracles_harmonics_are_the_programs() {
     }
 }
 
-/// Flat ellipsoids become surfels perpendicular to their shortest axis; thicker ellipsoids are
-/// refused without `--flatten`.
+/// Flat ellipsoids become surfels perpendicular to their shortest axis; commands that make surfels
+/// refuse thicker ellipsoids without `--flatten`.
 #[test]
 fn flat_ellipsoids_are_surfels_and_others_are_told() {
     let flat = torus(500, 1, 3);
@@ -321,7 +321,7 @@ fn flat_ellipsoids_are_surfels_and_others_are_told() {
     assert!(turned.surfels.iter().all(|surfel| surfel.normal().is_finite()));
     let path = folder.file("solid.ply", file(&solid(0.5, 2)));
     let output = folder.path("solid.png");
-    fails(&["render", text(&path), "-o", text(&output)], 1, &["500 of its 500 Gaussians", "--flatten"]);
+    fails(&["lod", text(&path), "-o", text(&output)], 1, &["500 of its 500 Gaussians", "--flatten"]);
     assert!(!output.exists());
     let told = succeeds(&["render", text(&path), "-o", text(&output), "--flatten", "--size", "64x64"]);
     let told = String::from_utf8(told.stderr).unwrap();

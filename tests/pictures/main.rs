@@ -32,6 +32,7 @@ mod raster;
 mod refusals;
 mod samples;
 mod separate;
+mod solid;
 mod texture;
 mod traffic;
 mod transparency;

@@ -199,6 +199,14 @@ fn shear(p: vec3<f32>) -> vec2<f32> {
     return vec2<f32>(0.0);
 }
 
+fn slope_in_view(p: vec3<f32>) -> vec2<f32> {
+    return vec2<f32>(0.0);
+}
+
+fn most_slope() -> vec2<f32> {
+    return vec2<f32>(0.0);
+}
+
 fn image_step(x: vec2<f32>, depths: vec2<f32>, focal: vec2<f32>) -> vec2<f32> {
     return x * focal;
 }

@@ -187,3 +187,24 @@ fn along_axis(image: vec2<f32>) -> f32 {
     let d = (image - held.intrinsics.zw) / held.intrinsics.xy;
     return inverseSqrt(1.0 + dot2(d, d));
 }
+
+// X/Z and Y/Z of the points that lie left of and above the image by 0.15 times its size, and right
+// of and below it.
+fn slope_limits() -> vec4<f32> {
+    let size = vec2<f32>(f32(held.width), f32(held.height));
+    let first = (-0.15 * size - held.intrinsics.zw) / held.intrinsics.xy;
+    return vec4<f32>(first, (1.15 * size - held.intrinsics.zw) / held.intrinsics.xy);
+}
+
+// For 3D Gaussians (axes_conic.wgsl): X/Z and Y/Z at p, limited to a little more than the image, as
+// the code of 3D Gaussian splatting limits them.
+fn slope_in_view(p: vec3<f32>) -> vec2<f32> {
+    let limits = slope_limits();
+    return min(max(p.xy / p.z, limits.xy), limits.zw);
+}
+
+// The greatest absolute values of slope_in_view.
+fn most_slope() -> vec2<f32> {
+    let limits = slope_limits();
+    return max(abs(limits.xy), abs(limits.zw));
+}

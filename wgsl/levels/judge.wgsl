@@ -92,7 +92,7 @@ fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
 fn draws_children(node: TreeNode, ball: Ball) -> bool {
     let radius = node.children * held.unit * (1.0 + BOUND_SLACK);
     let nearest = ball.nearest - BOUND_SLACK * norm3(ball.center);
-    let past = nearest - radius - growth(ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
+    let past = nearest - radius - growth(radius, ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
     // With the negative radius, is_beside() is false exactly if the ball lies wholly within the
     // image.
     let within = !is_beside(ball.center, -ball.radius, 0.0);

@@ -16,12 +16,13 @@ struct Axes {
 override LEAST_RADIUS: f32;
 override MOST_RADIUS: f32;
 
-fn growth(depth: f32) -> f32 {
+fn growth(radius: f32, depth: f32) -> f32 {
     let pixel = widening(max(depth, 0.0)) / min(held.intrinsics.x, held.intrinsics.y);
     return 1.00001 * max(LEAST_RADIUS, 0.5) * pixel;
 }
 
-fn half_axes(surfel: Surfel, depth: f32) -> Axes {
+fn half_axes(index: u32, surfel: Surfel, center: vec3<f32>) -> Axes {
+    let depth = center.z;
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let row = widening(depth) / held.intrinsics.y;

@@ -1,5 +1,5 @@
 // The half-axes of a surfel as given, in camera and world space, device units. Same interface as
-// axes_facing.wgsl.
+// axes_facing.wgsl and axes_conic.wgsl.
 // #import layout::{Surfel, held}
 // #import project::{rotate_plain}
 
@@ -10,13 +10,14 @@ struct Axes {
     t_world: vec3<f32>,
 }
 
-// An upper bound on how much a surfel's drawn radius exceeds its given one, at any depth up to
-// `depth`; device units.
-fn growth(depth: f32) -> f32 {
+// An upper bound on how much a surfel's drawn radius exceeds its given one, which is at most
+// `radius`, at any depth up to `depth`; device units.
+fn growth(radius: f32, depth: f32) -> f32 {
     return 0.0;
 }
 
-fn half_axes(surfel: Surfel, depth: f32) -> Axes {
+// `center` is the centre in camera space, device units.
+fn half_axes(index: u32, surfel: Surfel, center: vec3<f32>) -> Axes {
     // Plain f32 suffices for most splats; the half-axes of thin ones are rotated again in doubled
     // precision (rows.wgsl).
     let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;

@@ -21,7 +21,7 @@ struct Ball {
 fn ball_at(relative: vec3<f32>, radius: f32) -> Ball {
     var b: Ball;
     b.center = rotate_plain(relative);
-    b.radius = radius + growth(b.center.z + radius);
+    b.radius = radius + growth(radius, b.center.z + radius);
     b.nearest = b.center.z - b.radius;
     b.farthest = b.center.z + b.radius;
     return b;

@@ -4,7 +4,7 @@
 // need not wait. Where project_draws.wgsl is part of the module, the invocation also draws the
 // splat's nearest depths, which is stage 2.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xcc477997dbdd9eb1
+// All loops end, by 1 of src/gpu/loops.rs: 0xf75e6d161ada379d
 // #import around::{around, is_again}
 // #import axes_*::{half_axes}
 // #import camera_orthographic|perspective::{homography}
@@ -118,7 +118,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let index = surfel_of(place);
     let surfel = surfel_at(index);
     let center = rotate(relative_center(index, surfel));
-    let axes = half_axes(surfel, center[2].high);
+    let axes = half_axes(index, surfel, vec3<f32>(center[0].high, center[1].high, center[2].high));
     var h = homography(center, axes.s, axes.t, axes.s_world, axes.t_world, every);
     if (h.rare) {
         return RARE;

@@ -12,6 +12,9 @@ pub(super) struct Gaussians {
     pub opacities: [f32; 3],
     /// Medians of the longer and of the shorter standard deviation, world units.
     pub deviations: [f32; 2],
+    /// Median standard deviation along the shortest axis; None for Gaussian surfels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f32>,
 }
 
 impl Gaussians {
@@ -34,6 +37,8 @@ impl Gaussians {
             degree: if let Colors::Harmonics(harmonics) = &scene.colors { harmonics.degree() } else { 0 },
             opacities: [opacities[0], middle(&opacities), opacities[count - 1]],
             deviations: [middle(&longer), middle(&shorter)],
+            thickness: (!scene.thirds.is_empty())
+                .then(|| middle(&sorted(&mut scene.thirds.iter().map(|third| deviation(*third))))),
         })
     }
 }

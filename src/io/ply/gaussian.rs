@@ -1,5 +1,5 @@
 //! Vertices that are Gaussians: 2D Gaussian splatting (Huang et al. 2024), and 3D Gaussian
-//! splatting (Kerbl et al. 2023) where its Gaussians are flat.
+//! splatting (Kerbl et al. 2023), whose Gaussians are surfels where they are flat.
 //!
 //! The file holds the parameters as they are trained. `scale_0`, `scale_1` and, in three
 //! dimensions, `scale_2` are logarithms of standard deviations. `rot_0` (w) to `rot_3` are a
@@ -149,17 +149,22 @@ pub(super) struct Gaussians<'a> {
     terms: Vec<f32>,
     /// Shortest half-axis over the middle one, of each ellipsoid that can be drawn.
     ratios: Vec<f32>,
+    /// Shortest half-axis of each ellipsoid, world units.
+    thirds: Vec<f32>,
 }
 
 impl<'a> Gaussians<'a> {
     /// Reserves memory for `rows` Gaussians.
     pub(super) fn with_capacity(layout: &'a GaussianLayout, rows: u64) -> Result<Self, Fault> {
-        let (mut axes, mut colors, mut terms, mut ratios) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut axes, mut colors, mut terms) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut ratios, mut thirds) = (Vec::new(), Vec::new());
         reserve(&mut axes, rows)?;
         reserve(&mut colors, rows)?;
         reserve(&mut terms, rows.saturating_mul(layout.rest.len() as u64))?;
-        reserve(&mut ratios, if layout.scales.len() == 3 { rows } else { 0 })?;
-        Ok(Self { layout, axes, colors, terms, ratios })
+        for lengths in [&mut ratios, &mut thirds] {
+            reserve(lengths, if layout.scales.len() == 3 { rows } else { 0 })?;
+        }
+        Ok(Self { layout, axes, colors, terms, ratios, thirds })
     }
 
     /// Adds a Gaussian at `position`; `value(column)` gives its numbers.
@@ -186,6 +191,7 @@ impl<'a> Gaussians<'a> {
             if thickness.is_nan() {
                 axes[0].0 = f64::NAN;
             }
+            self.thirds.push((EXTENT * thickness) as f32);
             ratio = Some((thickness / axes[0].0.min(axes[1].0)) as f32);
         }
         let half_axis = |(deviation, unit): (f64, DVec3)| (rotation * unit * (EXTENT * deviation)).as_vec3().to_array();
@@ -219,6 +225,7 @@ impl<'a> Gaussians<'a> {
             }
         };
         points.flattened = flattened(self.ratios);
+        points.thirds = points.flattened.map(|_| self.thirds);
     }
 }
 
@@ -247,15 +254,22 @@ fn flattened(mut ratios: Vec<f32>) -> Option<Flattened> {
     Some(Flattened { count: ratios.len() as u64, thick, ratio })
 }
 
-/// Refuses a file with too many thick ellipsoids, unless the user asked to flatten them.
-pub(super) fn check(points: &Points, become_flat: bool) -> Result<(), Fault> {
-    match points.flattened {
-        Some(Flattened { count, thick, ratio }) if !become_flat && thick as f64 > MOST_THICK * count as f64 => {
-            Err(Fault::Malformed(format!(
-                "{thick} of its {count} Gaussians are ellipsoids thicker than a tenth of their width (median: {ratio:.2}), \
-                 not surfels: use --flatten to leave their shortest axis out"
-            )))
-        }
-        _ => Ok(()),
+/// Decides what the ellipsoids of a file are: surfels, or 3D Gaussians if too many are thick.
+///
+/// They become surfels anyway if `become_flat` is set. If `stay_solid` is not set, thick ones are
+/// refused.
+pub(super) fn settle(points: &mut Points, [become_flat, stay_solid]: [bool; 2]) -> Result<(), Fault> {
+    let Some(Flattened { count, thick, ratio }) = points.flattened else { return Ok(()) };
+    if become_flat || thick as f64 <= MOST_THICK * count as f64 {
+        points.thirds = None;
+        return Ok(());
     }
+    if stay_solid {
+        points.flattened = None;
+        return Ok(());
+    }
+    Err(Fault::Malformed(format!(
+        "{thick} of its {count} Gaussians are ellipsoids thicker than a tenth of their width (median: {ratio:.2}), \
+         not surfels: use --flatten to leave their shortest axis out"
+    )))
 }

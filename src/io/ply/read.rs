@@ -42,7 +42,8 @@ use std::path::{Component, Path, PathBuf};
 /// Gaussian splatting. Their half-axes are [`EXTENT`](crate::scene::gaussian::EXTENT) standard
 /// deviations, beyond which nothing shows, and their colours have alpha and depend on the view if
 /// the file says so. SuperSplat's compressed files are read too. With [`ReadOptions::flatten`],
-/// ellipsoids of any thickness lose their shortest axis.
+/// ellipsoids of any thickness lose their shortest axis; with [`ReadOptions::solid`], thick ones
+/// keep it.
 ///
 /// Comments in the header: `up y` or `up z` names the axis that points up; `closed` says that
 /// surfels cover a closed surface; `triangles NAME` names a mesh in the same folder that is drawn
@@ -260,7 +261,7 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     };
     progress.end();
     let Contents { mut points, faces, tree, whole, collector } = contents.map_err(in_file)?;
-    gaussian::check(&points, options.flatten).map_err(in_file)?;
+    gaussian::settle(&mut points, [options.flatten, options.solid]).map_err(in_file)?;
     points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
     if options.describe {
         points.about = Some(Box::new(about(&header, vertex).map_err(in_file)?));

@@ -12,7 +12,8 @@ use crate::io::{Points, ReadOptions};
 pub(in crate::io) struct Table {
     element: Element,
     layout: Layout,
-    flatten: bool,
+    /// [`ReadOptions::flatten`] and [`ReadOptions::solid`].
+    thick: [bool; 2],
     /// The indices of the columns that are needed, in order.
     needed: Vec<usize>,
     /// The index in `needed` of each column of the layout.
@@ -40,7 +41,7 @@ impl Table {
         needed.dedup();
         let place = |slot: usize| needed.iter().position(|own| *own == slot).unwrap_or_default();
         let places = layout.columns.iter().map(|column| place(column.slot)).collect();
-        Ok(Self { element, layout, flatten: options.flatten, needed, places })
+        Ok(Self { element, layout, thick: [options.flatten, options.solid], needed, places })
     }
 
     /// The indices of the columns whose numbers a row has, in order.
@@ -99,7 +100,7 @@ impl Rows<'_> {
     /// Returns the points, which may be the vertices of a mesh. Text has no types: numbers of
     /// intensities are integers if all of the file are whole, and those of colours may be.
     pub fn finish(self, is_mesh: bool) -> Result<Points, Fault> {
-        let Table { layout, flatten, places, .. } = self.table;
+        let Table { layout, thick, places, .. } = self.table;
         let is_whole = |column: usize| self.whole[places[column]];
         let (mut points, _, collector) = self.vertices.into_points();
         for run in points.raw.iter_mut().flat_map(|raw| &mut raw.runs) {
@@ -113,7 +114,7 @@ impl Rows<'_> {
                 *integer = layout.intensity.is_some_and(is_whole);
             }
         }
-        gaussian::check(&points, *flatten)?;
+        gaussian::settle(&mut points, *thick)?;
         collector.map_or(Ok(()), |collector| collector.finish(&mut points, is_mesh))?;
         Ok(points)
     }

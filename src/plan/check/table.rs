@@ -237,7 +237,38 @@ pub(super) const TEXTURES: [Clash; 3] = [
 ];
 
 /// Combinations of scenes and options that are rejected.
-pub(super) const SCENES: [SceneClash; 13] = [
+pub(super) const SCENES: [SceneClash; 19] = [
+    SceneClash {
+        applies: |facts, options, device| facts.solid && device && options.raster.is_some(),
+        sentence: "the rasteriser sorts no 3D Gaussians: take --backend gpu, or --flatten to make surfels of them",
+    },
+    SceneClash {
+        applies: |facts, options, _| facts.solid && !options.detail.is_finest(),
+        sentence: "3D Gaussians have no levels of detail: leave --lod and --splats out, or take --flatten and epsplat lod",
+    },
+    SceneClash {
+        applies: |facts, options, _| {
+            facts.solid && !matches!(options.composite, Composite::Gaussians | Composite::Sorted)
+        },
+        sentence: "3D Gaussians have no surface: leave --composite, --blend and --separate out, or take --flatten to make \
+                   surfels of them",
+    },
+    SceneClash {
+        applies: |facts, options, _| facts.solid && options.kernel.shape() != KernelShape::Gaussian,
+        sentence: "3D Gaussians have a kernel of their own: leave --kernel out, or take --flatten to make surfels of them",
+    },
+    SceneClash {
+        applies: |facts, options, _| {
+            let known = matches!(options.low_pass, LowPass::None | LowPass::Gaussians);
+            facts.solid && (!known || options.outline.is_some())
+        },
+        sentence: "3D Gaussians have no rims: leave --outline out and take --lowpass gaussians or none, or take --flatten to \
+                   make surfels of them",
+    },
+    SceneClash {
+        applies: |facts, options, _| facts.solid && options.maps.has(Map::Normal),
+        sentence: "3D Gaussians have no normals: leave the map normal out, or take --flatten to make surfels of them",
+    },
     SceneClash {
         applies: |facts, options, _| options.cull == Cull::Back && !facts.oriented && facts.surfels > 0,
         sentence: "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
@@ -313,7 +344,11 @@ pub(super) const SCENES: [SceneClash; 13] = [
 ];
 
 /// Combinations that a camera does not show if its lens is no pinhole.
-pub(super) const LENSES: [LensClash; 4] = [
+pub(super) const LENSES: [LensClash; 5] = [
+    LensClash {
+        applies: |_, facts, _, _| facts.solid,
+        sentence: "3D Gaussians are drawn by pinholes: take --flatten with a lens, or --ignore-distortion",
+    },
     LensClash {
         applies: |_, _, options, device| device && options.raster.is_some(),
         sentence: "the rasteriser draws by pinholes: take --backend gpu with a lens, or --ignore-distortion",

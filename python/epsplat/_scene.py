@@ -102,7 +102,8 @@ class Scene:
 
         positions (N, 3) float64, and where they are known normals (N, 3), radii (N,), half_axes
         (N, 2, 3), texture (N, 2) float32, colors (N, 4) as uint8 sRGB or float32 linear,
-        triangles (M, 3) int64, and up ("y" or "z"): ``Scene(**arrays)`` is that input again.
+        triangles (M, 3) int64. ``Scene(**arrays)`` has the same points; the up direction of the
+        format, and clip lines and curvature of surfels, are no arrays (:meth:`save` writes them).
         """
         return _epsplat.arrays(self._scene)
 

@@ -295,7 +295,7 @@ pub fn arrays<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Bound<'py, Py
 }
 
 fn of_points(py: Python<'_>, points: Points) -> PyResult<Bound<'_, PyDict>> {
-    use epsplat::low_level::scene::{Colors, Up};
+    use epsplat::low_level::scene::Colors;
     let points = match points.colors {
         Some(Colors::Harmonics(_)) => points.in_light(),
         _ => points,
@@ -320,9 +320,6 @@ fn of_points(py: Python<'_>, points: Points) -> PyResult<Bound<'_, PyDict>> {
             all.set_item("colors", PyArray1::from_vec(py, colors.into_flattened()).reshape([rows, 4])?)?;
         }
         _ => {}
-    }
-    if let Some(up) = points.up {
-        all.set_item("up", if up == Up::Z { "z" } else { "y" })?;
     }
     if let Some(places) = points.texture {
         all.set_item("texture", PyArray1::from_vec(py, places.into_flattened()).reshape([rows, 2])?)?;

@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 use std::sync::{Mutex, PoisonError};
 
-use epsplat::{CameraOptions, DeviceOptions, Error, Progress, RenderOptions, Renderer as Kept, Result};
+use epsplat::{Camera, CameraOptions, DeviceOptions, Error, Progress, RenderOptions, Renderer as Kept, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -68,14 +68,7 @@ impl Renderer {
         let views = views.map_err(|error| exception(py, &error))?;
         let (stack, notes) = run(py, progress, |progress| {
             self.with(progress, |kept| {
-                let sizes: Vec<_> = views.iter().map(|view| kept.camera(view)).collect::<Result<_>>()?;
-                let size = |index: usize| (sizes[index].width, sizes[index].height);
-                if let Some(other) = (1..views.len()).find(|index| size(*index) != size(0)) {
-                    let ((w, h), (ow, oh)) = (size(0), size(other));
-                    return Err(Error::Usage(format!(
-                        "the views have different sizes, {w}x{h} and {ow}x{oh}: render those of one size together"
-                    )));
-                }
+                let views = of_one_size(kept, views)?;
                 let mut stack = Stack::of(views.len());
                 for view in &views {
                     stack.push(kept.frame(view, progress)?);
@@ -133,6 +126,23 @@ impl Renderer {
         let (bounds, _) = run(py, None, |progress| self.with(progress, |kept| Ok(kept.bounds())))?;
         Ok((bounds.min.to_array(), bounds.max.to_array()))
     }
+}
+
+/// Returns the cameras of several views, so that their sizes can be compared before the first one
+/// is rendered. A single view stays as it is, and describes itself in a note.
+fn of_one_size(kept: &Kept, views: Vec<epsplat::View>) -> Result<Vec<epsplat::View>> {
+    if views.len() < 2 {
+        return Ok(views);
+    }
+    let cameras: Vec<Camera> = views.iter().map(|view| kept.camera(view)).collect::<Result<_>>()?;
+    let size = |camera: &Camera| (camera.width, camera.height);
+    if let Some(other) = cameras.iter().find(|camera| size(camera) != size(&cameras[0])) {
+        let ((w, h), (ow, oh)) = (size(&cameras[0]), size(other));
+        return Err(Error::Usage(format!(
+            "the views have different sizes, {w}x{h} and {ow}x{oh}: render those of one size together"
+        )));
+    }
+    Ok(cameras.into_iter().map(epsplat::View::from).collect())
 }
 
 impl Renderer {

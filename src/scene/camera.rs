@@ -334,14 +334,25 @@ impl Camera {
         if self.depth_is_distance() { p.length() } else { p.z }
     }
 
+    /// The point of a pinhole's or a lens's plane at the image point (x, y), pixels.
+    fn plane(&self, x: f64, y: f64) -> DVec2 {
+        DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy)
+    }
+
+    /// Whether the camera shows something at the image point (x, y), pixels: a lens shows nothing
+    /// beyond its image ([`Optics::shows`]).
+    pub fn shows(&self, x: f64, y: f64) -> bool {
+        self.optics.as_ref().is_none_or(|optics| optics.shows(self.plane(x, y)))
+    }
+
     /// The world-space direction of the view ray through the image point (x, y), pixels.
     ///
     /// It is not normalised: its depth is 1. The ray starts at [`ray_start`](Self::ray_start).
-    /// Where a lens shows nothing, it is the camera's axis.
+    /// Where a lens shows nothing ([`shows`](Self::shows)), it is that of [`Optics::ray`].
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
         if let Some(optics) = &self.optics {
-            let plane = DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy);
-            return self.rotation.transpose() * optics.ray(plane).unwrap_or(DVec3::Z);
+            let plane = self.plane(x, y);
+            return self.rotation.transpose() * optics.ray(plane);
         }
         let camera = match self.projection {
             Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),

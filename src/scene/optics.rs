@@ -16,7 +16,9 @@
 //! **Depth** is camera-space z for a perspective, and the distance from the eye for the other
 //! forms, which also see what lies behind the plane of the eye.
 
-use std::f64::consts::PI;
+mod inverse;
+
+use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
 use glam::{DMat2, DVec2, DVec3};
@@ -74,7 +76,10 @@ pub struct Optics {
     prism: [f64; 2],
     /// A factor on X and Y before a fisheye's angle is taken: 1, but for the FOV model.
     wide: f64,
+    /// Whether depth is camera-space z although the first step is a fisheye's: the FOV model.
+    is_flat: bool,
     limit: f64,
+    sure: f64,
     reach: f64,
 }
 
@@ -103,14 +108,12 @@ const STEPS: usize = 4096;
 /// The largest angle from the axis that a perspective shows, radians: 89.9 degrees.
 const WIDEST: f64 = 89.9 * PI / 180.0;
 
-/// Rounds of Newton's method for the tangential part of a distortion.
-const ROUNDS: usize = 12;
-
 impl Optics {
     /// A lens without distortion.
     pub fn of(form: Form) -> Self {
         let (radial, under, tangential, prism) = ([0.0; 4], [0.0; 3], [0.0; 2], [0.0; 2]);
-        Self { form, radial, under, tangential, prism, wide: 1.0, limit: 0.0, reach: 0.0 }.limited()
+        let (wide, is_flat, limit, sure, reach) = (1.0, false, 0.0, 0.0, 0.0);
+        Self { form, radial, under, tangential, prism, wide, is_flat, limit, sure, reach }.limited()
     }
 
     /// This lens with the radial numerator's coefficients k1 to k4.
@@ -170,7 +173,10 @@ impl Optics {
 
     fn limited(self) -> Self {
         let end = match self.form {
-            Form::Equirectangular => return Self { limit: f64::INFINITY, reach: f64::INFINITY, ..self },
+            Form::Equirectangular => {
+                let all = f64::INFINITY;
+                return Self { limit: all, sure: all, reach: all, ..self };
+            }
             Form::Fisheye => PI,
             Form::Perspective => WIDEST,
         };
@@ -196,7 +202,7 @@ impl Optics {
                 radius(low)
             }
         };
-        Self { limit, reach: limit, ..self }
+        Self { limit, sure: Self { limit, ..self }.surely(), reach: limit, ..self }
     }
 
     /// This lens in a camera whose image ends at `radius` of the plane, in focal lengths: splats
@@ -215,6 +221,23 @@ impl Optics {
     /// with it.
     pub fn reach(&self) -> f64 {
         self.reach
+    }
+
+    /// Whether a point of a segment in camera space lies within [`Self::reach`]. Not for a whole
+    /// sphere.
+    pub fn is_near_segment(&self, a: DVec3, b: DVec3) -> bool {
+        // Directions within the reach are a cone around the axis.
+        let cosine = match self.form {
+            Form::Perspective => self.reach.atan().cos(),
+            _ => self.reach.min(PI).cos(),
+        };
+        let widened = |p: DVec3| DVec3::new(self.wide * p.x, self.wide * p.y, p.z);
+        let (a, along) = (widened(a), widened(b) - widened(a));
+        // Where z / |p| is largest along the segment: a zero of its derivative, which is linear.
+        let share = (along.z * a.length_squared() - a.z * a.dot(along))
+            / (a.z * along.length_squared() - along.z * a.dot(along));
+        let inner = if share > 0.0 && share < 1.0 { share } else { 0.0 };
+        [0.0, inner, 1.0].into_iter().map(|share| a + share * along).any(|p| p.z >= cosine * p.length())
     }
 
     /// The radius, at most [`Self::limit`], that the radial part maps to `wanted`.
@@ -286,42 +309,6 @@ impl Optics {
             steps: rows,
             axis,
         })
-    }
-
-    /// The ray through a point of the plane: a point of depth 1 in camera space; `None` where the
-    /// lens shows nothing.
-    pub fn ray(&self, plane: DVec2) -> Option<DVec3> {
-        if self.form == Form::Equirectangular {
-            let ((sine, cosine), (up, level)) = (plane.x.sin_cos(), plane.y.sin_cos());
-            let in_sphere = plane.y.abs() <= 0.5 * PI && plane.x.abs() <= PI;
-            return in_sphere.then(|| DVec3::new(sine * level, up, cosine * level));
-        }
-        let e = self.undistorted(plane)?;
-        let r = e.length();
-        match self.form {
-            Form::Perspective => Some(e.extend(1.0)),
-            _ => {
-                let (sine, cosine) = r.sin_cos();
-                let across = if r > 0.0 { e * (sine / r / self.wide) } else { e / self.wide };
-                Some(across.extend(cosine).normalize())
-            }
-        }
-    }
-
-    /// The point that the second step maps to `plane`.
-    fn undistorted(&self, plane: DVec2) -> Option<DVec2> {
-        let wanted = plane.length();
-        let mut e = if wanted > 0.0 { plane * (self.radius_of(wanted) / wanted) } else { plane };
-        for _ in 0..ROUNDS {
-            let (value, slope) = self.distorted(e);
-            let step = slope.inverse() * (plane - value);
-            if !step.is_finite() {
-                return None;
-            }
-            e += step;
-        }
-        let off = (self.distorted(e).0 - plane).length();
-        (off <= 1e-9 * (1.0 + wanted) && e.length() <= self.limit).then_some(e)
     }
 }
 

@@ -170,6 +170,11 @@ fn scaled_homography(
     return h;
 }
 
+// A fragment at the pixel (x, y), which such a camera always shows.
+fn within_lens(fragment: Fragment, x: u32, y: u32) -> Fragment {
+    return fragment;
+}
+
 // The direction, in world space and of unit length, of the ray through the centre of the pixel.
 fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;

@@ -40,7 +40,7 @@ fn see_plane(p: array<Double, 3>) -> Sight {
 
 // The point of depth 1 on the ray of a point of the plane, camera space.
 fn plane_ray(plane: vec2<f32>) -> vec3<f32> {
-    let e = undistorted(plane);
+    let e = undistorted(plane).xy;
     let r = norm2(e);
     let turn = turned_by(r);
     let across = e * (select(1.0, turn.y / r, r > 0.0) / held.lens[1].w);

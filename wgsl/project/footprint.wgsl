@@ -52,7 +52,7 @@ fn large_splat(place: u32) -> u32 {
 
 fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     let d = vec2<f32>(f32(i32(x) - splat.anchor_x), f32(i32(y) - splat.anchor_y));
-    var fragment = met(splat, filter_, d);
+    var fragment = within_lens(met(splat, filter_, d), x, y);
     fragment.depth = sided(fragment.depth, is_away(splat, fragment));
     return faded(fragment, splat.fade);
 }

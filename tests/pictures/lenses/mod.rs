@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod borders;
+mod triangles;
+
 use std::f64::consts::{PI, TAU};
 
 use crate::common::{self, Random, bits};

@@ -263,7 +263,10 @@ impl Renderer {
                 let bent = is_told.then(|| lens::note(scene, &camera)).flatten();
                 bent.iter().for_each(|line| progress.note(line));
                 let rendered = match refined::refined(scene, &camera) {
-                    Some(refined) => render(&refined, &camera, settings, backend, progress)?,
+                    Some(refined) => {
+                        refined.note().iter().filter(|_| is_told).for_each(|line| progress.note(line));
+                        render(&refined.scene, &camera, settings, backend, progress)?
+                    }
                     None => renderer.frame(&camera, progress)?,
                 };
                 Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))

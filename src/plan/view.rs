@@ -115,6 +115,7 @@ fn lens(camera: &Camera) -> [[f32; 4]; 7] {
         }
         let radii = [optics.limit(), optics.reach(), optics.sure()].map(|radius| radius.min(1e18) as f32);
         rows[6][..3].copy_from_slice(&radii);
+        rows[6][3] = f32::from(u8::from(!optics.depth_is_distance()));
     }
     rows
 }

@@ -119,8 +119,8 @@ pub struct Truth {
     /// - `color`: the mean over the pixel's samples, premultiplied, over the background; linear
     ///   RGB, straight alpha. Each sample is shaded as [`crate::passes::resolve`] shades a pixel,
     ///   with the ray through the sample.
-    /// - `depth`: camera-space z of the first surface on the ray through the pixel's centre, world
-    ///   units; +inf for none.
+    /// - `depth`: the depth ([`Camera::depth`]) of the first surface on the ray through the pixel's
+    ///   centre, world units; +inf for none.
     /// - `normal`: the unit normal there, in world space, on the side that the surface specifies; 0
     ///   for none.
     pub frame: Frame,

@@ -64,9 +64,14 @@ impl Optics {
 
     /// The point that the second step maps to `plane`, or the one at the border of the image.
     pub(super) fn undistorted(&self, plane: DVec2) -> DVec2 {
+        self.seen_at(plane).unwrap_or_else(|| self.without_lean(plane))
+    }
+
+    /// The point within the limit whose image is at `plane`; `None` where the lens shows nothing.
+    pub(super) fn seen_at(&self, plane: DVec2) -> Option<DVec2> {
         match self.leans() {
-            true => self.found(plane).unwrap_or_else(|| self.without_lean(plane)),
-            false => self.without_lean(plane),
+            true => self.found(plane),
+            false => (plane.length() <= self.sure).then(|| self.without_lean(plane)),
         }
     }
 

@@ -15,7 +15,7 @@ fn ball(count: usize) -> Scene {
 }
 
 /// Lenses with the limit in the image: a whole fisheye, and distortions that fold the image.
-fn folding() -> [(&'static str, Camera); 4] {
+fn folding() -> [(&'static str, Camera); 5] {
     let bent = |radial: [f64; 4]| Optics::of(Form::Perspective).with_radial(radial);
     let leaning = bent([-0.5, 0.0, 0.0, 0.0]).with_tangential([0.01, -0.02]);
     let prism = Optics::of(Form::Fisheye).with_radial([-0.1, 0.0, 0.0, 0.0]).with_prism([0.02, 0.01]);
@@ -24,6 +24,7 @@ fn folding() -> [(&'static str, Camera); 4] {
         ("fisheye", posed((128, 128), Lens::Fisheye(360.0))),
         ("folded", around(bent([-0.5, 0.0, 0.0, 0.0]))),
         ("leaning", around(leaning)),
+        ("fov", posed((128, 128), Lens::Curved(Optics::field_of_view(2.0), [36.0, 36.0, 64.0, 64.0]))),
         ("prism", posed((128, 128), Lens::Curved(prism, [40.0, 40.0, 64.0, 64.0]))),
     ]
 }
@@ -109,4 +110,62 @@ fn truth_ends_where_the_lens_ends() {
     let seen = pixels(&camera).filter(|(pixel, _)| depths[*pixel].is_finite()).count();
     let beyond = pixels(&camera).filter(|(pixel, at)| depths[*pixel].is_finite() && !camera.shows(at.x, at.y)).count();
     assert!(seen > 300 && beyond == 0, "{seen} {beyond}");
+}
+
+/// COLMAP's FOV model is a perspective: it shows what lies in front of the eye, and depth is z.
+#[test]
+fn the_fov_model_shows_depths_along_the_axis_up_to_ninety_degrees() {
+    let Some(gpu) = common::gpu() else { return };
+    let camera = colmap("FOV", &[60.0, 60.0, 320.0, 240.0, 2.5]);
+    let wide = 2.0 * (1.25f64).tan();
+    let scene = disks(400, 0.1, 0.99 * PI, 24);
+    let plain = Settings { kernel: Kernel::Constant, ..settings() };
+    let fault = |sources: Sources| {
+        let device = Backend::Gpu { gpu: Box::new(gpu.clone()), sources };
+        [Backend::Reference, device].map(|backend| {
+            let frame = drawn(&scene, &camera, &plain, &backend);
+            let depths = frame.map(Map::Depth).unwrap();
+            let (mut wrong, mut shown) = (0, 0);
+            for (pixel, at) in pixels(&camera).filter(|(pixel, _)| depths[*pixel].is_finite()) {
+                let plane = (at - DVec2::new(320.0, 240.0)) * 2.5 / 60.0;
+                let angle = plane.length().tan() / wide;
+                let toward = (plane.normalize() * angle).extend(1.0);
+                let depth = f64::from(depths[pixel]);
+                // The point at that depth lies on a disk, within a pixel.
+                let near =
+                    |surfel: &Surfel| (DVec3::from(center(surfel)) - toward * depth).length() < 0.1 + 0.1 * depth;
+                shown += 1;
+                wrong += usize::from(plane.length() >= 0.5 * PI || !scene.surfels.iter().any(near));
+            }
+            (wrong, shown)
+        })
+    };
+    let [twin, device] = fault(Sources::default());
+    let flat =
+        Sources::default().replace("lens_fisheye.wgsl", "return held.lens[6].w > 0.0;", "return false;").unwrap();
+    let broken = fault(flat)[1];
+    eprintln!("pixels in the wrong place: twin {twin:?}, device {device:?}, with distances {broken:?}");
+    assert!(twin.0 == 0 && device.0 == 0 && twin.1 > 300 && device.1 > 300, "{twin:?} {device:?}");
+    assert!(broken.0 > 50, "{broken:?}");
+}
+
+/// Tangential terms move the corners of the image outward; splats there are drawn.
+#[test]
+fn images_of_leaning_lenses_are_covered_up_to_their_corners() {
+    let Some(gpu) = common::gpu() else { return };
+    let place = |k: usize| Vec3::new((k % 81) as f32 * 0.05 - 2.0, (k / 81) as f32 * 0.05 - 2.0, 1.0);
+    let surfels: Vec<Surfel> = (0..81 * 81).map(|k| Surfel::disk(place(k), Vec3::NEG_Z, 0.06)).collect();
+    let wall = Scene { surfels, ..Scene::default() };
+    for lean in [0.0, 0.02, 0.05] {
+        for rest in [[0.0, lean], [lean, 0.0], [-lean, lean]] {
+            let optics = Optics::of(Form::Perspective).with_radial([1e-6, 0.0, 0.0, 0.0]).with_tangential(rest);
+            let camera = posed((200, 200), Lens::Curved(optics, [100.0; 4]));
+            for backend in [Backend::Reference, Backend::gpu(gpu.clone())] {
+                let frame = drawn(&wall, &camera, &settings(), &backend);
+                let depths = frame.map(Map::Depth).unwrap();
+                let empty = depths.iter().filter(|depth| !depth.is_finite()).count();
+                assert_eq!(empty, 0, "{rest:?}");
+            }
+        }
+    }
 }

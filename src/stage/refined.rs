@@ -17,8 +17,8 @@ use crate::scene::{Camera, Form, Optics, Scene, Triangle};
 /// The largest distance of a point of an edge from its straight image, pixels.
 const STRAIGHT: f64 = 0.25;
 
-/// The largest relative error of the depth of the middle of an edge. A distance is not linear along
-/// an edge, and is interpolated as if it were.
+/// The largest relative error of the depth of a point of an edge. The depths of its ends are
+/// interpolated as those of a pinhole.
 const LEVEL: f64 = 1e-3;
 
 /// The largest length of an edge that ends beyond the lens's image, pixels.
@@ -131,10 +131,15 @@ impl View<'_> {
         };
         let along = b_image - a_image;
         let length = along.length();
+        // The device interpolates 1 / depth along the straight image. `share` is that of the image.
         let is_off = |share: f64| {
-            let Some((image, depth)) = self.camera.corner(a.lerp(b, share)) else { return true };
+            let there = share * a_depth / ((1.0 - share) * b_depth + share * a_depth);
+            let Some((image, depth)) = self.camera.corner(a.lerp(b, there)) else { return true };
             let is_curved = (image - a_image).perp_dot(along).abs() > STRAIGHT * length;
-            is_curved || (share == 0.5 && (0.5 * (a_depth + b_depth) - depth).abs() > LEVEL * depth)
+            let share = (image - a_image).dot(along) / along.length_squared();
+            let drawn = 1.0 / ((1.0 - share) / a_depth + share / b_depth);
+            let is_level = (drawn - depth).abs() <= LEVEL * depth;
+            is_curved || !is_level
         };
         length > STRAIGHT && [0.25, 0.5, 0.75].into_iter().any(is_off)
     }

@@ -1,6 +1,7 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk. With perspective.wgsl, the
 // same interface as camera_orthographic.wgsl.
 // Twin: src/passes/homography.rs.
+// #import camera_orthographic|perspective::{Fragment}
 // #import double::{Double, product, quotient, sum, two_sum}
 // #import layout::{held}
 // #import perspective::{chord, clipped_extent, tangents}

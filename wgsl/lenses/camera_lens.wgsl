@@ -3,6 +3,8 @@
 // lens at the centre, in place and in first derivatives. With perspective.wgsl, the same interface
 // as camera_pinhole.wgsl.
 // Twin: src/passes/homography.rs.
+// #import camera_orthographic|perspective::{Fragment}
+// #import distortion|lens_sphere::{shows_plane}
 // #import double::{Double, product, quotient, sum, two_sum}
 // #import layout::{held}
 // #import lens_*::{plane_ray, see_plane}

@@ -1,6 +1,7 @@
 // Evaluates a splat's record at a pixel. Every pass decides coverage, depth and rho by this file
 // alone.
 // Twin: src/passes/footprint.rs.
+// #import camera_*::{within_lens}
 // #import camera_orthographic|perspective::{Fragment}
 // #import curved|facing|flat::{is_away, met}
 // #import fade::{faded}

@@ -119,9 +119,9 @@ fn truth_ends_where_the_lens_ends() {
 #[test]
 fn the_fov_model_shows_depths_along_the_axis_up_to_ninety_degrees() {
     let Some(gpu) = common::gpu() else { return };
-    let camera = colmap("FOV", &[60.0, 60.0, 320.0, 240.0, 2.5]);
-    let wide = 2.0 * (1.25f64).tan();
-    let scene = disks(400, 0.1, 0.99 * PI, 24);
+    let camera = colmap("FOV", &[450.0, 450.0, 320.0, 240.0, 2.0]);
+    let wide = 2.0 * 1f64.tan();
+    let scene = disks(4000, 0.03, 0.99 * PI, 24);
     let plain = Settings { kernel: Kernel::Constant, ..settings() };
     let fault = |sources: Sources| {
         let device = Backend::Gpu { gpu: Box::new(gpu.clone()), sources };
@@ -130,13 +130,13 @@ fn the_fov_model_shows_depths_along_the_axis_up_to_ninety_degrees() {
             let depths = frame.map(Map::Depth).unwrap();
             let (mut wrong, mut shown) = (0, 0);
             for (pixel, at) in pixels(&camera).filter(|(pixel, _)| depths[*pixel].is_finite()) {
-                let plane = (at - DVec2::new(320.0, 240.0)) * 2.5 / 60.0;
+                let plane = (at - DVec2::new(320.0, 240.0)) * 2.0 / 450.0;
                 let angle = plane.length().tan() / wide;
                 let toward = (plane.normalize() * angle).extend(1.0);
                 let depth = f64::from(depths[pixel]);
-                // The point at that depth lies on a disk, within a pixel.
+                // The point at that depth lies on a disk, within a few pixels.
                 let near =
-                    |surfel: &Surfel| (DVec3::from(center(surfel)) - toward * depth).length() < 0.1 + 0.1 * depth;
+                    |surfel: &Surfel| (DVec3::from(center(surfel)) - toward * depth).length() < 0.045 + 0.02 * depth;
                 shown += 1;
                 wrong += usize::from(plane.length() >= 0.5 * PI || !scene.surfels.iter().any(near));
             }
@@ -148,8 +148,11 @@ fn the_fov_model_shows_depths_along_the_axis_up_to_ninety_degrees() {
         Sources::default().replace("lens_fisheye.wgsl", "return held.lens[6].w > 0.0;", "return false;").unwrap();
     let broken = fault(flat)[1];
     eprintln!("pixels in the wrong place: twin {twin:?}, device {device:?}, with distances {broken:?}");
-    assert!(twin.0 == 0 && device.0 == 0 && twin.1 > 300 && device.1 > 300, "{twin:?} {device:?}");
-    assert!(broken.0 > 50, "{broken:?}");
+    assert!(
+        twin.0 <= twin.1 / 100 && device.0 <= device.1 / 100 && twin.1 > 300 && device.1 > 300,
+        "{twin:?} {device:?}"
+    );
+    assert!(broken.0 > broken.1 / 4, "{broken:?}");
 }
 
 /// Tangential terms move the corners of the image outward; splats there are drawn.

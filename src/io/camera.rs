@@ -101,11 +101,14 @@ impl CameraFile {
         Self { size: Some(size), lens, ..self }
     }
 
-    /// This camera as a pinhole with the same focal lengths and principal point, if its lens has
-    /// such; `None` for other cameras.
+    /// This camera as a pinhole with the focal lengths of its model and the same principal point, if
+    /// its lens has such; `None` for other cameras.
     pub fn as_pinhole(&self) -> Option<Self> {
         match self.lens {
-            Lens::Curved(_, values) => Some(Self { lens: Lens::Intrinsics(values), ..self.clone() }),
+            Lens::Curved(optics, [fx, fy, cx, cy]) => {
+                let per = optics.per_focal();
+                Some(Self { lens: Lens::Intrinsics([fx * per, fy * per, cx, cy]), ..self.clone() })
+            }
             _ => None,
         }
     }

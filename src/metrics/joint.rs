@@ -37,6 +37,9 @@ pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> 
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
         let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
         let (start, ray) = (camera.ray_start(x, y), camera.ray(x, y));
+        if !camera.shows(x, y) {
+            return None;
+        }
         let [first, second] = surfaces.map(|surface| surface.first_hit(start, ray, camera.near));
         Some(first?.distance - second?.distance)
     };

@@ -86,8 +86,12 @@ pub(crate) fn kernel_file(kernel: Kernel) -> (&'static str, Vec<(&'static str, f
 
 /// Intersects the ray through the centre of pixel (x, y) with the splat's plane, or its low-pass.
 ///
-/// Returns the intersection and the factor on the kernel's weight; `None` behind the camera.
+/// Returns the intersection and the factor on the kernel's weight; `None` behind the camera, and
+/// where its lens shows nothing.
 pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
+    if !camera.shows(f64::from(x) + 0.5, f64::from(y) + 0.5) {
+        return None;
+    }
     met(splat, camera, low_pass, x, y).map(|(at, gain)| (at, gain * splat.fade.weight()))
 }
 

@@ -121,7 +121,7 @@ pub(super) struct Shown {
     layers: u32,
     /// How much the last layer shows, alpha times transmittance, if it is a tail; else 0.
     tail: f64,
-    /// Depth (camera-space z, world units) and alpha of the nearest surfaces.
+    /// Depth (`Camera::depth`, world units) and alpha of the nearest surfaces.
     nearest: [[f64; 2]; SURFACES],
 }
 

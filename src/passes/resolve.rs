@@ -75,9 +75,9 @@ pub struct Surface {
     pub normal: DVec3,
     /// The mean texture coordinates of the surfels.
     pub place: [f64; 2],
-    /// Camera-space z, world units.
+    /// Its depth ([`Camera::depth`]), world units.
     pub depth: f64,
-    /// The depth of the nearest fragment: camera-space z, world units.
+    /// The depth of the nearest fragment ([`Camera::depth`]), world units.
     pub front: f64,
     /// The sum of weights; 1 for a triangle.
     pub weight: f64,

@@ -53,7 +53,7 @@ pub struct Splat {
 pub struct Filter {
     /// The splat's centre relative to its anchor's centre, pixels.
     pub center: DVec2,
-    /// The smallest and the largest depth of the disk, camera-space z, world units.
+    /// The smallest and the largest depth of the disk ([`Camera::depth`]), world units.
     pub depths: [f64; 2],
     /// The rows of R: `R (x, y) = (r[0] x + r[1] y, r[2] y)`.
     pub r: [f64; 3],

@@ -72,7 +72,7 @@ pub struct Corner {
     pub place: DVec2,
     /// 1 for a vertex with an image, else its depth.
     pub w: f64,
-    /// Camera-space z, world units.
+    /// Its depth ([`Camera::depth`]), world units.
     pub depth: f64,
     /// The factor of its area in the barycentric coordinates (s_k above).
     pub share: f64,
@@ -113,7 +113,7 @@ pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
 /// A triangle at a point of the image.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
-    /// Camera-space z, world units.
+    /// Its depth ([`Camera::depth`]), world units.
     pub depth: f64,
     /// The barycentric coordinates, whose sum is 1.
     pub parts: [f64; 3],
@@ -195,7 +195,7 @@ pub struct Shown {
     pub color: [f64; 4],
     /// World space, unit length.
     pub normal: DVec3,
-    /// Camera-space z, world units; +inf where no triangle is.
+    /// Its depth ([`Camera::depth`]), world units; +inf where no triangle is.
     pub depth: f64,
     /// The smallest relative distance to a decision: to an edge, the near depth, or another
     /// triangle's depth.

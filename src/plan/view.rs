@@ -113,8 +113,9 @@ fn lens(camera: &Camera) -> [[f32; 4]; 7] {
         for (row, coefficients) in optics.coefficients().into_iter().enumerate() {
             (rows[row], rows[row + 3]) = split_all(coefficients);
         }
-        let [limit, reach] = [optics.limit(), optics.reach()].map(|radius| radius.min(1e18) as f32);
-        [rows[6][0], rows[6][1]] = [limit, reach];
+        let radii = [optics.limit(), optics.reach(), optics.sure()].map(|radius| radius.min(1e18) as f32);
+        rows[6][..3].copy_from_slice(&radii);
+        rows[6][3] = f32::from(u8::from(!optics.depth_is_distance()));
     }
     rows
 }

@@ -34,7 +34,7 @@ pub enum Target<'a> {
         /// light if it is `Rgba16Float` or `Rgba32Float`. The colours of Gaussians are sRGB codes
         /// in any format.
         color: &'a wgpu::Texture,
-        /// Takes the map of depths in the format `R32Float`: camera-space z, world units, +inf
+        /// Takes the map of depths ([`Camera::depth`]) in the format `R32Float`: world units, +inf
         /// where nothing is visible.
         depth: Option<&'a wgpu::Texture>,
     },

@@ -140,7 +140,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// [`Error::Limit`] if a limit of the adapter is too small, and any error of the device.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
         let start = Instant::now();
-        self.check_lens(camera)?;
+        self.check_lens(camera, "")?;
         let detail = self.sized(camera);
         let spent = start.elapsed().as_secs_f64() * 1e3;
         let Self { source, backend, sources, faults, kept, of_maps, .. } = self;
@@ -166,11 +166,18 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         Ok((self.filtered(frame, camera), report))
     }
 
-    /// Rejects what a camera whose lens is no pinhole does not show.
-    fn check_lens(&self, camera: &Camera) -> Result<()> {
+    /// Rejects what a camera whose lens is no pinhole does not show. `other` is how to get a
+    /// pinhole instead, as "leave --projection out"; empty if there is no such way.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub(crate) fn check_lens(&self, camera: &Camera, other: &str) -> Result<()> {
         let reference = matches!(self.backend.borrow(), Backend::Reference);
         let options = Settings { detail: self.detail, ..self.kept.options.clone() };
-        check::lens(&self.kept.facts, camera, &options, reference)
+        check::lens(&self.kept.facts, camera, &options, reference).map_err(|error| match error {
+            Error::Usage(sentence) if !other.is_empty() => Error::Usage(format!("{sentence}, or {other}")),
+            error => error,
+        })
     }
 
     /// Applies the filters of finished pictures, and removes a map that only they need.

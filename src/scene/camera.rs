@@ -21,7 +21,7 @@ pub enum Projection {
 ///
 /// Camera space is x right, y down, z forward. Pixel (i, j) has its centre at (i + 0.5, j + 0.5),
 /// origin top left. Depth is camera-space z; for fisheyes and whole spheres it is the distance from
-/// the eye.
+/// the eye ([`Camera::depth_is_distance`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Pinhole or orthographic.
@@ -277,10 +277,9 @@ impl Camera {
         let forward = rotation.row(2).normalize();
         let right = rotation.row(0).reject_from_normalized(forward).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-        let corners = [(0.0, 0.0), (width.into(), 0.0), (0.0, height.into()), (width.into(), height.into())];
-        let radius = |(x, y): (f64, f64)| ((x - cx) / fx).hypot((y - cy) / fy);
-        let farthest = corners.map(radius).into_iter().fold(0.0, f64::max);
-        let optics = lens.optics().map(|optics| optics.within(farthest));
+        let plane = |at: DVec2| (at - DVec2::new(cx, cy)) / DVec2::new(fx, fy);
+        let border = border(DVec2::new(width.into(), height.into())).map(plane);
+        let optics = lens.optics().map(|optics| optics.within(border, 1.0 / fx.min(fy)));
         Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near, optics })
     }
 
@@ -326,7 +325,7 @@ impl Camera {
 
     /// Whether depth is the distance from the eye instead of camera-space z.
     pub fn depth_is_distance(&self) -> bool {
-        self.optics.is_some_and(|optics| optics.form != Form::Perspective)
+        self.optics.is_some_and(|optics| optics.depth_is_distance())
     }
 
     /// The depth of a point of camera space, world units.
@@ -334,14 +333,25 @@ impl Camera {
         if self.depth_is_distance() { p.length() } else { p.z }
     }
 
+    /// The point of a pinhole's or a lens's plane at the image point (x, y), pixels.
+    fn plane(&self, x: f64, y: f64) -> DVec2 {
+        DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy)
+    }
+
+    /// Whether the camera shows something at the image point (x, y), pixels: a lens shows nothing
+    /// beyond its image ([`Optics::shows`]).
+    pub fn shows(&self, x: f64, y: f64) -> bool {
+        self.optics.as_ref().is_none_or(|optics| optics.shows(self.plane(x, y)))
+    }
+
     /// The world-space direction of the view ray through the image point (x, y), pixels.
     ///
     /// It is not normalised: its depth is 1. The ray starts at [`ray_start`](Self::ray_start).
-    /// Where a lens shows nothing, it is the camera's axis.
+    /// Where a lens shows nothing ([`shows`](Self::shows)), it is that of [`Optics::ray`].
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
         if let Some(optics) = &self.optics {
-            let plane = DVec2::new((x - self.cx) / self.fx, (y - self.cy) / self.fy);
-            return self.rotation.transpose() * optics.ray(plane).unwrap_or(DVec3::Z);
+            let plane = self.plane(x, y);
+            return self.rotation.transpose() * optics.ray(plane);
         }
         let camera = match self.projection {
             Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),
@@ -406,6 +416,17 @@ impl Camera {
         };
         out.any()
     }
+}
+
+/// Points on the border of an image of this size, pixels, the corners among them.
+fn border(size: DVec2) -> impl Iterator<Item = DVec2> {
+    const STEPS: u32 = 16;
+    let share = |step: u32| f64::from(step) / f64::from(STEPS);
+    let around = move |step: u32| {
+        let (x, y) = (size.x * share(step), size.y * share(step));
+        [DVec2::new(x, 0.0), DVec2::new(size.x, y), DVec2::new(size.x - x, size.y), DVec2::new(0.0, size.y - y)]
+    };
+    (0..STEPS).flat_map(around)
 }
 
 /// Normalises a vector of any length without overflow; zero stays zero.

@@ -42,12 +42,12 @@ pub enum Map {
     /// layers; 0 where there are none.
     Tail,
     /// The TexZ map of Tien 2008 (section 5.2): the mean texture coordinates (u, v), origin bottom
-    /// left, and the mean camera-space z, world units, of a textured pixel's fragments. 0, 0 and
-    /// +inf where nothing is visible. Only surfels have coordinates here: they are 0 where a
-    /// triangle is visible.
+    /// left, and the mean depth ([`Camera::depth`](super::Camera::depth)), world units, of a
+    /// textured pixel's fragments. 0, 0 and +inf where nothing is visible. Only surfels have
+    /// coordinates here: they are 0 where a triangle is visible.
     TexZ,
-    /// Depth (camera-space z, world units) and alpha of the nearest [`SURFACES`] surfaces
-    /// composited at the pixel, or of fragments for
+    /// Depth ([`Camera::depth`](super::Camera::depth), world units) and alpha of the nearest
+    /// [`SURFACES`] surfaces composited at the pixel, or of fragments for
     /// [`Composite::Sorted`](super::Composite::Sorted). A tail has its nearest depth. +inf and 0
     /// where there are no more.
     Surfaces,

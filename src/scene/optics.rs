@@ -13,10 +13,12 @@
 //! radius at which the radial part stops growing, such a polynomial would fold the scene back into
 //! the image; there the lens shows nothing ([`Optics::limit`]).
 //!
-//! **Depth** is camera-space z for a perspective, and the distance from the eye for the other
-//! forms, which also see what lies behind the plane of the eye.
+//! **Depth** is camera-space z for a perspective and the FOV model, and the distance from the eye
+//! for the other forms, which also see what lies behind the plane of the eye.
 
-use std::f64::consts::PI;
+mod inverse;
+
+use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
 use glam::{DMat2, DVec2, DVec3};
@@ -74,7 +76,11 @@ pub struct Optics {
     prism: [f64; 2],
     /// A factor on X and Y before a fisheye's angle is taken: 1, but for the FOV model.
     wide: f64,
+    /// Whether depth is camera-space z although the first step is a fisheye's: the FOV model.
+    is_flat: bool,
+    per_focal: f64,
     limit: f64,
+    sure: f64,
     reach: f64,
 }
 
@@ -94,8 +100,10 @@ pub struct Sight {
     pub axis: DVec3,
 }
 
-/// How far beyond the corners of the image, in radii of the farthest one, splats are drawn.
+/// How far beyond the border of the image splats are drawn: this factor on its distance from the
+/// axis, and pixels.
 const BEYOND: f64 = 1.1;
+const MARGIN: f64 = 8.0;
 
 /// Steps of the search for the limit of a lens.
 const STEPS: usize = 4096;
@@ -103,14 +111,12 @@ const STEPS: usize = 4096;
 /// The largest angle from the axis that a perspective shows, radians: 89.9 degrees.
 const WIDEST: f64 = 89.9 * PI / 180.0;
 
-/// Rounds of Newton's method for the tangential part of a distortion.
-const ROUNDS: usize = 12;
-
 impl Optics {
     /// A lens without distortion.
     pub fn of(form: Form) -> Self {
         let (radial, under, tangential, prism) = ([0.0; 4], [0.0; 3], [0.0; 2], [0.0; 2]);
-        Self { form, radial, under, tangential, prism, wide: 1.0, limit: 0.0, reach: 0.0 }.limited()
+        let (wide, is_flat, per_focal, limit, sure, reach) = (1.0, false, 1.0, 0.0, 0.0, 0.0);
+        Self { form, radial, under, tangential, prism, wide, is_flat, per_focal, limit, sure, reach }.limited()
     }
 
     /// This lens with the radial numerator's coefficients k1 to k4.
@@ -137,11 +143,24 @@ impl Optics {
         Self { prism, ..self }.limited()
     }
 
-    /// A fisheye whose angle is that of (wide X, wide Y, Z): the FOV model (Devernay and Faugeras
-    /// 2001), with `wide = 2 tan(omega / 2)` and focal lengths divided by omega.
-    #[must_use]
-    pub fn widened(self, wide: f64) -> Self {
-        Self { wide, ..self }.limited()
+    /// The FOV model (Devernay and Faugeras 2001) with the angle `omega`, radians, between 0 and
+    /// pi: a fisheye whose angle is that of (wide X, wide Y, Z) with `wide = 2 tan(omega / 2)`, and
+    /// whose focal lengths are those of the model divided by omega. It shows what lies in front of
+    /// the eye, and depth is camera-space z.
+    pub fn field_of_view(omega: f64) -> Self {
+        let wide = 2.0 * (0.5 * omega).tan();
+        Self { wide, is_flat: true, per_focal: omega, ..Self::of(Form::Fisheye) }.limited()
+    }
+
+    /// The factor from the focal lengths of this lens to those of its model: 1, but for the FOV
+    /// model.
+    pub fn per_focal(&self) -> f64 {
+        self.per_focal
+    }
+
+    /// Whether depth is the distance from the eye instead of camera-space z.
+    pub fn depth_is_distance(&self) -> bool {
+        self.form != Form::Perspective && !self.is_flat
     }
 
     /// Whether the lens bends nothing: a perspective without distortion, which is a pinhole.
@@ -153,7 +172,9 @@ impl Optics {
     /// Whether all numbers are finite and the lens shows something.
     pub fn is_usable(&self) -> bool {
         let all = self.radial.iter().chain(&self.under).chain(&self.tangential).chain(&self.prism);
-        all.into_iter().chain([&self.wide]).all(|k| k.is_finite() && k.abs() < 1e9) && self.limit > 0.0
+        all.into_iter().chain([&self.wide]).all(|k| k.is_finite() && k.abs() < 1e9)
+            && self.wide > 0.0
+            && self.limit > 0.0
     }
 
     /// The largest radius before the distortion that the lens shows, in focal lengths; infinite for
@@ -170,7 +191,11 @@ impl Optics {
 
     fn limited(self) -> Self {
         let end = match self.form {
-            Form::Equirectangular => return Self { limit: f64::INFINITY, reach: f64::INFINITY, ..self },
+            Form::Equirectangular => {
+                let all = f64::INFINITY;
+                return Self { limit: all, sure: all, reach: all, ..self };
+            }
+            Form::Fisheye if self.is_flat => (self.wide * WIDEST.tan()).atan(),
             Form::Fisheye => PI,
             Form::Perspective => WIDEST,
         };
@@ -196,18 +221,23 @@ impl Optics {
                 radius(low)
             }
         };
-        Self { limit, reach: limit, ..self }
+        Self { limit, sure: Self { limit, ..self }.surely(), reach: limit, ..self }
     }
 
-    /// This lens in a camera whose image ends at `radius` of the plane, in focal lengths: splats
-    /// are drawn up to a tenth farther out ([`Self::reach`]).
+    /// This lens in a camera whose image has a border through these points of the plane, and pixels
+    /// of this size, in focal lengths: splats are drawn up to a tenth and eight pixels farther out
+    /// ([`Self::reach`]).
     #[must_use]
-    pub fn within(self, radius: f64) -> Self {
+    pub fn within(self, border: impl IntoIterator<Item = DVec2>, pixel: f64) -> Self {
         if self.form == Form::Equirectangular {
             return self;
         }
-        let reach = self.radius_of(BEYOND * radius);
-        Self { reach, ..self }
+        let radius = |at: DVec2| {
+            let at = at * BEYOND + at.normalize_or_zero() * (MARGIN * pixel);
+            self.seen_at(at).map_or(self.limit, DVec2::length)
+        };
+        let reach = border.into_iter().map(radius).fold(0.0, f64::max);
+        Self { reach: reach.min(self.limit), ..self }
     }
 
     /// The largest radius before the distortion at which the centre of a splat is drawn. Beyond the
@@ -215,6 +245,23 @@ impl Optics {
     /// with it.
     pub fn reach(&self) -> f64 {
         self.reach
+    }
+
+    /// Whether a point of a segment in camera space lies within [`Self::reach`]. Not for a whole
+    /// sphere.
+    pub fn is_near_segment(&self, a: DVec3, b: DVec3) -> bool {
+        // Directions within the reach are a cone around the axis.
+        let cosine = match self.form {
+            Form::Perspective => self.reach.atan().cos(),
+            _ => self.reach.min(PI).cos(),
+        };
+        let widened = |p: DVec3| DVec3::new(self.wide * p.x, self.wide * p.y, p.z);
+        let (a, along) = (widened(a), widened(b) - widened(a));
+        // Where z / |p| is largest along the segment: a zero of its derivative, which is linear.
+        let share = (along.z * a.length_squared() - a.z * a.dot(along))
+            / (a.z * along.length_squared() - along.z * a.dot(along));
+        let inner = if share > 0.0 && share < 1.0 { share } else { 0.0 };
+        [0.0, inner, 1.0].into_iter().map(|share| a + share * along).any(|p| p.z >= cosine * p.length())
     }
 
     /// The radius, at most [`Self::limit`], that the radial part maps to `wanted`.
@@ -269,6 +316,7 @@ impl Optics {
     pub fn see(&self, p: DVec3) -> Option<Sight> {
         let (e, depth, steps, axis) = match self.form {
             Form::Perspective => perspective(p)?,
+            Form::Fisheye if self.is_flat => flat(fisheye(p, self.wide)?, p)?,
             Form::Fisheye => fisheye(p, self.wide)?,
             Form::Equirectangular => return sphere(p),
         };
@@ -286,42 +334,6 @@ impl Optics {
             steps: rows,
             axis,
         })
-    }
-
-    /// The ray through a point of the plane: a point of depth 1 in camera space; `None` where the
-    /// lens shows nothing.
-    pub fn ray(&self, plane: DVec2) -> Option<DVec3> {
-        if self.form == Form::Equirectangular {
-            let ((sine, cosine), (up, level)) = (plane.x.sin_cos(), plane.y.sin_cos());
-            let in_sphere = plane.y.abs() <= 0.5 * PI && plane.x.abs() <= PI;
-            return in_sphere.then(|| DVec3::new(sine * level, up, cosine * level));
-        }
-        let e = self.undistorted(plane)?;
-        let r = e.length();
-        match self.form {
-            Form::Perspective => Some(e.extend(1.0)),
-            _ => {
-                let (sine, cosine) = r.sin_cos();
-                let across = if r > 0.0 { e * (sine / r / self.wide) } else { e / self.wide };
-                Some(across.extend(cosine).normalize())
-            }
-        }
-    }
-
-    /// The point that the second step maps to `plane`.
-    fn undistorted(&self, plane: DVec2) -> Option<DVec2> {
-        let wanted = plane.length();
-        let mut e = if wanted > 0.0 { plane * (self.radius_of(wanted) / wanted) } else { plane };
-        for _ in 0..ROUNDS {
-            let (value, slope) = self.distorted(e);
-            let step = slope.inverse() * (plane - value);
-            if !step.is_finite() {
-                return None;
-            }
-            e += step;
-        }
-        let off = (self.distorted(e).0 - plane).length();
-        (off <= 1e-9 * (1.0 + wanted) && e.length() <= self.limit).then_some(e)
     }
 }
 
@@ -345,6 +357,11 @@ fn fisheye(p: DVec3, wide: f64) -> Option<First> {
     let around = (toward.perp() * turned * wide).extend(0.0);
     let row = |k: usize| (outward * toward[k] + around * toward.perp()[k]) * depth;
     (far > 0.0 && (is_ahead || r > 0.0)).then_some((toward * angle, depth, [row(0), row(1)], p / depth))
+}
+
+/// The first step of a fisheye with the depth camera-space z.
+fn flat((at, depth, steps, _): First, p: DVec3) -> Option<First> {
+    (p.z > 0.0).then_some((at, p.z, steps.map(|step| step * (p.z / depth)), DVec3::Z))
 }
 
 fn sphere(p: DVec3) -> Option<Sight> {

@@ -250,6 +250,7 @@ impl Renderer {
         progress: &dyn Progress,
     ) -> Result<Picture> {
         let (camera, seen) = view.camera(self.scene())?;
+        let other = view.as_pinhole();
         let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
         let maps = Maps::of(&options.maps.aov);
@@ -261,12 +262,16 @@ impl Renderer {
         };
         match drawn {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
+                renderer.check_lens(&camera, other)?;
                 let view = ViewReport::new(&camera, &seen, scene, *guessed_up);
                 tell(&view);
                 let bent = is_told.then(|| lens::note(scene, &camera)).flatten();
                 bent.iter().for_each(|line| progress.note(line));
                 let rendered = match refined::refined(scene, &camera) {
-                    Some(refined) => render(&refined, &camera, settings, backend, progress)?,
+                    Some(refined) => {
+                        refined.note().iter().filter(|_| is_told).for_each(|line| progress.note(line));
+                        render(&refined.scene, &camera, settings, backend, progress)?
+                    }
                     None => renderer.frame(&camera, progress)?,
                 };
                 Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
@@ -283,7 +288,9 @@ impl Renderer {
                 if is_told {
                     progress.note(&read.sentence());
                 }
-                let rendered = render(&scene, &camera, &settings, backend, progress)?;
+                let mut renderer = render::Renderer::new(&scene, &settings, &**backend)?;
+                renderer.check_lens(&camera, other)?;
+                let rendered = renderer.frame(&camera, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
                 Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))

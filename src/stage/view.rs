@@ -34,6 +34,17 @@ struct Given {
     lens: Lens,
     place: Place,
     near: Option<f64>,
+    source: Source,
+}
+
+/// Where a lens is given.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Options,
+    /// The file of `--camera`.
+    File,
+    /// A file of many cameras.
+    Set,
 }
 
 #[derive(Clone, Debug)]
@@ -56,7 +67,8 @@ enum Place {
 impl Default for View {
     fn default() -> Self {
         let (size, lens) = (Self::DEFAULT_SIZE, Lens::Fov(DEFAULT_FOV));
-        Self(Kind::Given(Given { size, lens, place: Place::Framed { side: None, up: None, fits: false }, near: None }))
+        let place = Place::Framed { side: None, up: None, fits: false };
+        Self(Kind::Given(Given { size, lens, place, near: None, source: Source::Options }))
     }
 }
 
@@ -106,7 +118,7 @@ impl View {
             (Some(eye), None) => Place::Eye(eye, options.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, options.up)),
         };
-        Given { size, lens, place, near: options.near }.checked()
+        Given { size, lens, place, near: options.near, source: Source::Options }.checked()
     }
 
     /// Returns the view of `file`, a camera that was read from `path`. The options may supply size
@@ -138,7 +150,8 @@ impl View {
         let default = if file.lens == Lens::Equirectangular { Self::SPHERE_SIZE } else { Self::DEFAULT_SIZE };
         let size = file.size.or(options.size).unwrap_or(default);
         let near = options.near.or(file.near);
-        let view = Given { size, lens: file.lens, place: Place::Pose(file.pose), near };
+        let source = if options.file.is_some() { Source::File } else { Source::Set };
+        let view = Given { size, lens: file.lens, place: Place::Pose(file.pose), near, source };
         view.checked().map_err(|error| said_by(path.display(), error))
     }
 
@@ -147,6 +160,18 @@ impl View {
         match &self.0 {
             Kind::Given(given) => given.camera(scene, Camera::default_near(scene)),
             Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, scene))),
+        }
+    }
+
+    /// How users get a pinhole in place of the view's lens; empty if there is no such way, or the
+    /// view is one.
+    pub(super) fn as_pinhole(&self) -> &'static str {
+        match &self.0 {
+            Kind::Given(Given { lens, .. }) if lens.optics().is_none() => "",
+            Kind::Given(Given { source: Source::Options, .. }) => "leave --projection out",
+            Kind::Given(Given { source: Source::File, .. }) => "take a camera file without a model",
+            Kind::Given(Given { source: Source::Set, lens: Lens::Curved(..), .. }) => "take --ignore-distortion",
+            Kind::Given(_) | Kind::Camera(_) => "",
         }
     }
 

@@ -119,8 +119,8 @@ pub struct Truth {
     /// - `color`: the mean over the pixel's samples, premultiplied, over the background; linear
     ///   RGB, straight alpha. Each sample is shaded as [`crate::passes::resolve`] shades a pixel,
     ///   with the ray through the sample.
-    /// - `depth`: camera-space z of the first surface on the ray through the pixel's centre, world
-    ///   units; +inf for none.
+    /// - `depth`: the depth ([`Camera::depth`]) of the first surface on the ray through the pixel's
+    ///   centre, world units; +inf for none.
     /// - `normal`: the unit normal there, in world space, on the side that the surface specifies; 0
     ///   for none.
     pub frame: Frame,
@@ -186,7 +186,10 @@ impl Truth {
 
 fn pixel(surface: &Surface, camera: &Camera, options: &Settings, grid: u32, x: u32, y: u32) -> Pixel {
     let corner = DVec2::new(x.into(), y.into());
-    let see = |at: DVec2, beyond: f64| surface.first_hit(camera.ray_start(at.x, at.y), camera.ray(at.x, at.y), beyond);
+    let see = |at: DVec2, beyond: f64| {
+        let (start, ray) = (camera.ray_start(at.x, at.y), camera.ray(at.x, at.y));
+        if camera.shows(at.x, at.y) { surface.first_hit(start, ray, beyond) } else { None }
+    };
     let after = |hit: Hit| hit.distance + SAME_SURFACE * (hit.distance + surface.size());
     let goes_through = options.opacity < 1.0 || options.composite != Composite::Opaque;
     let (mut hits, mut light, mut alpha) = (0, DVec3::ZERO, 0.0);

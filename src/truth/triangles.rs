@@ -39,8 +39,13 @@ pub struct TriangleTree {
     center: DVec3,
     /// Half the diagonal of that box, world units.
     radius: f64,
+    paint: Box<Paint>,
+}
+
+#[derive(Clone)]
+struct Paint {
     /// The mesh without positions and normals, for its colours.
-    paint: Box<Mesh>,
+    mesh: Mesh,
     /// The least alpha that shows of the image of each material; 0 if all of it does.
     least_alphas: Vec<f32>,
 }
@@ -90,7 +95,7 @@ impl TriangleTree {
         } else {
             build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
         };
-        let paint = Mesh {
+        let colors = Mesh {
             triangles: mesh.triangles.clone(),
             colors: mesh.colors.clone(),
             face_colors: mesh.face_colors.clone(),
@@ -101,7 +106,7 @@ impl TriangleTree {
         };
         let of_material = |material: &Material| material.texture.as_ref().map_or(0.0, |image| image.least_alpha());
         let least_alphas = mesh.materials.iter().map(of_material).collect();
-        Ok(Self { tree, triangles, center, radius, paint: Box::new(paint), least_alphas })
+        Ok(Self { tree, triangles, center, radius, paint: Box::new(Paint { mesh: colors, least_alphas }) })
     }
 
     /// The centre of the mesh's bounding box, world coordinates.
@@ -152,10 +157,10 @@ impl TriangleTree {
         });
         let (t, index, weights) = first?;
         let triangle = &self.triangles[index];
-        let mut color = self.paint.color_at(triangle.index, weights);
+        let mut color = self.paint.mesh.color_at(triangle.index, weights);
         if self.least_alpha(triangle.index) == CUT {
             // A cut-out is opaque where it shows.
-            color[3] = self.paint.material_of(triangle.index).map_or(1.0, |material| material.diffuse[3]);
+            color[3] = self.paint.mesh.material_of(triangle.index).map_or(1.0, |material| material.diffuse[3]);
         }
         Some(Hit {
             distance: (t + line.shift) * self.radius / direction.length(),
@@ -167,8 +172,8 @@ impl TriangleTree {
 
     /// The least alpha that shows of the image of the mesh's triangle with this index.
     fn least_alpha(&self, index: usize) -> f32 {
-        let material = self.paint.material.as_ref().and_then(|of| of.get(index));
-        material.and_then(|of| self.least_alphas.get(*of as usize)).copied().unwrap_or(0.0)
+        let material = self.paint.mesh.material.as_ref().and_then(|of| of.get(index));
+        material.and_then(|of| self.paint.least_alphas.get(*of as usize)).copied().unwrap_or(0.0)
     }
 
     /// Whether a triangle is there at the point with these weights: not where its image is
@@ -176,7 +181,7 @@ impl TriangleTree {
     fn shows(&self, triangle: usize, weights: DVec3) -> bool {
         let index = self.triangles[triangle].index;
         let least = self.least_alpha(index);
-        least == 0.0 || self.paint.image_at(index, weights).is_none_or(|texel| texel[3] >= least)
+        least == 0.0 || self.paint.mesh.image_at(index, weights).is_none_or(|texel| texel[3] >= least)
     }
 }
 

@@ -111,15 +111,15 @@ fn what_lies_behind_a_hole_shows() {
     let Some(gpu) = common::gpu() else { return };
     let camera = camera((48, 48));
     let texture = |alphas: [u8; 4]| {
-        let texels = alphas.map(|alpha| [255, 0, 0, alpha]).to_vec();
-        Arc::new(Texture::new(2, 2, texels).unwrap())
+        let texel = |k: usize| [255, 0, 0, alphas[k / 8 * 2 + k % 4 / 2]];
+        Arc::new(Texture::new(4, 4, (0..16).map(texel).collect()).unwrap())
     };
     let of = |alphas: [u8; 4]| {
         let mut all = square(9.0, 6.0, None).to_vec();
         all.extend(square(3.0, 1.6, Some(0)));
         Scene { triangles: Triangles::textured(&all, &[texture(alphas)]), ..Scene::default() }
     };
-    // The picture is upside down, so its lower left quarter has its middle in the first texel.
+    // The picture is upside down, so its lower left quarter shows the first quarter of the image.
     let at = |frame: &Frame, (x, y): (usize, usize)| frame.color[y * 48 + x].map(|value| (1e6 * value).round() / 1e6);
     let quarters = [(12, 35), (35, 35), (12, 12), (35, 12)];
     for composite in [Composite::Opaque, Composite::Layers(4), Composite::Sorted] {

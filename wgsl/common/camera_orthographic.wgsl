@@ -143,6 +143,11 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
     return clamp(abc.z, low, high);
 }
 
+// A fragment at the pixel (x, y), which such a camera always shows.
+fn within_lens(fragment: Fragment, x: u32, y: u32) -> Fragment {
+    return fragment;
+}
+
 fn ray(x: u32, y: u32) -> vec3<f32> {
     return held.rotation[2].xyz;
 }

@@ -1,6 +1,7 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk. With perspective.wgsl, the
 // same interface as camera_orthographic.wgsl.
 // Twin: src/passes/homography.rs.
+// #import camera_orthographic|perspective::{Fragment}
 // #import double::{Double, product, quotient, sum, two_sum}
 // #import layout::{held}
 // #import perspective::{chord, clipped_extent, tangents}
@@ -168,6 +169,11 @@ fn scaled_homography(
     h.low = vec2<f32>(across.x, down.x) - 1.0;
     h.high = vec2<f32>(across.y, down.y) + 1.0;
     return h;
+}
+
+// A fragment at the pixel (x, y), which such a camera always shows.
+fn within_lens(fragment: Fragment, x: u32, y: u32) -> Fragment {
+    return fragment;
 }
 
 // The direction, in world space and of unit length, of the ray through the centre of the pixel.

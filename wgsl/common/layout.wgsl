@@ -65,7 +65,9 @@ struct View {
     atlas: vec4<f32>,
     // A lens that is no pinhole (src/scene/optics.rs); else 0. Its coefficients: the leading parts
     // of k1 to k4, of k5 to k7 and the widening, and of p1, p2, s1 and s2; then their trailing
-    // parts; then x: the largest radius before the distortion, y: the largest of a splat's centre.
+    // parts; then x: the largest radius before the distortion, y: the largest of a splat's centre,
+    // z: the radius of the plane within which the lens surely shows each point, w: 1 if depth is
+    // camera-space z, 0 if it is the distance from the eye.
     lens: array<vec4<f32>, 7>,
 }
 

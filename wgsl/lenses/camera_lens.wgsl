@@ -3,6 +3,8 @@
 // lens at the centre, in place and in first derivatives. With perspective.wgsl, the same interface
 // as camera_pinhole.wgsl.
 // Twin: src/passes/homography.rs.
+// #import camera_orthographic|perspective::{Fragment}
+// #import distortion|lens_sphere::{shows_plane}
 // #import double::{Double, product, quotient, sum, two_sum}
 // #import layout::{held}
 // #import lens_*::{plane_ray, see_plane}
@@ -159,9 +161,22 @@ fn scaled_homography(
     return h;
 }
 
-// The point of depth 1 on the ray through an image point, in world axes relative to the eye.
+// The point of the plane at an image point.
+fn plane_of(image: vec2<f32>) -> vec2<f32> {
+    return (image - held.intrinsics.zw) / held.intrinsics.xy;
+}
+
+// A fragment at the pixel (x, y). Beyond its image a lens shows nothing.
+fn within_lens(fragment: Fragment, x: u32, y: u32) -> Fragment {
+    var kept = fragment;
+    kept.hit = fragment.hit && shows_plane(plane_of(vec2<f32>(f32(x), f32(y)) + 0.5));
+    return kept;
+}
+
+// The point of depth 1 on the ray through an image point, in world axes relative to the eye. Where
+// the lens shows nothing, it is that of Optics::ray in src/scene/optics/inverse.rs.
 fn ray_at(image: vec2<f32>) -> vec3<f32> {
-    let d = plane_ray((image - held.intrinsics.zw) / held.intrinsics.xy);
+    let d = plane_ray(plane_of(image));
     return d.x * held.rotation[0].xyz + d.y * held.rotation[1].xyz + d.z * held.rotation[2].xyz;
 }
 

@@ -1,8 +1,8 @@
 // The second step of a lens: radial, tangential and thin prism distortion of a point of the plane.
 // src/scene/optics.rs has the formula; lens_perspective.wgsl and lens_fisheye.wgsl make the first
 // step.
-// Twin: src/scene/optics.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x5be0b698cdf3d916
+// Twins: src/scene/optics.rs and src/scene/optics/inverse.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x1d24bc44ea9e10f7
 // #import camera_lens::{Sight}
 // #import double::{Double, product, quotient, sum}
 // #import layout::{held}
@@ -82,13 +82,31 @@ fn distorted(first: Sight) -> Sight {
 
 // The number of halvings of the radius, and of rounds for the tangential part.
 const RADIUS_ROUNDS: u32 = 30u;
-const TANGENTIAL_ROUNDS: u32 = 6u;
+const TANGENTIAL_ROUNDS: u32 = 8u;
 
-// The point that the distortion maps to `plane`.
-fn undistorted(plane: vec2<f32>) -> vec2<f32> {
+// The largest distance, in focal lengths at a distance of 0 from the axis, at which a point counts
+// as found.
+const FOUND: f32 = 1e-4;
+
+// What the distortion adds to a point of the plane times the radial factor.
+fn leaning(e: vec2<f32>) -> vec2<f32> {
+    let r_2 = dot2(e, e);
+    let p = held.lens[2].xy;
+    return p.xy * (2.0 * e.x * e.y) + p.yx * (r_2 + 2.0 * e * e) + held.lens[2].zw * r_2;
+}
+
+// Whether there are tangential or prism terms.
+fn leans() -> bool {
+    return any(held.lens[2] != vec4<f32>(0.0));
+}
+
+// The point that the distortion maps to `plane`; z is 1 if the lens shows it. If not, the point is
+// that at the border of the image, without the tangential part.
+fn undistorted(plane: vec2<f32>) -> vec3<f32> {
     let wanted = norm2(plane);
+    let limit = lens_limit();
     var low = 0.0;
-    var high = lens_limit();
+    var high = limit;
     for (var k = 0u; k < RADIUS_ROUNDS; k++) {
         let middle = 0.5 * (low + high);
         if (middle * radial_at(middle * middle).x < wanted) {
@@ -97,16 +115,29 @@ fn undistorted(plane: vec2<f32>) -> vec2<f32> {
             high = middle;
         }
     }
-    var e = plane * select(1.0, high / wanted, wanted > 0.0);
+    let start = plane * select(1.0, high / wanted, wanted > 0.0);
+    if (!leans()) {
+        return vec3<f32>(start, select(0.0, 1.0, wanted <= held.lens[6].z));
+    }
+    var e = start;
     for (var k = 0u; k < TANGENTIAL_ROUNDS; k++) {
-        let r_2 = dot2(e, e);
-        let xy = 2.0 * e.x * e.y;
-        let p = held.lens[2].xy;
-        let at = e * radial_at(r_2).x + p.xy * xy + p.yx * (r_2 + 2.0 * e * e) + held.lens[2].zw * r_2;
         let slope = distortion_slope(e);
-        let off = plane - at;
+        let off = plane - (e * radial_at(dot2(e, e)).x + leaning(e));
         let turned = vec2<f32>(slope.w * off.x - slope.y * off.y, slope.x * off.y - slope.z * off.x);
         e += turned / (slope.x * slope.w - slope.y * slope.z);
+        let r = norm2(e);
+        e *= select(1.0, limit / r, r > limit);
     }
-    return e;
+    // Comparisons with NaN are false.
+    let rest = norm2(plane - (e * radial_at(dot2(e, e)).x + leaning(e)));
+    let found = rest <= FOUND * (1.0 + wanted);
+    return select(vec3<f32>(start, 0.0), vec3<f32>(e, 1.0), found);
+}
+
+// Whether the lens shows something at a point of the plane.
+fn shows_plane(plane: vec2<f32>) -> bool {
+    if (norm2(plane) <= held.lens[6].z) {
+        return true;
+    }
+    return leans() && undistorted(plane).z > 0.0;
 }

@@ -1,5 +1,5 @@
 // The first step of a fisheye: the angle from the axis, radians, in the direction of (X, Y). Depth
-// is the distance from the eye.
+// is the distance from the eye, or camera-space z for the FOV model.
 // Twin: src/scene/optics.rs.
 // #import angle::{angle_of, length_of, turned_by}
 // #import camera_lens::{Sight}
@@ -8,6 +8,11 @@
 // #import layout::{held}
 // #import rows::{single}
 // #import vectors::{norm2, unit3}
+
+// Whether depth is camera-space z.
+fn is_flat() -> bool {
+    return held.lens[6].w > 0.0;
+}
 
 fn see_plane(p: array<Double, 3>) -> Sight {
     var sight: Sight;
@@ -18,8 +23,11 @@ fn see_plane(p: array<Double, 3>) -> Sight {
     let far = length_of(r, p[2]);
     // Straight ahead, all directions of (X, Y) are alike.
     let is_ahead = r.high <= 1e-12 * far.high && p[2].high > 0.0;
-    sight.seen = far.high > 0.0 && (is_ahead || r.high > 0.0);
-    sight.depth = length_of(length_of(p[0], p[1]), p[2]);
+    sight.seen = far.high > 0.0 && (is_ahead || r.high > 0.0) && (p[2].high > 0.0 || !is_flat());
+    sight.depth = p[2];
+    if (!is_flat()) {
+        sight.depth = length_of(length_of(p[0], p[1]), p[2]);
+    }
     var turned = quotient(single(1.0), far);
     var toward = vec2<f32>(1.0, 0.0);
     if (!is_ahead && r.high > 0.0) {
@@ -34,15 +42,16 @@ fn see_plane(p: array<Double, 3>) -> Sight {
     let around = vec3<f32>(perp * (turned.high * wide.high * depth), 0.0);
     sight.across = outward * toward.x + around * perp.x;
     sight.down = outward * toward.y + around * perp.y;
-    sight.axis = vec3<f32>(p[0].high, p[1].high, p[2].high) / depth;
+    sight.axis = select(vec3<f32>(p[0].high, p[1].high, p[2].high) / depth, vec3<f32>(0.0, 0.0, 1.0), is_flat());
     return distorted(sight);
 }
 
 // The point of depth 1 on the ray of a point of the plane, camera space.
 fn plane_ray(plane: vec2<f32>) -> vec3<f32> {
-    let e = undistorted(plane);
+    let e = undistorted(plane).xy;
     let r = norm2(e);
     let turn = turned_by(r);
     let across = e * (select(1.0, turn.y / r, r > 0.0) / held.lens[1].w);
-    return unit3(vec3<f32>(across, turn.x));
+    let ray = vec3<f32>(across, turn.x);
+    return select(unit3(ray), ray / ray.z, is_flat());
 }

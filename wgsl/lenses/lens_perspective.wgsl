@@ -18,5 +18,5 @@ fn see_plane(p: array<Double, 3>) -> Sight {
 
 // The point of depth 1 on the ray of a point of the plane, camera space.
 fn plane_ray(plane: vec2<f32>) -> vec3<f32> {
-    return vec3<f32>(undistorted(plane), 1.0);
+    return vec3<f32>(undistorted(plane).xy, 1.0);
 }

@@ -25,6 +25,11 @@ fn see_plane(p: array<Double, 3>) -> Sight {
     return sight;
 }
 
+// Whether a point of the plane is one of the sphere.
+fn shows_plane(plane: vec2<f32>) -> bool {
+    return all(abs(plane) <= vec2<f32>(3.1415927, 1.5707964));
+}
+
 fn plane_ray(plane: vec2<f32>) -> vec3<f32> {
     let across = turned_by(plane.x);
     let down = turned_by(plane.y);

@@ -1,6 +1,7 @@
 // Evaluates a splat's record at a pixel. Every pass decides coverage, depth and rho by this file
 // alone.
 // Twin: src/passes/footprint.rs.
+// #import camera_*::{within_lens}
 // #import camera_orthographic|perspective::{Fragment}
 // #import curved|facing|flat::{is_away, met}
 // #import fade::{faded}
@@ -52,7 +53,7 @@ fn large_splat(place: u32) -> u32 {
 
 fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     let d = vec2<f32>(f32(i32(x) - splat.anchor_x), f32(i32(y) - splat.anchor_y));
-    var fragment = met(splat, filter_, d);
+    var fragment = within_lens(met(splat, filter_, d), x, y);
     fragment.depth = sided(fragment.depth, is_away(splat, fragment));
     return faded(fragment, splat.fade);
 }

@@ -6,19 +6,17 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 
-use super::colmap::{Model, bent};
+use super::colmap::Model;
 use super::{NamedCamera, name_of};
 use crate::io::camera::{CameraFile, Pose, of_value, rigid};
 use crate::io::values::shown;
-use crate::scene::{Form, Lens, Optics};
+use crate::scene::Lens;
 
-const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+/// Keys of coefficients of distortion.
+const DISTORTIONS: [&str; 12] = ["k", "k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "sx1", "sy1", "omega"];
 
 /// The name of a whole sphere's camera model.
 const SPHERE: &str = "EQUIRECTANGULAR";
-
-/// The name of the camera model whose coefficients from k4 on are a denominator's.
-const RATIONAL: &str = "FULL_OPENCV";
 
 /// Keys of a pose in a camera file.
 const POSES: [&str; 4] = ["eye", "target", "camera_to_world", "world_to_camera"];
@@ -95,21 +93,24 @@ impl Frame<'_> {
         if let Some(model) = model.filter(|model| model.is_undrawn()) {
             return Ok((Lens::Intrinsics(intrinsics), Some(model.name)));
         }
-        let mut values = [0.0; 8];
-        for (value, key) in values.iter_mut().zip(DISTORTIONS) {
-            *value = self.number(key)?.unwrap_or(0.0);
+        let mut given = Vec::new();
+        for key in DISTORTIONS {
+            given.extend(self.number(key)?.filter(|value| *value != 0.0).map(|value| (key, value)));
         }
-        let [k1, k2, k3, k4, k5, k6, p1, p2] = values;
-        let form =
-            if is_fisheye || model.is_some_and(|model| model.fisheye) { Form::Fisheye } else { Form::Perspective };
-        let plain = Optics::of(form).with_tangential([p1, p2]);
-        // OpenCV's model with eight coefficients has a denominator.
-        let is_rational = model.is_some_and(|model| model.name == RATIONAL) || k5 != 0.0 || k6 != 0.0;
-        let optics = match is_rational {
-            true => plain.with_radial([k1, k2, k3, 0.0]).with_denominator([k4, k5, k6]),
-            false => plain.with_radial([k1, k2, k3, k4]),
+        let has = |key: &str| given.iter().any(|(name, _)| *name == key);
+        // OpenCV's model with eight coefficients has a denominator. Others differ in their form.
+        let name = match model {
+            Some(model) if model.fisheye || !is_fisheye => model.name,
+            _ if is_fisheye => "OPENCV_FISHEYE",
+            _ => "OPENCV",
         };
-        Ok((bent(optics, intrinsics), None))
+        let name = if name == "OPENCV" && (has("k5") || has("k6")) { "FULL_OPENCV" } else { name };
+        let model = Model::of_name(name).ok_or("its lens has no model")?;
+        if let Some((key, _)) = given.iter().find(|(key, _)| !model.reads(key)) {
+            return Err(format!("its {key} is no coefficient of the camera_model {name}"));
+        }
+        let of = |key: &str| given.iter().find(|(name, _)| *name == key).map_or(0.0, |(_, value)| *value);
+        Ok((model.lens_of(intrinsics, &of), None))
     }
 
     /// The camera of a frame that has the keys of a camera file; `None` for other frames.
@@ -207,6 +208,7 @@ impl Frame<'_> {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
+    use crate::scene::{Form, Optics};
 
     fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
         super::super::parse(text, size)
@@ -257,6 +259,14 @@ mod tests {
             assert_eq!(lens(own).lens, bent(Optics::of(Form::Fisheye).with_radial([0.25, 0.0, 0.0, 0.0])));
         }
         assert_eq!(lens(r#""camera_model": "EQUIRECTANGULAR","#).lens, Lens::Equirectangular);
+        // All coefficients of COLMAP's models are read by their own names.
+        let radial = bent(plain.with_radial([0.3, 0.0, 0.0, 0.0]));
+        assert_eq!(lens(r#""camera_model": "SIMPLE_RADIAL", "k": 0.3, "k1": null,"#).lens, radial);
+        assert_eq!(lens(r#""camera_model": "SIMPLE_RADIAL", "k1": 0.3,"#).lens, radial);
+        let prism = Optics::of(Form::Fisheye).with_prism([0.01, -0.02]);
+        assert_eq!(lens(r#""camera_model": "THIN_PRISM_FISHEYE", "sx1": 0.01, "sy1": -0.02,"#).lens, bent(prism));
+        let Lens::Curved(wide, [fx, ..]) = lens(r#""camera_model": "FOV", "omega": 0.5,"#).lens else { panic!() };
+        assert_eq!((wide, fx), (Optics::field_of_view(0.5), 1000.0));
         let undrawn = one(shared, r#""camera_model": "RAD_TAN_THIN_PRISM_FISHEYE","#).unwrap();
         assert_eq!(
             (undrawn.camera.lens, undrawn.undrawn),
@@ -306,6 +316,9 @@ mod tests {
             (r#""camera_angle_x": 0,"#, "", "camera_angle_x must lie between 0 and pi"),
             (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y must lie between 0 and pi"),
             (r#""camera_angle_x": 1,"#, r#""k2": [],"#, "k2 is not a number"),
+            (r#""camera_angle_x": 1,"#, r#""omega": 0.5,"#, "its omega is no coefficient of the camera_model OPENCV"),
+            (r#""camera_angle_x": 1, "camera_model": "FOV","#, r#""k1": 0.5,"#, "its k1 is no coefficient of"),
+            (r#""camera_angle_x": 1, "is_fisheye": true,"#, r#""k5": 0.5,"#, "its k5 is no coefficient of"),
         ] {
             let message = one(shared, own).unwrap_err();
             assert!(message.starts_with("frame 1 (./train/r_7): ") && message.contains(said), "{message}");

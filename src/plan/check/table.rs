@@ -351,16 +351,15 @@ pub(super) const SCENES: [SceneClash; 20] = [
 pub(super) const LENSES: [LensClash; 5] = [
     LensClash {
         applies: |_, facts, _, _| facts.solid,
-        sentence: "3D Gaussians are drawn by pinholes: take --flatten with a lens, or --ignore-distortion",
+        sentence: "3D Gaussians are drawn by pinholes: take --flatten with a lens",
     },
     LensClash {
         applies: |_, _, options, device| device && options.raster.is_some(),
-        sentence: "the rasteriser draws by pinholes: take --backend gpu with a lens, or --ignore-distortion",
+        sentence: "the rasteriser draws by pinholes: take --backend gpu with a lens",
     },
     LensClash {
         applies: |_, facts, options, _| facts.nodes_of(options).is_some(),
-        sentence: "levels of detail are chosen by pinholes: leave --lod and --splats out with a lens, or take \
-                   --ignore-distortion",
+        sentence: "levels of detail are chosen by pinholes: leave --lod and --splats out with a lens",
     },
     LensClash {
         applies: |_, _, options, _| options.facing.is_some(),

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, DVec3};
 
 use self::models::Camera;
-pub(super) use self::models::{Model, bent};
+pub(super) use self::models::Model;
 use super::{NamedCamera, name_of};
 use crate::error::{Error, Result};
 use crate::io::camera::{CameraFile, Pose};

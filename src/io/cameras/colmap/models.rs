@@ -107,22 +107,38 @@ impl Model {
     }
 
     /// The lens of focal lengths and principal point, with the values of the model's coefficients.
-    pub(in crate::io::cameras) fn lens(&self, intrinsics: [f64; 4], values: &[f64]) -> Lens {
+    fn lens(&self, intrinsics: [f64; 4], values: &[f64]) -> Lens {
         let of = |name: &str| {
             let place = self.distortions.iter().position(|own| *own == name);
             place.and_then(|place| values.get(place)).copied().unwrap_or(0.0)
         };
+        self.lens_of(intrinsics, &of)
+    }
+
+    /// Whether [`Self::lens_of`] uses the coefficient of this name. Other programs write
+    /// coefficients that COLMAP's model has not, as k3 and k4 of `OPENCV`.
+    pub(in crate::io::cameras) fn reads(&self, coefficient: &str) -> bool {
+        match coefficient {
+            "omega" => self.name == "FOV",
+            "k5" | "k6" => self.name == "FULL_OPENCV",
+            _ => self.name != "FOV",
+        }
+    }
+
+    /// As [`Self::lens`], with the value of each coefficient by its name; 0 if it is not given.
+    pub(in crate::io::cameras) fn lens_of(&self, intrinsics: [f64; 4], of: &dyn Fn(&str) -> f64) -> Lens {
         let form = if self.fisheye { Form::Fisheye } else { Form::Perspective };
         let plain = Optics::of(form).with_tangential([of("p1"), of("p2")]).with_prism([of("sx1"), of("sy1")]);
         match self.name {
+            // The formula is even in omega.
             "FOV" if of("omega") != 0.0 => {
-                let (omega, [fx, fy, cx, cy]) = (of("omega"), intrinsics);
-                let optics = Optics::of(Form::Fisheye).widened(2.0 * (0.5 * omega).tan());
-                Lens::Curved(optics, [fx / omega, fy / omega, cx, cy])
+                let optics = Optics::field_of_view(of("omega").abs());
+                let [fx, fy, cx, cy] = intrinsics;
+                Lens::Curved(optics, [fx / optics.per_focal(), fy / optics.per_focal(), cx, cy])
             }
             // In this model the coefficients from k4 on are those of the denominator.
             "FULL_OPENCV" => {
-                let optics = plain.with_radial([of("k1"), of("k2"), of("k3"), 0.0]);
+                let optics = plain.with_radial([of("k1") + of("k"), of("k2"), of("k3"), 0.0]);
                 bent(optics.with_denominator([of("k4"), of("k5"), of("k6")]), intrinsics)
             }
             _ => bent(plain.with_radial([of("k1") + of("k"), of("k2"), of("k3"), of("k4")]), intrinsics),
@@ -131,14 +147,17 @@ impl Model {
 }
 
 /// A lens of these optics; a pinhole if they bend nothing.
-pub(in crate::io::cameras) fn bent(optics: Optics, intrinsics: [f64; 4]) -> Lens {
+fn bent(optics: Optics, intrinsics: [f64; 4]) -> Lens {
     if optics.is_pinhole() { Lens::Intrinsics(intrinsics) } else { Lens::Curved(optics, intrinsics) }
 }
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use glam::{DMat3, DVec3};
+
     use super::*;
+    use crate::io::camera::{CameraFile, Pose};
 
     #[test]
     fn later_models_are_known_by_number_and_name() {
@@ -164,5 +183,20 @@ mod tests {
         assert_eq!(camera(16, "EUCM", &[5.0, 6.0, 4.0, 2.0, 0.5, 1.0]), (pinhole, Some("EUCM")));
         let square = Lens::Intrinsics([5.0, 5.0, 4.0, 2.0]);
         assert_eq!(camera(12, "SIMPLE_DIVISION", &[5.0, 4.0, 2.0, 0.1]), (square, Some("SIMPLE_DIVISION")));
+    }
+
+    /// A pinhole in place of a lens has the focal lengths of the file, also those of the FOV model,
+    /// whose plane is scaled.
+    #[test]
+    fn a_pinhole_has_the_focal_lengths_of_the_file() {
+        for (name, rest) in [("FOV", &[0.9][..]), ("OPENCV", &[0.1, 0.0, 0.0, 0.0]), ("FISHEYE", &[])] {
+            let parameters = [&[200.0, 210.0, 100.0, 90.0][..], rest].concat();
+            let lens = Model::of_name(name).unwrap().camera((200, 180), &parameters).unwrap().lens;
+            let pose = Pose::Rigid(DMat3::IDENTITY, DVec3::ZERO);
+            let file = CameraFile { size: Some((200, 180)), lens, pose, near: None };
+            let Lens::Intrinsics(values) = file.as_pinhole().unwrap().lens else { panic!("{name}") };
+            let off = values.iter().zip(&parameters).map(|(own, given)| (own - given).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-10, "{name}: {values:?}");
+        }
     }
 }

@@ -3,10 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod borders;
+mod triangles;
+
 use std::f64::consts::{PI, TAU};
 
 use crate::common::{self, Random, bits};
-use common::command::{Folder, ply, succeeds, text};
+use common::command::{Folder, epsplat, ply, succeeds, text};
 use epsplat::Lens;
 use epsplat::io::camera::Pose;
 use epsplat::io::cameras;
@@ -17,8 +20,8 @@ use epsplat::low_level::passes::project::reference_all;
 use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::{
-    Camera, Colors, Detail, Facing, Form, Map, Maps, Optics, PointShape, Samples, Scene, Shading, Surfel, Triangle,
-    Triangles,
+    Camera, Colors, Detail, Facing, Form, Kernel, Map, Maps, Optics, PointShape, Samples, Scene, Shading, Surfel,
+    Triangle, Triangles,
 };
 use epsplat::low_level::surfels::hierarchy;
 use glam::{DMat3, DVec2, DVec3, Vec3};
@@ -159,10 +162,12 @@ fn images(scene: &Scene, camera: &Camera) -> Option<Vec<(usize, DVec2, DVec2)>> 
 }
 
 #[test]
-fn points_of_distorted_colmap_cameras_appear_within_a_hundredth_of_a_pixel() {
+fn points_of_distorted_colmap_cameras_appear_within_a_millionth_of_a_pixel() {
     for (name, parameters) in MODELS {
         let camera = colmap(name, parameters);
-        let scene = disks(600, 0.02, 0.6, 5);
+        // A perspective is tested within its image, a fisheye up to 80 degrees.
+        let most = if name.ends_with("FISHEYE") { 1.4 } else { 0.6 };
+        let scene = disks(600, 0.02, most, 5);
         let Some(images) = images(&scene, &camera) else { return };
         let (mut worst, mut worst_of_twin, mut moved) = (0.0f64, 0.0f64, 0.0f64);
         for (index, of_device, of_twin) in &images {
@@ -177,7 +182,7 @@ fn points_of_distorted_colmap_cameras_appear_within_a_hundredth_of_a_pixel() {
             "{name}: {} points, {worst:.1e} pixels, twin {worst_of_twin:.1e}, a pinhole {moved:.1}",
             images.len()
         );
-        assert!(images.len() > 300 && worst < 1e-6 && worst_of_twin < 1e-10, "{name}: {worst} {worst_of_twin}");
+        assert!(images.len() > 250 && worst < 1e-6 && worst_of_twin < 1e-10, "{name}: {worst} {worst_of_twin}");
         // The control: a pinhole would miss.
         assert_eq!(moved > 0.01, !name.ends_with("PINHOLE"), "{name}: {moved}");
     }
@@ -216,7 +221,7 @@ fn points_of_fisheyes_and_spheres_appear_where_their_angles_say() {
             worst = worst.max(off(*of_device)).max(off(*of_twin));
         }
         eprintln!("{name}: {} points, {worst:.1e} pixels", images.len());
-        assert!(images.len() > 500 && worst < 1e-5, "{name}: {worst}");
+        assert!(images.len() > 500 && worst < 1e-6, "{name}: {worst}");
     }
 }
 
@@ -368,7 +373,11 @@ fn images_of_disks_err_as_the_guide_says() {
             let sight = camera.sight(p).unwrap();
             let r = sight.plane.length();
             let stated = match *name {
-                "perspective" => 1.0,
+                "perspective" => {
+                    let ([k1, k2], lean, r) = ([-0.25f64, 0.09], 0.004f64.hypot(0.003), sight.radius);
+                    let slope = (1.0 + 3.0 * k1 * r.powi(2) + 5.0 * k2 * r.powi(4) - 6.0 * lean * r).min(1.0);
+                    (3.0 * k1.abs() * r + 10.0 * k2 * r.powi(3) + 3.0 * lean) / slope.powi(2)
+                }
                 "fisheye" => r / 3.0,
                 _ => 0.5 * (1.0 / (1.0 - p.y * p.y) - 1.0).sqrt() + 0.05,
             };
@@ -485,5 +494,41 @@ fn visible_points_are_those_of_the_lens() {
         succeeds(&[&line[..], &more.into_iter().collect::<Vec<_>>()].concat());
         let head = String::from_utf8_lossy(&std::fs::read(&seen).unwrap()).into_owned();
         assert!(head.contains(&format!("element vertex {count}\n")), "{more:?}");
+    }
+}
+
+/// A refusal says how to get a pinhole where there is a way, and comes before notes on the lens.
+#[test]
+fn refusals_name_the_option_that_gives_a_pinhole() {
+    let folder = Folder::new();
+    let rows = "1.5 0 -2 0 0 1 1.9\n".repeat(2);
+    let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 2, &rows));
+    let pose = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+    let set = |lens: &str| {
+        let frame = format!(r#"{{"file_path": "a", "transform_matrix": {pose}}}"#);
+        folder.file("t.json", format!(r#"{{"w": 64, "h": 64, "fl_x": 40, {lens}, "frames": [{frame}]}}"#))
+    };
+    let camera = r#"{"model": "fisheye", "eye": [0,0,0], "target": [0,0,-1]}"#;
+    let camera = folder.file("camera.json", camera);
+    let (output, views) = (folder.path("a.png"), folder.path("views"));
+    let refused = |line: &[&str], end: &str| {
+        let all = ["render", text(&cloud), "--backend", "reference", "--facing", "circle", "--shading", "unlit"];
+        let run = epsplat(&[&all[..], line].concat());
+        let said = String::from_utf8(run.stderr).unwrap();
+        let last = said.lines().last().unwrap_or_default();
+        assert!(!run.status.success() && last.ends_with(end), "{said}");
+        assert!(!said.contains("this lens bends"), "{said}");
+    };
+    let facing = "leave --facing out with a lens";
+    let line = ["-o", text(&output), "--projection", "fisheye", "--eye", "0,0,0", "--target", "0,0,-1"];
+    refused(&line, &format!("{facing}, or leave --projection out"));
+    refused(
+        &["-o", text(&output), "--camera", text(&camera)],
+        &format!("{facing}, or take a camera file without a model"),
+    );
+    for (lens, end) in [(r#""k1": 0.1"#, ", or take --ignore-distortion"), (r#""camera_model": "EQUIRECTANGULAR""#, "")]
+    {
+        let set = set(lens);
+        refused(&["-o", text(&views), "--cameras", text(&set)], &format!("{facing}{end}"));
     }
 }

@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ._errors import UsageError
+from ._errors import NoMemoryError, UsageError
+
+#: Copies of fewer bytes are made without a look at the free memory.
+_SMALL = 1 << 28
 
 
 def array(name: str, value: Any) -> np.ndarray:
@@ -28,6 +31,28 @@ def array(name: str, value: Any) -> np.ndarray:
         raise UsageError(f"{name}: it is no array of numbers: {error}") from None
 
 
+def _free() -> float:
+    """Returns the bytes of memory that the system has free, or inf where it does not tell."""
+    try:
+        with open("/proc/meminfo") as file:
+            lines = dict(line.split(":", 1) for line in file)
+        return 1024.0 * int(lines["MemAvailable"].split()[0])
+    except (OSError, KeyError, ValueError):
+        return float("inf")
+
+
+def _converted(name: str, numbers: np.ndarray, dtype: Any) -> np.ndarray:
+    """Returns a copy of ``numbers`` of another type; arrays may claim more rows than memory has."""
+    size = numbers.size * np.dtype(dtype).itemsize
+    try:
+        if size < _SMALL or size < _free():
+            return numbers.astype(dtype)
+    except MemoryError:
+        pass
+    needed = (size + (1 << 20) - 1) >> 20
+    raise NoMemoryError(f"the system has no memory for a copy of {name}: about {needed} MiB are needed")
+
+
 def floats(name: str, value: Any) -> np.ndarray:
     """Returns ``value`` as an array of float32 or float64, in the byte order of the machine."""
     numbers = array(name, value)
@@ -35,7 +60,7 @@ def floats(name: str, value: Any) -> np.ndarray:
         return numbers
     if numbers.dtype.kind not in "iuf":
         raise UsageError(f"{name}: an array of numbers is needed, not of {numbers.dtype}")
-    return numbers.astype(np.float32 if numbers.dtype == np.float16 else np.float64)
+    return _converted(name, numbers, np.float32 if numbers.dtype == np.float16 else np.float64)
 
 
 def colors(name: str, value: Any) -> np.ndarray:
@@ -49,4 +74,4 @@ def indices(name: str, value: Any) -> np.ndarray:
     numbers = array(name, value)
     if numbers.dtype.kind not in "iu":
         raise UsageError(f"{name}: an array of integers is needed, not of {numbers.dtype}")
-    return numbers.astype(np.int64, copy=False)
+    return numbers if numbers.dtype == np.int64 and numbers.dtype.isnative else _converted(name, numbers, np.int64)

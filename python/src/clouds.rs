@@ -49,6 +49,7 @@ fn text(value: &impl serde::Serialize) -> Value {
     serde_json::to_value(value).unwrap_or_default()
 }
 
+/// A scene, its counts as JSON, and notes.
 type Made = (Scene, String, Vec<String>);
 
 /// Computes surfels from points. Returns them with counts and notes.
@@ -67,8 +68,7 @@ pub fn surfels(
     let orientation = of_all(py, &orient)?;
     let options = FromPoints { size, orientation, estimate_normals, limits };
     let from = scene.scene.clone();
-    let (made, mut notes) =
-        run(py, progress, |progress| from_points(inputs(&from, progress)?, &options, progress))?;
+    let (made, mut notes) = run(py, progress, |progress| from_points(inputs(&from, progress)?, &options, progress))?;
     notes.extend(made.notes());
     let report = json!({ "surfels": made.preparation.surfels, "parts": made.parts });
     Ok((Scene::of(made.points), report.to_string(), notes))
@@ -261,6 +261,9 @@ pub fn coverage(
     Ok((report.to_string(), notes))
 }
 
+/// The counts of each input, the number of points that each view sees, and notes.
+type Seen<'py> = (Vec<Bound<'py, PyAny>>, Vec<u64>, Vec<String>);
+
 /// Counts the views that see each point. Returns a count for each point of each input, and the
 /// points that each view sees.
 #[pyfunction]
@@ -270,7 +273,7 @@ pub fn visible<'py>(
     views: Vec<PyRef<'py, View>>,
     keywords: &Bound<'py, PyDict>,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Vec<Bound<'py, PyAny>>, Vec<u64>, Vec<String>)> {
+) -> PyResult<Seen<'py>> {
     let parsed = parsed(py, &arguments(Scope::Renderer, keywords)?)?;
     let views = views.iter().map(|view| view.with(&parsed.camera)).collect::<Result<Vec<_>>>();
     let views = views.map_err(|error| exception(py, &error))?;

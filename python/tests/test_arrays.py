@@ -131,10 +131,11 @@ def test_bad_arrays_are_one_exception(arguments):
 
 
 def test_more_points_than_memory_are_refused():
-    claimed = np.broadcast_to(np.zeros((1, 3), np.float32), (2**33, 3))
-    with pytest.raises(epsplat.Error) as error:
-        epsplat.Scene(claimed)
-    assert isinstance(error.value, MemoryError)
+    for dtype in [np.float32, np.float64, np.uint16, np.dtype(">f4")]:
+        claimed = np.broadcast_to(np.zeros((1, 3), dtype), (2**36, 3))
+        with pytest.raises(epsplat.NoMemoryError, match="MiB") as error:
+            epsplat.Scene(claimed)
+        assert isinstance(error.value, MemoryError)
 
 
 def test_points_that_are_not_finite_are_left_out_and_counted(sphere):

@@ -137,6 +137,14 @@ def test_the_import_is_quick():
     assert min(times) < 0.15, times
 
 
+def test_nothing_is_printed():
+    """Drivers look for a display in a folder that servers do not have."""
+    program = "import epsplat, numpy as np; epsplat.Renderer(epsplat.Scene(np.eye(3)), 32, 24).render()"
+    environment = {name: value for name, value in os.environ.items() if name != "XDG_RUNTIME_DIR"}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def test_no_driver_is_no_obstacle(sphere, tmp_path):
     """Without any driver the f64 reference renders."""
     np.save(tmp_path / "points.npy", sphere)

@@ -12,6 +12,7 @@ use crate::io::ClassOpacities;
 use crate::plan::{BackendName, Settings};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
+use crate::surfels::hierarchy::NodeBounds;
 use crate::surfels::sampling::Priority;
 use crate::surfels::simplify::Tolerance;
 use crate::truth::DEFAULT_GRID;
@@ -80,6 +81,9 @@ pub struct SceneEntry {
     /// Whether surfels keep their clip lines and curvature; by default both.
     #[serde(default)]
     pub rims: Rims,
+    /// What nodes of levels of detail bound; by default rims.
+    #[serde(default, deserialize_with = "parsed")]
+    pub bounds: Option<NodeBounds>,
     /// The texture of the mesh in `file`, relative to the definition's folder.
     pub texture: Option<PathBuf>,
     /// Whether the texture is looked up per pixel. Otherwise each surfel has one colour from it.
@@ -177,6 +181,12 @@ pub enum Making {
     /// As [`Bsp`](Self::Bsp), with one radius for all surfels.
     #[serde(rename = "bsp:global")]
     BspGlobal,
+    /// As [`Bsp`](Self::Bsp), by the circumspheres of the clusters.
+    #[serde(rename = "bsp:circumsphere")]
+    BspCircumsphere,
+    /// As [`BspGlobal`](Self::BspGlobal), by the circumspheres of the clusters.
+    #[serde(rename = "bsp:global-circumsphere")]
+    BspGlobalCircumsphere,
     /// As [`Knn`](Self::Knn), with disks as large as the triangles at a mesh's vertices.
     Qsplat,
     /// As `epsplat sample` does: `count` samples of a mesh, with ellipses that cover it.

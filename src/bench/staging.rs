@@ -136,7 +136,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     if definition.configs.iter().any(Config::cuts) && !scene.surfels.is_empty() {
-        (scene, _) = hierarchy::build(scene, progress)?;
+        (scene, _) = hierarchy::build_with(scene, entry.bounds.unwrap_or_default(), progress)?;
     }
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
 }
@@ -281,6 +281,8 @@ fn of_file(
         Making::Ellipse => sized(Size::Ellipse)?,
         Making::Bsp => sized(Size::Bsp(Triangle::default()))?,
         Making::BspGlobal => sized(Size::BspGlobal(Triangle::default()))?,
+        Making::BspCircumsphere => sized(Size::Bsp(Triangle::Circumsphere))?,
+        Making::BspGlobalCircumsphere => sized(Size::BspGlobal(Triangle::Circumsphere))?,
         Making::Qsplat => {
             let bare = Points { faces: read(file)?.faces, ..bare()? };
             let options = FromPoints { size: Size::Qsplat, ..FromPoints::default() };

@@ -92,6 +92,8 @@ pub struct SceneEntry {
     /// Simplifies the surfels as `epsplat simplify --shape cap` does, within this tolerance.
     #[serde(default, deserialize_with = "parsed")]
     pub simplify: Option<Tolerance>,
+    /// With `simplify`: selects disks as `epsplat simplify --cover thesis:R` does, with this R.
+    pub cover: Option<f64>,
     /// A generated surface in place of a file.
     ///
     /// Sphere, torus, plane, checkerboard, text, shells or crossing.

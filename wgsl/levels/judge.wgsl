@@ -2,7 +2,7 @@
 // in the image, or that nothing below it is visible. A cut that divides a node draws what is below
 // the node in its place: its surfels, or its children, which may be divided in turn.
 // Twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xa539cb6c61ef32e7
+// All loops end, by 1 of src/gpu/loops.rs: 0xbe73f2f4fd74cada
 // #import axes_*::{growth}
 // #import backs_curved|backs_flat::{leaning}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
@@ -146,16 +146,22 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // Otherwise children must be judged: neither the image area of a child's ellipse nor the side
     // that it shows follows from the node's own position and size.
     let unjudged = MEASURES_EXTENT && !CULL_CONES && draws_children(node, ball);
-    let backs = select(0u, backs_below(node) << BACKS_SHIFT, CULL_BACK && kind_of(node) == LEAF && cuts > 0u);
+    var backs = 0u;
+    if (CULL_BACK && kind_of(node) == LEAF && cuts > 0u) {
+        backs = backs_below(node) << BACKS_SHIFT;
+    }
     return cuts | select(0u, CHILDREN_DRAWN, unjudged) | backs;
 }
 
 // A bit for each surfel of a leaf that faces away, wherever it is seen. Crowded leaves keep all.
 fn backs_below(node: TreeNode) -> u32 {
     let count = node.below & COUNT_MASK;
+    let judged = select(0u, count, count <= FAN_OUT);
     var backs = 0u;
-    for (var k = 0u; k < min(count, FAN_OUT); k++) {
-        backs |= select(0u, 1u << k, count <= FAN_OUT && shows_back(node.first + k));
+    for (var k = 0u; k < judged; k++) {
+        if (shows_back(node.first + k)) {
+            backs |= 1u << k;
+        }
     }
     return backs;
 }

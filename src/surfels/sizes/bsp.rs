@@ -15,8 +15,8 @@
 //! through centroids, as in the clustering that it is based on (Pauly et al. 2002), so clusters end
 //! with one to three points. The radius is the mean over the clusters of three points that are not
 //! collinear. Two rules keep the mean from following a few bad clusters, which the paper's models
-//! may not have had: nearly collinear points count as collinear ([`NEARLY_COLLINEAR`]), as their
-//! circumsphere may be as large as the model, and three points count only if they were split from a
+//! may not have had: circumspheres of nearly collinear points do not count
+//! ([`NEARLY_COLLINEAR`]), as they may be as large as the model, and three points count only if they were split from a
 //! cluster that is nearly a plane ([`MOST_VARIATION`]).
 
 use glam::DVec3;
@@ -45,9 +45,8 @@ const TWO_TRIANGLES: usize = 6;
 /// three points lie on a line, and they count as collinear.
 const COLLINEAR: f64 = 1e-12;
 
-/// In [`common_radius`] three points count as collinear if l1 is less than this share of the sum of
-/// their eigenvalues, 0.5 for an equilateral triangle. The circumsphere of others has at most 2.1
-/// times the diameter of their longest edge.
+/// In [`common_radius`] the circumsphere of three points does not count if l1 is less than this
+/// share of the sum of their eigenvalues, which is 0.5 for an equilateral triangle.
 ///
 /// On the Dragon's 435,545 distinct vertices, whose triangles have slivers, the mean diameter is
 /// 4 % of the model's diagonal without this rule.
@@ -192,7 +191,7 @@ fn split_at_means(
     if let [a, b, c] = cluster {
         let (b, c) = (at(b) - at(a), at(c) - at(a));
         return match triangle_size(triangle, b, c) {
-            Some(size) if variation <= MOST_VARIATION && !is_nearly_collinear(b, c) => {
+            Some(size) if variation <= MOST_VARIATION && !is_sliver(triangle, (b, c)) => {
                 Clusters { triangles: (size, 1), ..Clusters::default() }
             }
             _ => Clusters { edges: (mean_edge(b, c), 1), ..Clusters::default() },
@@ -222,7 +221,11 @@ fn split_at_means(
     low.and(high)
 }
 
-/// Whether the triangle with corners at 0, `a` and `b` is too narrow to count.
+/// Whether the triangle with corners at 0, `a` and `b` is too narrow for its circumsphere to count.
+fn is_sliver(triangle: Triangle, (a, b): (DVec3, DVec3)) -> bool {
+    triangle == Triangle::Circumsphere && is_nearly_collinear(a, b)
+}
+
 fn is_nearly_collinear(a: DVec3, b: DVec3) -> bool {
     let longest = a.length().max(b.length()).max(a.distance(b));
     let corners = [DVec3::ZERO, a / longest, b / longest];
@@ -261,7 +264,7 @@ mod tests {
     use crate::scene::Bounds;
 
     fn distinct(positions: &[[f64; 3]]) -> DistinctPositions {
-        let bounds = Bounds::of(positions.iter().map(|position| DVec3::from_array(*position)));
+        let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
         DistinctPositions::new(positions, &bounds, DVec3::ZERO).unwrap()
     }
 

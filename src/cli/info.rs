@@ -252,9 +252,10 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     if !info.lacks.is_empty() {
         let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));
     }
+    let among = if info.sample.is_some() { " among those examined" } else { "" };
     let _ = writeln!(
         text,
-        "A renderer makes {} surfels of it, radius up to {:.4},",
+        "A renderer makes {} surfels of it, radius up to {:.4}{among},",
         info.preparation.surfels, info.largest_radius
     );
     let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));

@@ -112,6 +112,26 @@ pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Res
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
 
+/// A decoder of an image for textures, and a function that describes what is wrong with it.
+#[cfg(feature = "gltf")]
+fn decoder<'a>(path: &'a Path, bytes: &'a [u8]) -> Result<(impl ImageDecoder + 'a, impl Fn(ImageError) -> Error + 'a)> {
+    let unreadable = |e: ImageError| Error::malformed(path, format!("not a readable {PAINT}: {e}"));
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes));
+    reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?;
+    reader.no_limits();
+    Ok((reader.into_decoder().map_err(unreadable)?, unreadable))
+}
+
+/// Reads width and height from the header of an image in `bytes` of the file at `path`.
+///
+/// # Errors
+///
+/// The errors of [`decode`].
+#[cfg(feature = "gltf")]
+pub(super) fn size_of_bytes(path: &Path, bytes: &[u8]) -> Result<[u32; 2]> {
+    decoder(path, bytes).map(|(decoder, _)| decoder.dimensions().into())
+}
+
 /// Decodes an image for textures from `bytes` in a file at `path`.
 ///
 /// # Errors
@@ -119,11 +139,7 @@ pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Res
 /// The errors of [`decode`].
 #[cfg(feature = "gltf")]
 pub(super) fn decode_bytes(path: &Path, bytes: &[u8], each: u64) -> Result<DynamicImage> {
-    let unreadable = |e: ImageError| Error::malformed(path, format!("not a readable {PAINT}: {e}"));
-    let mut reader = ImageReader::new(std::io::Cursor::new(bytes));
-    reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?;
-    reader.no_limits();
-    let decoder = reader.into_decoder().map_err(unreadable)?;
+    let (decoder, unreadable) = decoder(path, bytes)?;
     let (width, height) = decoder.dimensions();
     let own = u64::from(decoder.color_type().bytes_per_pixel());
     check(path, (width.into(), height.into()), own + each)?;

@@ -190,10 +190,7 @@ impl Mesh {
     /// interpolated colours of the vertices, the triangle's own colour, the diffuse colour, the
     /// default colour.
     pub fn color_at(&self, triangle: usize, weights: DVec3) -> [f32; 4] {
-        let material = self.material_of(triangle);
-        let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
-        if let (Some((material, texture)), Some([u, v])) = (textured, self.texture_at(triangle, weights)) {
-            let texel = texture.at(u, v);
+        if let (Some(material), Some(texel)) = (self.material_of(triangle), self.image_at(triangle, weights)) {
             return std::array::from_fn(|k| texel[k] * material.diffuse[k]);
         }
         match &self.colors {
@@ -203,6 +200,13 @@ impl Mesh {
             }
             None => self.own_color(triangle).unwrap_or(DEFAULT_COLOR),
         }
+    }
+
+    /// The colour of a triangle's image at the point with these barycentric weights: linear RGB,
+    /// straight alpha; None without an image.
+    pub(crate) fn image_at(&self, triangle: usize, weights: DVec3) -> Option<[f32; 4]> {
+        let texture = self.material_of(triangle)?.texture.as_ref()?;
+        self.texture_at(triangle, weights).map(|[u, v]| texture.at(u, v))
     }
 
     /// The colour of a triangle, or else the diffuse colour of its material; None without either.

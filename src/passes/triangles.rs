@@ -42,6 +42,10 @@
 //! **Facing away**: a triangle's corners run counterclockwise as its front is seen. With
 //! [`Cull::Back`] triangles whose edges have p on the other side are left out.
 //!
+//! **Cut-outs**: where the image of a triangle is transparent
+//! ([`least_alpha`](crate::scene::Texture::least_alpha)), the triangle is not there. The image is
+//! looked up as in the attribute pass.
+//!
 //! **The nearest triangle** is an atomic maximum of (bits(+inf) - bits(depth), number). The order
 //! of [`Triangles`](crate::scene::Triangles) does not depend on the order in files, so no bit of
 //! the image does. The rasteriser, for comparison, uses its own coverage and depths; among
@@ -171,8 +175,9 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
         parts,
         spread: spread.abs(),
         hit: inside && depth >= camera.near,
-        // In the image rows go down, so a positive area is clockwise.
-        faces: sides[0] < 0.0,
+        // In the image rows go down, so a positive area is clockwise. Near an edge, one side may
+        // differ from the two others.
+        faces: most < 0.0,
         decision: distance.min(beyond),
     })
 }
@@ -247,6 +252,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
                     continue;
                 }
                 if crossing.decision > -NEARBY || crossing.hit {
+                    let crossing = cut(scene, number, crossing);
                     let pixel = &mut shown[((y - first_row) * camera.width + x) as usize];
                     *pixel = pixel.with(number as u32, crossing);
                 }
@@ -266,6 +272,17 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
         shown.color = shaded(color, lit, camera, options, at);
     }
     shown
+}
+
+/// The crossing of a triangle where its image may be transparent.
+fn cut(scene: &Scene, triangle: usize, crossing: Crossing) -> Crossing {
+    match scene.triangles.excess_alpha(triangle, crossing.parts, crossing.spread) {
+        Some(excess) => {
+            let decision = crossing.decision.min(excess);
+            Crossing { hit: crossing.hit && excess >= 0.0, decision, ..crossing }
+        }
+        None => crossing,
+    }
 }
 
 /// The unit direction of the view ray through a pixel's centre.
@@ -351,9 +368,10 @@ pub const PASS: Pass = Pass {
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
-        let all =
-            ["corners.wgsl", vertex, "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", texture];
-        all.into_iter().chain(corner.iter().copied()).chain(visibility.iter().copied()).chain(own).collect()
+        let cutout = if mesh.cut { "cutout.wgsl" } else { "cutout_absent.wgsl" };
+        let drawn = ["triangles_tiles.wgsl", "triangles_attributes.wgsl", texture, cutout];
+        let all = ["corners.wgsl", vertex, "triangles.wgsl"].into_iter().chain(drawn);
+        all.chain(corner.iter().copied()).chain(visibility.iter().copied()).chain(own).collect()
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),

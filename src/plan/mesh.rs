@@ -19,6 +19,8 @@ pub struct MeshFacts {
     pub colored: bool,
     /// Whether triangles have textures.
     pub textured: bool,
+    /// Whether points of triangles are left out, because their image is transparent there.
+    pub cut: bool,
     /// Whether corner positions have low parts ([`Triangles::low`]).
     pub doubled: bool,
     /// The bounding box of all corners, in world units relative to the scene's origin.
@@ -60,6 +62,7 @@ impl MeshFacts {
             normals: !triangles.normals().is_empty(),
             colored: triangles.colors().len() > 1,
             textured: !triangles.paint().is_empty(),
+            cut: triangles.are_cut(),
             doubled: !triangles.low().is_empty(),
             bounds: bounds_of(triangles),
         }
@@ -85,6 +88,8 @@ pub struct MeshNeeds {
     pub colored: bool,
     /// Triangles have textures.
     pub textured: bool,
+    /// Points of triangles are left out, because their image is transparent there.
+    pub cut: bool,
     /// The f32 positions of corners omit visible digits, so their low parts are stored too.
     pub doubled: bool,
     /// Triangles that face away are left out.
@@ -107,10 +112,10 @@ impl MeshNeeds {
         self.normal_words() + if self.colored { 12 } else { 0 }
     }
 
-    /// Words of a triangle's attributes: normals, colours, texture coordinates and the texture's
-    /// number.
+    /// Words of a triangle's attributes: normals, colours, texture coordinates, the texture's
+    /// number, and the least alpha that shows if points are left out.
     pub fn words(&self) -> u32 {
-        self.places_at() + if self.textured { 7 } else { 0 }
+        self.places_at() + if self.textured { 7 + u32::from(self.cut) } else { 0 }
     }
 
     /// The positions of corners: three words per vertex, or six with the low parts last.
@@ -135,6 +140,8 @@ impl MeshNeeds {
                 // The texture's number plus 1, or 0 for none. It is stored as a number, because an
                 // f32 need not keep bits.
                 words.push(painted.texture.checked_add(others + 1).unwrap_or(0) as f32);
+                let least = triangles.textures().get(painted.texture as usize).map_or(0.0, Mipmap::least_alpha);
+                words.extend(self.cut.then_some(least));
             }
         }
         words

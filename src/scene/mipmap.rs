@@ -12,17 +12,24 @@ use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mipmap {
     levels: Vec<Arc<Texture>>,
+    least_alpha: f32,
 }
 
 impl Mipmap {
     /// Computes all halvings of `texture`: each texel is the mean, in linear light weighted by
     /// alpha, of the texels that it covers in the level before.
     pub fn new(texture: Arc<Texture>) -> Self {
+        let least_alpha = texture.least_alpha();
         let mut levels = vec![texture];
         while let Some(half) = levels.last().and_then(|last| half(last)) {
             levels.push(Arc::new(half));
         }
-        Self { levels }
+        Self { levels, least_alpha }
+    }
+
+    /// [`Texture::least_alpha`] of the full image.
+    pub fn least_alpha(&self) -> f32 {
+        self.least_alpha
     }
 
     /// The levels, from the full image; each is half as wide and high as the one before.

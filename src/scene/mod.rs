@@ -76,6 +76,7 @@ pub use provenance::Provenance;
 pub use scene::{Bounds, Scene, Up};
 pub use side::Side;
 pub use surfel::Surfel;
+pub(crate) use texture::CUT;
 pub use texture::{Place, Texture, Textured};
 pub use triangles::{Triangle, Triangles};
 pub use whole::{LevelFacts, Whole};

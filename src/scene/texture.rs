@@ -9,13 +9,16 @@ use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb};
 use super::{Atlas, Camera, Mipmap, Projection};
 use crate::error::{Error, Result};
 
+/// The least alpha at which a point of a cut-out image shows; it is then opaque.
+pub const CUT: f32 = 0.5;
+
 /// An image of 8-bit sRGB colours with straight alpha.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     width: u32,
     height: u32,
-    /// Rows from the top.
-    texels: Vec<[u8; 4]>,
+    /// Rows from the top. Copies of an image share them.
+    texels: Arc<Vec<[u8; 4]>>,
     /// Coordinates outside [0, 1] take the edge texels if set; otherwise the image repeats.
     clamps: bool,
 }
@@ -25,7 +28,8 @@ impl Texture {
     /// length or is empty.
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
-        (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, clamps: false })
+        let is_whole = count > 0 && count == texels.len() as u64;
+        is_whole.then(|| Self { width, height, texels: Arc::new(texels), clamps: false })
     }
 
     /// The same image with another address mode: outside [0, 1], `true` takes the edge texels and
@@ -52,12 +56,30 @@ impl Texture {
         let alpha = |code: u8| (f64::from(code) * f64::from(factor[3]).clamp(0.0, 1.0)).round() as u8;
         let times =
             |[r, g, b, a]: &[u8; 4]| [red[usize::from(*r)], green[usize::from(*g)], blue[usize::from(*b)], alpha(*a)];
-        Self { texels: self.texels.par_iter().map(times).collect(), ..*self }
+        Self { texels: Arc::new(self.texels.par_iter().map(times).collect()), ..*self }
     }
 
     /// Width and height in texels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
+    }
+
+    /// The least alpha of a point of the image that hides what lies behind it.
+    ///
+    /// 0 for an opaque image; [`CUT`] for a cut-out, whose alphas are 0 and 1 only; else half a
+    /// code, so that only points where nothing is hide nothing.
+    pub fn least_alpha(&self) -> f32 {
+        let any = |of: fn(u8) -> bool| self.texels.par_iter().any(|[.., alpha]| of(*alpha));
+        match (any(|alpha| alpha < 255), any(|alpha| !matches!(alpha, 0 | 255))) {
+            (false, _) => 0.0,
+            (true, false) => CUT,
+            (true, true) => 0.5 / 255.0,
+        }
+    }
+
+    /// Whether the image has an alpha between 0 and 1.
+    pub fn is_translucent(&self) -> bool {
+        self.texels.par_iter().any(|[.., alpha]| !matches!(alpha, 0 | 255))
     }
 
     /// The sRGB codes with straight alpha, rows from the top.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{Bounds, Mipmap, Texture};
+use super::{Bounds, CUT, Mipmap, Texture};
 use crate::morton;
 
 use places::{LEAST_TOLD, LEAST_WIDTH, Place, doubled, has_area, shown_error, single};
@@ -226,17 +226,34 @@ impl Triangles {
         &self.textures
     }
 
-    /// The filtered premultiplied colour of a triangle's texture; white without one.
+    /// Whether points of triangles are left out, because their image is transparent there.
+    pub fn are_cut(&self) -> bool {
+        self.textures.iter().any(|mipmap| mipmap.least_alpha() > 0.0)
+    }
+
+    /// The image of a triangle with its place in it; None without one.
+    fn painted_by(&self, triangle: usize) -> Option<(&Painted, &Mipmap)> {
+        self.painted.get(triangle).and_then(|of| Some((of, self.textures.get(of.texture as usize)?)))
+    }
+
+    /// How far the image's alpha at a point of a triangle exceeds the least that shows
+    /// ([`Texture::least_alpha`]), relative to it; negative where the triangle is left out. None if
+    /// all of the triangle shows. `parts` and `spread` are those of [`Self::texture_at`].
+    pub fn excess_alpha(&self, triangle: usize, parts: [f64; 3], spread: f64) -> Option<f64> {
+        let (painted, mipmap) = self.painted_by(triangle)?;
+        let least = f64::from(mipmap.least_alpha());
+        (least > 0.0).then(|| seen(painted, mipmap, parts, spread)[3] / least - 1.0)
+    }
+
+    /// The filtered premultiplied colour of a triangle's texture; white without one. A point of a
+    /// cut-out is opaque.
     ///
     /// `parts` are the barycentric coordinates of the point. `spread` is the area that a pixel
     /// covers in the plane of `parts[1]` and `parts[2]`, in which the triangle has the area 1/2.
     pub fn texture_at(&self, triangle: usize, parts: [f64; 3], spread: f64) -> [f64; 4] {
-        let painted = self.painted.get(triangle).and_then(|of| Some((of, self.textures.get(of.texture as usize)?)));
-        let Some((painted, mipmap)) = painted else { return [1.0; 4] };
-        let [a, b, c] = painted.places.map(|place| DVec2::from_array(place.map(f64::from)));
-        let place = a + parts[1] * (b - a) + parts[2] * (c - a);
-        let [width, height] = mipmap.levels()[0].size().map(f64::from);
-        mipmap.seen_at(place.to_array(), spread * (b - a).perp_dot(c - a).abs() * width * height)
+        let Some((painted, mipmap)) = self.painted_by(triangle) else { return [1.0; 4] };
+        let seen = seen(painted, mipmap, parts, spread);
+        if mipmap.least_alpha() == CUT { seen.map(|channel| channel / seen[3]) } else { seen }
     }
 
     /// The longest edge at a vertex, world units.
@@ -266,6 +283,14 @@ impl Triangles {
         let of = if self.colors.len() == self.corners.len() { triangle } else { 0 };
         self.colors[of].map(|color| color.map(f64::from))
     }
+}
+
+/// The filtered premultiplied colour of the image at a point of a triangle.
+fn seen(painted: &Painted, mipmap: &Mipmap, parts: [f64; 3], spread: f64) -> [f64; 4] {
+    let [a, b, c] = painted.places.map(|place| DVec2::from_array(place.map(f64::from)));
+    let place = a + parts[1] * (b - a) + parts[2] * (c - a);
+    let [width, height] = mipmap.levels()[0].size().map(f64::from);
+    mipmap.seen_at(place.to_array(), spread * (b - a).perp_dot(c - a).abs() * width * height)
 }
 
 /// The Morton code of the cell of `bounds` that contains `place`.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::Request;
 use super::whole::Made;
 use crate::error::{Error, Result};
-use crate::io::{self, Mesh, Points, ReadOptions, Texture};
+use crate::io::{self, Mesh, Paint, Points, ReadOptions, Texture};
 use crate::options::MeshAs;
 use crate::progress::Progress;
 use crate::scene::{Colors, Composite};
@@ -30,7 +30,9 @@ pub(super) struct Meshes {
 /// [`Error::Usage`] if all inputs are drawn as triangles and an option needs surfels.
 fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> Result<(MeshAs, Option<String>)> {
     let (drawn_as, needed) = request.scene.options.mesh(request.options);
-    let layered = request.options.transparency.composite.is_some_and(|how| how != Composite::Opaque);
+    // Gaussians are composited from all their fragments.
+    let layered = request.options.transparency.composite.is_some_and(|how| how != Composite::Opaque)
+        || inputs.iter().any(|points| points.encoded);
     let alone = inputs.iter().all(|points| points.is_mesh() || points.positions.is_empty());
     match (request.triangles().mesh, needed) {
         (Some(MeshAs::Triangles), Some(option)) if alone => Err(Error::Usage(format!(
@@ -44,7 +46,7 @@ fn drawn_as(request: &Request<'_>, inputs: &[Points]) -> Result<(MeshAs, Option<
     }
 }
 
-/// Whether a vertex or a triangle of a mesh has an alpha below 1.
+/// Whether a vertex, a triangle or an image of a mesh has an alpha between 0 and 1.
 fn is_translucent(mesh: &Points) -> bool {
     let of_vertices = match &mesh.colors {
         Some(Colors::Constant([.., alpha])) => *alpha < 1.0,
@@ -53,7 +55,10 @@ fn is_translucent(mesh: &Points) -> bool {
         Some(Colors::Textured(_) | Colors::Harmonics(_)) | None => false,
     };
     let paint = mesh.faces.as_ref().and_then(|faces| faces.paint.as_ref());
-    of_vertices || paint.is_some_and(|paint| paint.colors.iter().any(|[.., alpha]| *alpha < 1.0))
+    let of_paint = |paint: &Paint| {
+        paint.colors.iter().any(|[.., alpha]| *alpha < 1.0) || paint.textures.iter().any(|image| image.is_translucent())
+    };
+    of_vertices || paint.is_some_and(|paint| of_paint(paint))
 }
 
 impl Meshes {

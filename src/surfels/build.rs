@@ -279,6 +279,15 @@ impl Given<'_> {
         unit(*self.0.points.normals.as_ref()?.get(i)?)
     }
 
+    /// The largest given radius or half-axis; 0 if there is none.
+    pub(super) fn largest_radius(&self) -> f32 {
+        let largest = |i: usize| match self.axes(i) {
+            Some([s, t]) => s.length().max(t.length()),
+            None => self.radius(i).unwrap_or(0.0),
+        };
+        (0..self.0.points.positions.len()).into_par_iter().map(largest).reduce(|| 0.0, f32::max)
+    }
+
     fn radius(&self, i: usize) -> Option<f32> {
         usable_radius(*self.0.points.radii.as_ref()?.get(i)?)
     }
@@ -384,8 +393,8 @@ fn estimated(
     preparation.distinct_positions = Some(distinct.len() as u64);
     preparation.median_spacing = median_spacing;
     let smaller = |(i, &position): (usize, &u32)| limited[position as usize] && given.lacks_radius(i);
-    preparation.limited_by_neighbours =
-        distinct.of_point().par_iter().enumerate().filter(|point| smaller(*point)).count() as u64;
+    let limited = distinct.of_point().par_iter().enumerate().filter(|point| smaller(*point)).count() as u64;
+    preparation.limited_by_neighbours = Some(limited);
     if preparation.estimated_normals == 0 {
         preparation.opposed_normals = opposed(distinct, &graph, |point| given.normal(point));
     }

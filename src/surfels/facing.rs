@@ -66,6 +66,7 @@ pub fn build_facing(
     // Placeholders: the camera determines where the surfels face.
     points.normals = Some(vec![[0.0, 0.0, 1.0]; own.len()]);
     (points.axes, points.clips, points.caps, points.texture) = (None, None, None, None);
+    points.thirds = None;
     let ((scene, mut preparation), _) = built(gathered, limits, progress)?;
     preparation.common_radius =
         common.filter(|_| lacking > 0 && all.is_none()).map(|radius| (lacking, factor * radius));

@@ -156,7 +156,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let unsided = gathered.points.unsided && preparation.estimated_normals < preparation.surfels;
     let points =
         Points { unsided, normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
-    preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
+    preparation.limited_by_neighbours = Some(sizes.limited(distinct.of_point()));
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(&Listed(count, |index| (DVec3::from_array(points.positions[index]), radius(index)))).1;
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear, sparse: sizes.sparse })

@@ -81,8 +81,9 @@ pub struct Preparation {
     /// leaves them out ([`Scene::framed`]).
     pub strays: u64,
     /// The number of surfels whose estimated radius was reduced because of their neighbours
-    /// ([`Limits::largest_ratio`]).
-    pub limited_by_neighbours: u64,
+    /// ([`Limits::largest_ratio`]); None if no radius was estimated, or only some places of a cloud
+    /// were examined.
+    pub limited_by_neighbours: Option<u64>,
     /// The number of surfels larger than a million times the scene, which were reduced to that
     /// size.
     pub limited_radii: u64,
@@ -157,8 +158,10 @@ impl Preparation {
             format!("{points} points have no radius and got a common one from the mean spacing: {radius:.3e} world units (--point-size)")
         });
         let strays = counted(self.strays, "stray: they lie far away from all others, outside of the default view");
-        let by_neighbours =
-            counted(self.limited_by_neighbours, "would have had larger surfels than their neighbours allow");
+        let by_neighbours = counted(
+            self.limited_by_neighbours.unwrap_or(0),
+            "would have had larger surfels than their neighbours allow",
+        );
         let random = self.has_random_sides().then(|| {
             let (opposed, all) = (self.opposed_normals, self.surfels);
             format!("normals face either way: {opposed} of {all} are opposed to the nearest one's, so they have no side (epsplat surfels --estimate-normals gives them one)")

@@ -25,6 +25,10 @@ const WHOLE: usize = 1 << 20;
 /// by about a percent where neighbouring places are alike.
 const EXAMINED: u64 = 1 << 16;
 
+/// The examined places hold at least this many times the points of the largest of them, so that
+/// none of them decides the result.
+const TIMES_LARGEST: u64 = 32;
+
 /// The side of a place, which is a cube, in spacings: about a thousand points of a surface.
 const SIDE: f64 = 32.0;
 
@@ -38,11 +42,11 @@ pub struct Survey {
     /// The scene; of a sampled cloud, the surfels in and around the examined places.
     pub scene: Scene,
     /// The counts of all points' preparation. Of a sampled cloud, those that depend on neighbours
-    /// are estimates, and the number of surfels that neighbours limit is left out (0).
+    /// are estimates.
     pub preparation: Preparation,
     /// The scene's origin, world coordinates.
     pub origin: DVec3,
-    /// The largest half-axis among the examined surfels, world units.
+    /// The largest half-axis, world units: of all points that have one, and of the examined surfels.
     pub largest_radius: f32,
     /// How well the surfels cover the surface; None for Gaussians, and if all points are at one
     /// position. Of a sampled cloud, its counts are estimates.
@@ -92,13 +96,14 @@ fn surveyed(points: Points, whole: usize, progress: &dyn Progress) -> Result<Sur
         return of_whole(scene, preparation, progress);
     };
     let counted = counted(&mut gathered, strays);
+    let largest_given = Given(&gathered).largest_radius();
     let up = *gathered.points.up.get_or_insert_with(|| guess_up(&body));
     let examined = places.keep(&mut gathered);
     let ((mut scene, sampled), _) = built(gathered, &Limits::default(), progress)?;
     (scene.up, scene.oriented) = (up, scene.oriented && counted.estimated_normals == 0);
     let points = examined.iter().filter(|examined| **examined).count() as u64;
     let radii = scene.surfels.iter().zip(&examined).filter(|(_, examined)| **examined);
-    let largest_radius = radii.map(|(surfel, _)| surfel.radius()).fold(0.0, f32::max);
+    let largest_radius = radii.map(|(surfel, _)| surfel.radius()).fold(largest_given, f32::max);
     let scaled = |count: u64, of: u64| (count as f64 * counted.surfels as f64 / of.max(1) as f64).round() as u64;
     let of_built = |count: u64| scaled(count, sampled.surfels);
     let coverage = coverage_among(&scene, Some(&examined), progress)?.map(|found| Coverage {
@@ -110,7 +115,7 @@ fn surveyed(points: Points, whole: usize, progress: &dyn Progress) -> Result<Sur
         distinct_positions: sampled.distinct_positions.map(of_built),
         opposed_normals: of_built(sampled.opposed_normals),
         // At the rim of the margin, points lack neighbours that they have in the cloud.
-        limited_by_neighbours: 0,
+        limited_by_neighbours: None,
         limited_radii: of_built(sampled.limited_radii),
         rounding: sampled.rounding,
         median_spacing: sampled.median_spacing,
@@ -166,18 +171,18 @@ enum Role {
 }
 
 impl Places {
-    /// Chooses places with [`EXAMINED`] points or more; None if those are nearly all.
+    /// Chooses places with [`EXAMINED`] points or more; None if those are half of all or more.
     fn chosen(positions: &[[f64; 3]], low: DVec3, spacing: f64) -> Option<Self> {
         let mut places = Self { low, side: SIDE * spacing, margin: MARGIN * spacing, cells: HashMap::new(), chosen: 0 };
         let mut counts: Vec<(u64, Cell, u64)> =
             places.counts(positions).into_iter().map(|(cell, count)| (hash(cell), cell, count)).collect();
         counts.sort_unstable();
-        let mut held = 0;
+        let (mut held, mut largest) = (0, 0);
         for (_, cell, count) in counts {
-            if held >= EXAMINED {
+            if held >= EXAMINED.max(TIMES_LARGEST * largest) {
                 break;
             }
-            held += count;
+            (held, largest) = (held + count, largest.max(count));
             places.choose(cell);
         }
         (2 * held < positions.len() as u64).then_some(places)
@@ -297,9 +302,36 @@ mod tests {
         };
         assert_eq!(counts(&some), counts(&whole));
         assert_eq!(counts(&some)[1..], [1, 400_001, 40_001, 400_001, 1]);
+        // Given radii are all examined.
+        let mut given = ground(false);
+        let mut radii = vec![1.0; given.positions.len()];
+        radii[123_456] = 50.0;
+        given.radii = Some(radii);
+        assert_eq!(surveyed(given, 1000, &()).unwrap().largest_radius, 50.0);
         // Another order of the points chooses the same places.
         let reversed = surveyed(ground(true), 1000, &()).unwrap();
         assert_eq!(reversed.sample, some.sample);
         assert_eq!((reversed.coverage, reversed.largest_radius), (some.coverage, some.largest_radius));
+    }
+
+    /// Dense clusters on sparse ground: no place with a share of the points decides the result.
+    #[test]
+    fn places_of_many_points_need_many_others() {
+        let mut random = Random::stream(10, 0);
+        let mut number = || random.number();
+        let mut positions: Vec<[f64; 3]> = (0..300_000).map(|_| [1000.0 * number(), 1000.0 * number(), 0.0]).collect();
+        let places = |positions: &[[f64; 3]]| Places::chosen(positions, DVec3::ZERO, 1.0);
+        assert!(places(&positions).is_some());
+        let mut clusters: Vec<[f64; 3]> = (0..8)
+            .flat_map(|k| vec![[125.0 * f64::from(k) + 16.0, 16.0, 0.0]; 20_000])
+            .map(|[x, y, z]| [x + number(), y + number(), z])
+            .collect();
+        positions.append(&mut clusters);
+        if let Some(places) = places(&positions) {
+            let of = |cell: &Cell| positions.iter().filter(|p| places.cell(DVec3::from_array(**p)) == *cell).count();
+            let held = places.cells.iter().filter(|(_, chosen)| **chosen).map(|(cell, _)| of(cell));
+            let held: Vec<usize> = held.collect();
+            assert!(held.iter().sum::<usize>() >= 32 * held.iter().max().unwrap(), "{held:?}");
+        }
     }
 }

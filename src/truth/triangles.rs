@@ -18,8 +18,8 @@ use obvhs::ray::{Ray, RayHit};
 use super::Hit;
 use super::nearest::{nearest, triangle_squared_distance};
 use crate::error::Result;
-use crate::io::Mesh;
-use crate::scene::Bounds;
+use crate::io::{Material, Mesh};
+use crate::scene::{Bounds, CUT};
 use crate::surfels::LARGEST_COORDINATE;
 
 /// The padding of each box, in radii of the mesh. A ray starts within 2 radii of the centre and is
@@ -41,6 +41,8 @@ pub struct TriangleTree {
     radius: f64,
     /// The mesh without positions and normals, for its colours.
     paint: Box<Mesh>,
+    /// The least alpha that shows of the image of each material; 0 if all of it does.
+    least_alphas: Vec<f32>,
 }
 
 /// A triangle that has an area.
@@ -97,7 +99,9 @@ impl TriangleTree {
             material: mesh.material.clone(),
             ..Mesh::default()
         };
-        Ok(Self { tree, triangles, center, radius, paint: Box::new(paint) })
+        let of_material = |material: &Material| material.texture.as_ref().map_or(0.0, |image| image.least_alpha());
+        let least_alphas = mesh.materials.iter().map(of_material).collect();
+        Ok(Self { tree, triangles, center, radius, paint: Box::new(paint), least_alphas })
     }
 
     /// The centre of the mesh's bounding box, world coordinates.
@@ -139,7 +143,7 @@ impl TriangleTree {
         self.tree.ray_traverse(ray, &mut RayHit::none(), |_, entry| {
             let index = self.tree.primitive_indices[entry] as usize;
             let Some((t, weights)) = line.meets(&self.triangles[index].corners) else { return f32::INFINITY };
-            if t <= after || first.is_some_and(|(nearest, ..)| t >= nearest) {
+            if !self.shows(index, weights) || t <= after || first.is_some_and(|(nearest, ..)| t >= nearest) {
                 return f32::INFINITY;
             }
             first = Some((t, index, weights));
@@ -148,12 +152,31 @@ impl TriangleTree {
         });
         let (t, index, weights) = first?;
         let triangle = &self.triangles[index];
+        let mut color = self.paint.color_at(triangle.index, weights);
+        if self.least_alpha(triangle.index) == CUT {
+            // A cut-out is opaque where it shows.
+            color[3] = self.paint.material_of(triangle.index).map_or(1.0, |material| material.diffuse[3]);
+        }
         Some(Hit {
             distance: (t + line.shift) * self.radius / direction.length(),
             normal: triangle.normal_at(weights),
             facet: triangle.normal,
-            color: self.paint.color_at(triangle.index, weights),
+            color,
         })
+    }
+
+    /// The least alpha that shows of the image of the mesh's triangle with this index.
+    fn least_alpha(&self, index: usize) -> f32 {
+        let material = self.paint.material.as_ref().and_then(|of| of.get(index));
+        material.and_then(|of| self.least_alphas.get(*of as usize)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether a triangle is there at the point with these weights: not where its image is
+    /// transparent.
+    fn shows(&self, triangle: usize, weights: DVec3) -> bool {
+        let index = self.triangles[triangle].index;
+        let least = self.least_alpha(index);
+        least == 0.0 || self.paint.image_at(index, weights).is_none_or(|texel| texel[3] >= least)
     }
 }
 

@@ -110,6 +110,10 @@ fn seen(one: &Gaussian, camera: &Camera, rules: Rules) -> Option<Seen> {
     let entry = |a: usize, b: usize| jacobian[a].dot(in_camera * jacobian[b]);
     let covariance =
         DMat2::from_cols_array(&[entry(0, 0) + rules.dilation, entry(0, 1), entry(1, 0), entry(1, 1) + rules.dilation]);
+    // The method's code leaves out a Gaussian whose image has no area.
+    if covariance.determinant() <= 0.0 {
+        return None;
+    }
     let direction = match camera.projection {
         Projection::Pinhole => (center - camera.eye).normalize(),
         Projection::Orthographic => camera.rotation.row(2),
@@ -133,7 +137,9 @@ pub fn picture(gaussians: &[Gaussian], camera: &Camera, rules: Rules) -> Vec<([f
             let d = place - one.image;
             let power = -0.5 * d.dot(one.conic * d);
             let alpha = one.alpha * power.exp();
-            let certain = (alpha * 255.0 - 1.0).abs() > 1e-4 * (1.0 - power);
+            // The logarithm of alpha over the least alpha that counts.
+            let excess = (255.0 * one.alpha).ln() + power;
+            let certain = excess.abs() > 1e-4 * (1.0 - power);
             let counts = alpha >= 1.0 / 255.0;
             (counts || !certain).then_some((one.depth, if counts { alpha.min(0.99) } else { 0.0 }, one.color, certain))
         });

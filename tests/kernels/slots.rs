@@ -126,10 +126,13 @@ fn wrong_slots_are_noticed() {
         ("cull.wgsl", "const SPARE: vec2<u32> = vec2<u32>(9u)", "const SPARE: vec2<u32> = vec2<u32>(16u)"),
         ("project.wgsl", "&rare[QUEUE_START + place], slot)", "&rare[QUEUE_START + place], place_for(slot))"),
     ];
-    for options in options() {
+    for (number, options) in options().into_iter().enumerate() {
         let expected = image(Sources::default(), &options);
-        for (file, from, to) in wrong {
+        for (_, (file, from, to)) in wrong.into_iter().enumerate().filter(|(k, _)| common::takes(number + k, 3)) {
             assert!(image(broken(file, from, to), &options) != expected, "{from} in {file} may be {to:?}: {options:?}");
+        }
+        if !common::takes(number, 3) {
+            continue;
         }
         // Repeating the last surfel to the end of its batch has no effect until the check for
         // existence is removed.

@@ -74,7 +74,11 @@ fn compare_counts() {
 #[test]
 fn spreading_changes_no_bit_of_any_form() {
     let mut spread = Vec::new();
-    for (name, scene, camera, options) in drawn() {
+    let always = ["unlit", "constant", "max", "radius"];
+    for (k, (name, scene, camera, options)) in drawn().into_iter().enumerate() {
+        if !always.contains(&name) && !common::takes(k, 3) {
+            continue;
+        }
         let (expected, ..) = alone((&scene, &camera), &options);
         let (frame, report, _) = scattered(card(), Sources::default(), (&scene, &camera), &options);
         assert!(bits(&frame) == bits(&expected), "{name}: spreading changes bits");
@@ -82,7 +86,7 @@ fn spreading_changes_no_bit_of_any_form() {
         assert!(!report.needs.contains(&"spreads") || !report.needs.contains(&"wide-sums"), "{name}");
         spread.extend(report.needs.contains(&"spreads").then_some(name));
     }
-    assert!(["unlit", "constant", "max", "radius"].iter().all(|name| spread.contains(name)), "{spread:?}");
+    assert!(always.iter().all(|name| spread.contains(name)), "{spread:?}");
     // Samples, several pages, and a wider view with several bands.
     let (scene, camera) = (sphere(2000, 2.0), sphere_camera(41, Projection::Pinhole));
     let options = Settings { samples: Samples { across: 2, down: 4 }, ..Default::default() };

@@ -10,6 +10,7 @@ mod clips;
 mod common;
 mod copies;
 mod curved;
+mod cutouts;
 mod facing;
 mod far;
 mod frames;

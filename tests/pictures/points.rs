@@ -350,8 +350,8 @@ fn a_scene_of_points_has_the_same_limits() {
     assert!(changed > 0 && changed < 100, "{changed}");
     // The limit by the median of all points always applies, and may also limit some of these
     // points.
-    let counted = changed.max(free.1.limited_by_neighbours)..=changed + free.1.limited_by_neighbours;
-    assert!(counted.contains(&limited.1.limited_by_neighbours), "{counted:?}");
+    let counted = changed.max(free.1.limited_by_neighbours.unwrap())..=changed + free.1.limited_by_neighbours.unwrap();
+    assert!(counted.contains(&limited.1.limited_by_neighbours.unwrap()), "{counted:?}");
     assert!(limited.1.notes().iter().any(|note| note.contains("neighbours allow")), "{:?}", limited.1.notes());
     assert!(radii(&limited).iter().zip(radii(&free)).all(|(limited, free)| *limited <= free));
     // The disk of the distant point is limited to about three times a typical radius.
@@ -389,7 +389,7 @@ fn no_disk_flies_past_its_neighbours() {
         positions.push([0.0, 0.0, 0.12]);
         let last = |largest_ratio: f64| {
             let made = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, largest_ratio) });
-            (made.points.radii.unwrap()[10_000], made.preparation.limited_by_neighbours)
+            (made.points.radii.unwrap()[10_000], made.preparation.limited_by_neighbours.unwrap_or(0))
         };
         let ((free, none), (limited, some)) = (last(f64::INFINITY), last(2.0));
         if let Size::Bsp(_) = size {

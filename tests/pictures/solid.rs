@@ -86,6 +86,7 @@ fn errors(expected: &[([f64; 4], bool)], shown: &Frame) -> (f64, f64) {
     });
     let (sum, count, most) =
         errors.fold((0.0, 0, 0.0f64), |(sum, count, most), error| (sum + error * error, count + 1, most.max(error)));
+    assert!(count > 400, "{count}");
     ((sum / f64::from(count)).sqrt(), most)
 }
 
@@ -100,7 +101,7 @@ fn pictures_are_what_the_published_formulas_say() {
     for (name, camera) in cameras() {
         let expected = picture(&gaussians, &camera, Rules::PUBLISHED);
         let certain = expected.iter().filter(|pixel| pixel.1 && pixel.0[3] > 0.0).count();
-        assert!(certain > 100, "{name}: {certain}");
+        assert!(certain > 40, "{name}: {certain}");
         let controls = [
             Rules { dilation: 0.0, ..Rules::PUBLISHED },
             Rules { third: false, ..Rules::PUBLISHED },
@@ -222,9 +223,14 @@ fn sizes_of_all_magnitudes_are_drawn() {
         for backend in backends() {
             let shown = frame(&scene, &camera, &options(), &backend);
             assert!(shown.color.iter().flatten().all(|value| value.is_finite()), "{name}");
-            let (rmse, _) = errors(&picture(&gaussians, &camera, Rules::PUBLISHED), &shown);
-            println!("{name}: {rmse:e}");
-            assert!(rmse < 2e-4, "{name}: {rmse:e}");
+            let (rmse, most) = errors(&picture(&gaussians, &camera, Rules::PUBLISHED), &shown);
+            println!("{name}: {rmse:e} {most:e}");
+            assert!(rmse < 1e-6 && most < 3e-5, "{name}: {rmse:e} {most:e}");
+            // Control: the loss of the thinnest eighth shows.
+            let others: Vec<_> =
+                gaussians.iter().enumerate().filter(|(k, _)| k % 8 != 0).map(|(_, one)| one.clone()).collect();
+            let (rmse, _) = errors(&picture(&others, &camera, Rules::PUBLISHED), &shown);
+            assert!(rmse > 1e-4, "{name}: {rmse:e}");
         }
     }
 }

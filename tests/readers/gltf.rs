@@ -1,6 +1,6 @@
 //! glTF files in both forms, made by hand and by another program, and damaged ones.
 
-use super::made::{F32, I16, Made, U8, U32};
+use super::made::{F32, I16, Made, U8, U16, U32};
 use super::{Folder, ReadOptions, io};
 use epsplat::io::{Points, Up};
 use epsplat::low_level::scene::Colors;
@@ -251,8 +251,28 @@ fn images_that_cannot_be_read_are_left_out_with_a_note() {
     for (textures, images) in [("", ""), (r#"{"source":3}"#, "{}"), (r#"{"source":0,"sampler":1}"#, "{}")] {
         assert!(of(textures, images).unwrap_err().to_string().contains("does not exist"));
     }
-    std::fs::write(folder.path("there.png"), "").unwrap();
-    assert_eq!(io::companions(&folder.path("a.gltf"), None).unwrap().len(), 0);
+    // An image that can be read shows after any number of others that cannot, up to a limit.
+    for (missing, is_shown) in [(20, true), (255, true), (256, false)] {
+        let materials = (0..=missing)
+            .map(|k| format!(r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{k}}}}}}}"#))
+            .collect::<Vec<_>>();
+        let textures = (0..=missing).map(|k| format!(r#"{{"source":{k}}}"#)).collect::<Vec<_>>();
+        let images = (0..missing).map(|k| format!(r#"{{"uri":"{k}.png"}}"#));
+        let images = images.chain([format!(r#"{{"uri":"{}"}}"#, image())]).collect::<Vec<_>>();
+        let primitives = (0..=missing)
+            .map(|k| format!(r#"{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"material":{k}}}"#))
+            .collect::<Vec<_>>();
+        let [materials, textures, images] = [materials, textures, images].map(|all| all.join(","));
+        let scene = scene(&primitives.join(","));
+        let rest = format!(r#"{scene},"materials":[{materials}],"textures":[{textures}],"images":[{images}]"#);
+        let points = folder.read("a.gltf", made.text(&rest).as_bytes()).unwrap();
+        let paint = points.faces.unwrap().paint.unwrap();
+        assert_eq!(paint.textures.len(), usize::from(is_shown), "{missing} {:?}", points.notes);
+        let last = points.notes.last().unwrap();
+        let more = missing - 16 + usize::from(!is_shown);
+        assert_eq!(*last, format!("and {more} more notes about its materials"));
+    }
+    assert!(!io::companions(&folder.path("a.gltf"), None).unwrap().is_empty());
 }
 
 #[test]
@@ -279,6 +299,14 @@ fn quantised_and_sparse_accessors_are_read() {
     assert_eq!(of(&text), [[0.0; 3], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]);
     let text = made.text(&scene(r#"{"attributes":{"POSITION":1},"mode":0}"#));
     assert_eq!(of(&text), [[0.0; 3], [7.0, 8.0, 9.0], [0.0; 3], [4.0, 5.0, 6.0]]);
+    let stored = made.view(&[1.0f32, 2.0, 3.0, 1.0, 2.0, 3.0].map(f32::to_le_bytes).concat());
+    let (numbers, values) =
+        (made.view(&1u16.to_le_bytes()), made.view(&[7.0f32, 8.0, 9.0].map(f32::to_le_bytes).concat()));
+    made.described(&format!(
+        r#"{{"bufferView":{stored},"componentType":{F32},"type":"VEC3","count":2,"sparse":{{"count":1,"indices":{{"bufferView":{numbers},"componentType":{U16}}},"values":{{"bufferView":{values}}}}}}}"#
+    ));
+    let text = made.text(&scene(r#"{"attributes":{"POSITION":2},"mode":0}"#));
+    assert_eq!(of(&text), [[1.0, 2.0, 3.0], [7.0, 8.0, 9.0]]);
 }
 
 #[test]
@@ -406,6 +434,14 @@ fn sizes_are_bounded_by_that_of_the_file() {
     let many = vec![PLAIN; 1000].join(",");
     let rest = format!(r#""nodes":[{shared}],"meshes":[{{"primitives":[{many}]}}]"#);
     assert!(folder.refusal("a.gltf", made.text(&rest).as_bytes()).contains("vertices and corners"));
+    // A file that many buffers name counts once.
+    std::fs::write(folder.path("large.bin"), vec![0; 1 << 20]).unwrap();
+    let named = vec![r#"{"uri":"large.bin","byteLength":1}"#; 1000].join(",");
+    let text = made.text(&rest).replacen(r#""buffers":["#, &format!(r#""buffers":[{named},"#), 1);
+    let text = text.replace(r#""buffer":0"#, r#""buffer":1000"#);
+    assert!(folder.refusal("a.gltf", text.as_bytes()).contains("vertices and corners"));
+    let rest = format!(r#""nodes":[],"extras":[{}]"#, vec!["[]"; 1 << 22].join(","));
+    assert!(folder.refusal("a.gltf", made.text(&rest).as_bytes()).contains("values or more"));
     let rest = format!(r#""nodes":[{}]"#, vec!["{}"; (1 << 20) + 1].join(","));
     assert!(folder.refusal("a.gltf", made.text(&rest).as_bytes()).contains("1048577 nodes"));
 }

@@ -36,10 +36,13 @@ fn growth(radius: f32, depth: f32) -> f32 {
 }
 
 fn half_axes(index: u32, surfel: Surfel, center: vec3<f32>) -> Axes {
-    let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
-    let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
+    let s_own = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]);
+    let t_own = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]);
     let third = bitcast<f32>(attribute_word(index, THIRD_WORD)) * held.unit;
-    let w_world = unit3(cross3(unit3(s_world), unit3(t_world))) * third;
+    // Squares of half-axes may be too small for an f32.
+    let w_world = unit3(cross3(unit3(s_own / greatest(s_own)), unit3(t_own / greatest(t_own)))) * third;
+    let s_world = s_own * held.unit;
+    let t_world = t_own * held.unit;
     let slope = slope_in_view(center);
     let s = rotate_plain(s_world);
     let t = rotate_plain(t_world);

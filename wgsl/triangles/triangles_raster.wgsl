@@ -2,8 +2,9 @@
 // interpolated depths and its depth test. The nearest triangle is shaded as in the compute path.
 // Same interface as triangles_named.wgsl.
 // #import corner_*::{clip_depth, homogeneous_depth}
+// #import cutout::{shows}
 // #import layout::{held, hold}
-// #import triangles::{corner_at, triangles}
+// #import triangles::{corner_at, triangle_at, triangles}
 
 // One plus the index of the nearest triangle; 0 where there is none.
 @group(0) @binding(69) var drawn_triangles: texture_2d<u32>;
@@ -26,6 +27,11 @@ fn drawn_corner(@builtin(vertex_index) vertex: u32) -> DrawnCorner {
 
 @fragment
 fn drawn_triangle(corner: DrawnCorner) -> @location(0) u32 {
+    let at = floor(corner.position.xy) + 0.5;
+    hold();
+    if (!shows(triangle_at(corner.number), corner.number, at)) {
+        discard;
+    }
     return corner.number + 1u;
 }
 

@@ -1,13 +1,23 @@
 // Textured triangles: the lookup for a pixel (textures.wgsl). Same interface as
 // triangles_texture_absent.wgsl.
+// #import cutout::{least_alpha}
 // #import textures::{seen_texture}
 // #import triangles_attributes::{triangle_attributes}
 
 // The first word of the texture coordinates in a triangle's record.
 override TRIANGLE_PLACES: u32;
 
-// The premultiplied texture colour. `spread` is the barycentric area of the pixel.
+// The least alpha at which a point of a cut-out image shows; it is then opaque.
+const CUT: f32 = 0.5;
+
+// The premultiplied texture colour of a point that shows. `spread` is the barycentric area of the
+// pixel.
 fn triangle_texture(record: u32, parts: vec3<f32>, spread: f32) -> vec4<f32> {
+    let seen = image_of_triangle(record, parts, spread);
+    return select(seen, seen / seen.w, least_alpha(record) == CUT);
+}
+
+fn image_of_triangle(record: u32, parts: vec3<f32>, spread: f32) -> vec4<f32> {
     let first = record + TRIANGLE_PLACES;
     let a = vec2<f32>(triangle_attributes[first], triangle_attributes[first + 1u]);
     let b = vec2<f32>(triangle_attributes[first + 2u], triangle_attributes[first + 3u]);

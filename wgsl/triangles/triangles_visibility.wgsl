@@ -1,9 +1,10 @@
 // The visibility pass of triangles: the nearest one at every pixel; at equal depths, the one with
 // the greatest index. One invocation per triangle; one workgroup for each large triangle, and for
 // each rare one, for which f32 is not enough. Twin: src/passes/triangles.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x5ceb1bca6abfb79f
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x4d6bde282b7d3568
 // #import corner_*::{has_image, homogeneous_depth, is_before}
 // #import corners::{Corner}
+// #import cutout::{shows}
 // #import footprint::{QUEUE_START, Rectangle, TILE, pixel_index}
 // #import layout::{WORKGROUP, held, held_band, hold, kept_depth, linear_index}
 // #import project::{QUEUE_GRID, rows_of}
@@ -93,9 +94,9 @@ fn is_rare(triangle: Triangle) -> bool {
     return !(is_plain(triangle.a) && is_plain(triangle.b) && is_plain(triangle.c)) || is_ill_formed(triangle);
 }
 
-fn keep_crossing(crossed: Crossing, number: u32, x: u32, y: u32) {
-    if (crossed.hit) {
-        keep_triangle(pixel_index(x, y), kept_depth(bitcast<u32>(crossed.depth)), number);
+fn keep_crossing(crossed: Crossing, triangle: Triangle, number: u32, at: vec2<u32>) {
+    if (crossed.hit && shows(triangle, number, vec2<f32>(at) + 0.5)) {
+        keep_triangle(pixel_index(at.x, at.y), kept_depth(bitcast<u32>(crossed.depth)), number);
     }
 }
 
@@ -124,7 +125,7 @@ fn draw_small(number: u32, queues: bool) {
     }
     var at = pixels.first;
     while (at.y <= pixels.last.y) {
-        keep_crossing(cross_plainly(triangle, vec2<f32>(at) + 0.5), number, at.x, at.y);
+        keep_crossing(cross_plainly(triangle, vec2<f32>(at) + 0.5), triangle, number, at);
         at.x++;
         at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
     }
@@ -139,7 +140,8 @@ fn draw_large(place: u32, local: vec2<u32>) {
     let pixels = reach_of(triangle);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            keep_crossing(cross_plainly(triangle, vec2<f32>(f32(x), f32(y)) + 0.5), number, x, y);
+            let at = vec2<u32>(x, y);
+            keep_crossing(cross_plainly(triangle, vec2<f32>(at) + 0.5), triangle, number, at);
         }
     }
 }
@@ -153,7 +155,8 @@ fn draw_rare(place: u32, local: vec2<u32>) {
     let pixels = reach_of(triangle);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            keep_crossing(cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5), number, x, y);
+            let at = vec2<u32>(x, y);
+            keep_crossing(cross_precisely(triangle, vec2<f32>(at) + 0.5), triangle, number, at);
         }
     }
 }

@@ -49,7 +49,10 @@ impl<'a> Accessor<'a> {
         let (Checked::Valid(kind), Checked::Valid(shape)) = (&own.component_type, &own.type_) else {
             return Err(malformed(format!("the accessor {number} has an unknown type")));
         };
-        let (kind, width) = (kind.0, width_of(*shape));
+        if matches!(shape, Type::Mat2 | Type::Mat3 | Type::Mat4) {
+            return Err(malformed(format!("the accessor {number} has matrices, which do not fit")));
+        }
+        let (kind, width) = (kind.0, shape.multiplicity());
         if !widths.contains(&width) {
             return Err(malformed(format!("the accessor {number} has elements of {width} numbers, which do not fit")));
         }
@@ -126,11 +129,6 @@ fn number(bytes: &[u8], k: usize, kind: ComponentType) -> f64 {
         ComponentType::U32 => u32::from_le_bytes(chunk(bytes, k)).into(),
         ComponentType::F32 => f32::from_le_bytes(chunk(bytes, k)).into(),
     }
-}
-
-/// The number of components; matrices are not read.
-fn width_of(shape: Type) -> usize {
-    shape.multiplicity()
 }
 
 impl<'a> Elements<'a> {

@@ -58,9 +58,14 @@ impl<'a> Buffers<'a> {
         Self { document, all }
     }
 
-    /// The number of bytes of all buffers.
+    /// The number of bytes of all buffers. Buffers that name one file count once, and the file's
+    /// own bytes not at all.
     pub(super) fn length(&self) -> u64 {
-        self.all.iter().flatten().map(|bytes| bytes.get().len() as u64).sum()
+        let others = self.all.iter().flatten().filter_map(|bytes| match bytes {
+            Bytes::Own(_) => None,
+            Bytes::Other(bytes) => Some((bytes.as_ptr(), bytes.len() as u64)),
+        });
+        others.collect::<HashMap<_, _>>().values().sum()
     }
 
     /// The bytes of a buffer view, and the step between its elements if it has one.
@@ -131,7 +136,9 @@ fn unescaped(text: &str) -> Vec<u8> {
     let mut plain = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
     while let [byte, after @ ..] = rest {
-        let code = after.get(..2).filter(|_| *byte == b'%').and_then(|code| std::str::from_utf8(code).ok());
+        // The parser of numbers would take a sign.
+        let code = after.get(..2).filter(|code| *byte == b'%' && code.iter().all(u8::is_ascii_hexdigit));
+        let code = code.and_then(|code| std::str::from_utf8(code).ok());
         let code = code.and_then(|code| u8::from_str_radix(code, 16).ok());
         plain.push(code.unwrap_or(*byte));
         rest = if code.is_some() { &after[2..] } else { after };
@@ -149,7 +156,7 @@ mod tests {
         assert_eq!(of("data:application/octet-stream;base64,AQID"), Some(vec![1, 2, 3]));
         assert_eq!(of("DATA:;base64,AQI="), Some(vec![1, 2]));
         assert_eq!(of("data:;base64,AQI"), Some(vec![1, 2]));
-        assert_eq!(of("data:,a%20%zz%4"), Some(b"a %zz%4".to_vec()));
+        assert_eq!(of("data:,a%20%zz%+5%4"), Some(b"a %zz%+5%4".to_vec()));
         assert_eq!((of("a.bin"), of("dat"), of("däta")), (None, None, None));
         for damaged in ["data:", "data:;base64,A", "data:;base64,*"] {
             assert!(data_of(damaged).is_some_and(|data| data.is_err()), "{damaged}");

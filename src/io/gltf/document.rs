@@ -12,6 +12,10 @@ use crate::io::values::{BYTE_ORDER_MARK, one_line, shown};
 /// The most bytes of JSON.
 const MOST_JSON: usize = 1 << 28;
 
+/// The most marks between values of JSON: a value takes up to 250 bytes of memory for each. Data
+/// URIs have few.
+const MOST_MARKS: usize = 1 << 23;
+
 /// The most entries of a list at the top of the JSON: an empty object of two bytes becomes a node
 /// of hundreds.
 const MOST_LISTED: usize = 1 << 20;
@@ -49,6 +53,10 @@ impl Document {
         };
         if text.len() > MOST_JSON {
             return Err(malformed(format!("its JSON is longer than {} MiB: save it as GLB", MOST_JSON >> 20)));
+        }
+        let marks = text.iter().filter(|byte| b"{[:,".contains(byte)).count();
+        if marks > MOST_MARKS {
+            return Err(malformed(format!("its JSON has {marks} values or more, beyond the limit of {MOST_MARKS}")));
         }
         let mut value: Value = serde_json::from_slice(text).map_err(not_gltf)?;
         check_version(&value)?;

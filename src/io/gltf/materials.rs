@@ -100,12 +100,14 @@ pub(super) struct Materials<'a> {
     path: &'a Path,
     beside: Beside,
     ignore_alpha: bool,
-    /// Decoded images, by their place: a file, or the index of an image inside the file.
+    /// Decoded images, by their place.
     decoded: HashMap<Source, Option<Arc<Texture>>>,
     /// Images as materials show them, by the index of the image, whether it clamps, and the fate of
     /// its alphas.
     shown: HashMap<(usize, bool, Cut), Option<Arc<Texture>>>,
     pixels: u64,
+    /// The number of images that were tried and left out.
+    failed: usize,
     pub(super) numbers: Numbers,
     notes: Vec<String>,
     /// The number of notes that are not told.
@@ -115,14 +117,18 @@ pub(super) struct Materials<'a> {
 /// The most notes about materials.
 const MOST_NOTES: usize = 16;
 
+/// The most images that are tried and left out: a damaged file may name any number of images that
+/// take long to decode before they fail.
+const MOST_FAILED: usize = 256;
+
 /// The place of an image, and its bytes if it is no file.
 type Placed<'a> = (Source, Option<Cow<'a, [u8]>>);
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Source {
     File(PathBuf),
-    /// A buffer view.
-    View(usize),
+    /// Bytes of a buffer: their address, and their number.
+    Inside(usize, usize),
     /// The data URI of an image.
     Data(usize),
 }
@@ -147,6 +153,7 @@ impl<'a> Materials<'a> {
             decoded: HashMap::new(),
             shown: HashMap::new(),
             pixels: 0,
+            failed: 0,
             numbers: Numbers::default(),
             notes: Vec::new(),
             more: 0,
@@ -224,10 +231,12 @@ impl<'a> Materials<'a> {
 
     /// Adds a note unless it is there.
     pub(super) fn note(&mut self, note: String) {
-        if self.notes.len() >= MOST_NOTES {
-            self.more += 1;
-        } else if !self.notes.contains(&note) {
-            self.notes.push(note);
+        if self.notes.contains(&note) {
+            return;
+        }
+        match self.notes.len() < MOST_NOTES {
+            true => self.notes.push(note),
+            false => self.more += 1,
         }
     }
 
@@ -262,18 +271,18 @@ impl<'a> Materials<'a> {
             Cut::None => code,
             Cut::Below(least) => 255 * u8::from(u16::from(code) >= least),
         };
-        if !clamps && image.texels().iter().all(|texel| texel[3] == alpha(texel[3])) {
-            return Some(image.clone());
+        if image.texels().iter().all(|texel| texel[3] == alpha(texel[3])) {
+            return Some(Arc::new(Texture::clone(image).clamped(clamps)));
         }
         let [width, height] = image.size();
-        self.count(u64::from(width) * u64::from(height)).then_some(())?;
+        self.count([width, height]).then_some(())?;
         let texels = image.texels().iter().map(|[r, g, b, a]| [*r, *g, *b, alpha(*a)]).collect();
         Texture::new(width, height, texels).map(|texture| Arc::new(texture.clamped(clamps)))
     }
 
     /// Counts pixels of an image; false with a note if there are too many.
-    fn count(&mut self, pixels: u64) -> bool {
-        let all = self.pixels.saturating_add(pixels);
+    fn count(&mut self, [width, height]: [u32; 2]) -> bool {
+        let all = self.pixels.saturating_add(u64::from(width) * u64::from(height));
         if all > MOST_PIXELS {
             self.note(format!("images are left out: all have more pixels than the limit of {MOST_PIXELS}"));
             return false;
@@ -286,14 +295,14 @@ impl<'a> Materials<'a> {
     fn decoded(&mut self, number: usize) -> Option<Arc<Texture>> {
         let document = self.document;
         let image = document.root.images.get(number)?;
-        // A damaged file may name any number of images that take long to decode before they fail.
-        if self.notes.len() >= MOST_NOTES {
-            self.more += 1;
+        if self.failed >= MOST_FAILED {
+            self.note(format!("further images are left out, as {MOST_FAILED} could not be read"));
             return None;
         }
         let (source, bytes) = match self.bytes(number, image) {
             Ok(found) => found,
             Err(why) => {
+                self.failed += 1;
                 self.note(format!("a texture is left out: its image {number} cannot be read: {why}"));
                 return None;
             }
@@ -303,22 +312,23 @@ impl<'a> Materials<'a> {
         }
         let path = match &source {
             Source::File(path) => path,
-            Source::View(_) | Source::Data(_) => self.path,
+            Source::Inside(..) | Source::Data(_) => self.path,
         };
         let bytes = match bytes {
             Some(bytes) => Ok(bytes),
             None => image::bytes(path).map(Cow::from),
         };
-        let texture = bytes.and_then(|bytes| Texture::decoded(path, &bytes));
-        let texture = match texture {
-            Ok(texture) => Some(texture),
-            Err(error) => {
-                self.note(format!("a texture is left out: {}", one_line(&error.to_string())));
-                None
-            }
-        };
-        let pixels = texture.as_ref().map_or(0, |texture| texture.texels().len() as u64);
-        let texture = texture.filter(|_| self.count(pixels)).map(Arc::new);
+        let texture = bytes.and_then(|bytes| {
+            // An image beyond the limit is not decoded.
+            let size = image::size_of_bytes(path, &bytes)?;
+            if self.count(size) { Texture::decoded(path, &bytes).map(Some) } else { Ok(None) }
+        });
+        let texture = texture.unwrap_or_else(|error| {
+            self.failed += 1;
+            self.note(format!("a texture is left out: {}", one_line(&error.to_string())));
+            None
+        });
+        let texture = texture.map(Arc::new);
         self.decoded.insert(source, texture.clone());
         texture
     }
@@ -327,7 +337,7 @@ impl<'a> Materials<'a> {
     fn bytes(&mut self, number: usize, image: &Image) -> Result<Placed<'a>, String> {
         if let Some(view) = image.buffer_view {
             return match self.buffers.view(view) {
-                Ok((bytes, _)) => Ok((Source::View(view.value()), Some(bytes.into()))),
+                Ok((bytes, _)) => Ok((Source::Inside(bytes.as_ptr() as usize, bytes.len()), Some(bytes.into()))),
                 Err(Fault::Malformed(why)) => Err(why),
                 Err(_) => Err("its bytes are missing".into()),
             };

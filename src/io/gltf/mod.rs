@@ -30,9 +30,9 @@ use nodes::Placed;
 use parts::{Parts, Source, mode, size};
 
 /// The most vertices and corners that a scene may have because its nodes share meshes: this many,
-/// and so many more for each byte of its files.
-const MOST_SHARED: u64 = 1 << 20;
-const MOST_SHARED_PER_BYTE: u64 = 32;
+/// and so many more for each byte of its files. A vertex takes about a hundred bytes of memory.
+const MOST_SHARED: u64 = 1 << 24;
+const MOST_SHARED_PER_BYTE: u64 = 4;
 
 /// Reads the default scene of a glTF file: its triangles, or its points if it has no triangles. If
 /// no scene is the default, all nodes belong to it.
@@ -45,7 +45,8 @@ const MOST_SHARED_PER_BYTE: u64 = 32;
 ///   image is multiplied by the base colour, and by `COLOR_0` if all vertices of a primitive share
 ///   it. Texture coordinates may be transformed (`KHR_texture_transform`), and their origin becomes
 ///   bottom left.
-/// - Alphas are ignored for `OPAQUE`, become 0 or 1 for `MASK`, and stay for `BLEND`.
+/// - Alphas are ignored for `OPAQUE`, become 0 or 1 for `MASK` (those of texels before images are
+///   filtered), and stay for `BLEND`.
 /// - Buffers and images may lie in the file, in data URIs, or in files beside it. Accessors may be
 ///   sparse, normalized or quantised.
 ///

@@ -241,7 +241,7 @@ pub(super) const TEXTURES: [Clash; 3] = [
 ];
 
 /// Combinations of scenes and options that are rejected.
-pub(super) const SCENES: [SceneClash; 19] = [
+pub(super) const SCENES: [SceneClash; 20] = [
     SceneClash {
         applies: |facts, options, device| facts.solid && device && options.raster.is_some(),
         sentence: "the rasteriser sorts no 3D Gaussians: take --backend gpu, or --flatten to make surfels of them",
@@ -268,6 +268,10 @@ pub(super) const SCENES: [SceneClash; 19] = [
         },
         sentence: "3D Gaussians have no rims: leave --outline out and take --lowpass gaussians or none, or take --flatten to \
                    make surfels of them",
+    },
+    SceneClash {
+        applies: |facts, options, _| facts.solid && options.facing.is_some(),
+        sentence: "3D Gaussians have sizes of their own: leave --facing out, or take --flatten to make surfels of them",
     },
     SceneClash {
         applies: |facts, options, _| facts.solid && options.maps.has(Map::Normal),

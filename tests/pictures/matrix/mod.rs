@@ -34,7 +34,7 @@ use common::any_scene::{self, Sampled};
 use common::{Random, any_options};
 
 /// Frames that the device draws by default.
-const FRAMES: usize = 200;
+const FRAMES: usize = 80;
 
 /// Views per combination.
 const VIEWS: usize = 3;
@@ -364,7 +364,7 @@ fn a_fault_is_found() {
         ("curved.wgsl", "let a = 0.5 * bent", "let a = 0.51 * bent", &|of| of.sampled.about.contains(&"caps")),
         ("join_blended.wgsl", "clamp(0.5 +", "clamp(0.51 +", &blended),
     ];
-    for (file, from, to, fits) in faults {
+    for (_, (file, from, to, fits)) in faults.into_iter().enumerate().filter(|(k, _)| common::takes(*k, 2)) {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let found =
             (0..4000).filter_map(|seed| combination(seed, &mut Tally::default())).filter(|of| fits(of)).take(24);

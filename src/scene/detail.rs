@@ -98,8 +98,8 @@ pub enum DetailMeasure {
     /// surfels lie off the node's cap ([`Node::radius`]).
     #[default]
     Extent,
-    /// The area of the square whose side is the longer axis of the ellipse's image. By this
-    /// reading of Pajarola 2003 its Table 2 can be repeated.
+    /// The area of the square whose side is the longer axis of the ellipse's image. This
+    /// reading of Pajarola 2003 comes nearest to the numbers in its Table 2.
     Square,
 }
 

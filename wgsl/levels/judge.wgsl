@@ -4,7 +4,7 @@
 // Twin: src/passes/select.rs.
 // All loops end, by 1 of src/gpu/loops.rs: 0xbe73f2f4fd74cada
 // #import axes_*::{growth}
-// #import backs_curved|backs_flat::{leaning}
+// #import backs_*::{leaning}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
 // #import camera_*::{axis_image, ball_sine, is_beside}
 // #import camera_orthographic|perspective::{ray_to}

@@ -94,8 +94,7 @@ mod tests {
         // Enough samples are distributed as ever.
         assert_eq!(distribute_by_rank(&priorities, 6600), distribute(&priorities, 6600));
         assert_eq!(distribute_by_rank(&[0.0, 2.0, f64::NAN], 3), [0, 3, 0]);
-        // Of equal voxels in a row, those that get one are spread: no quarter has less than its
-        // share.
+        // Equal voxels in a row get samples evenly: no quarter has less than its share.
         let some = distribute_by_rank(&[1.0; 400], 100);
         assert!(some.chunks(100).all(|part| part.iter().sum::<usize>().abs_diff(25) <= 2), "{some:?}");
     }

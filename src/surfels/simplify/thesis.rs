@@ -202,8 +202,8 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
 }
 
 /// Simplifies `scene` as in the thesis, to disks that are each centred at a surfel and have its
-/// colour and texture coordinates. The tolerance is in world units; a disk conquers the points within `ratio` times its
-/// radius.
+/// colour and texture coordinates. The tolerance is in world units; a disk conquers the points
+/// within `ratio` times its radius.
 ///
 /// # Errors
 ///

@@ -81,7 +81,7 @@ pub struct SceneEntry {
     /// Whether surfels keep their clip lines and curvature; by default both.
     #[serde(default)]
     pub rims: Rims,
-    /// What nodes of levels of detail bound; by default rims.
+    /// Parts of the disks below that nodes of levels of detail bound; by default rims.
     #[serde(default, deserialize_with = "parsed")]
     pub bounds: Option<NodeBounds>,
     /// The texture of the mesh in `file`, relative to the definition's folder.

@@ -43,7 +43,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     build_with(scene, NodeBounds::Rims, progress)
 }
 
-/// What the ellipse of a node bounds.
+/// The parts of the disks below that the ellipse of a node bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NodeBounds {
     /// The rims of the disks below the node, on the node's cap. Its shape is that of the covariance

@@ -15,9 +15,9 @@
 //! through centroids, as in the clustering that it is based on (Pauly et al. 2002), so clusters end
 //! with one to three points. The radius is the mean over the clusters of three points that are not
 //! collinear. Two rules keep the mean from following a few bad clusters, which the paper's models
-//! may not have had: circumspheres of nearly collinear points do not count
-//! ([`NEARLY_COLLINEAR`]), as they may be as large as the model, and three points count only if they
-//! were split from a cluster that is nearly a plane ([`MOST_VARIATION`]).
+//! may not have had. Circumspheres of nearly collinear points do not count ([`NEARLY_COLLINEAR`]),
+//! as they may be as large as the model. Three points count only if they were split from a cluster
+//! that is nearly a plane ([`MOST_VARIATION`]).
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -413,7 +413,7 @@ fn surfels_are_scaled_and_choices_without_meaning_are_refused() {
         frame.color.iter().filter(|color| color[3] > 0.0).count()
     };
     let [small, own, large] = ["0.2", "1", "1.5"].map(seen);
-    assert!(4 * small < own && own < large, "{small} {own} {large}");
+    assert!(2 * small < own && own < large, "{small} {own} {large}");
     let refuses = |more: &[&str], words: &[&str]| {
         fails(&[&["render", text(&sphere)], more, &options[..]].concat(), 2, words);
     };

@@ -15,7 +15,7 @@ use epsplat::low_level::scene::{
     Camera, Colors, Cull, Epsilon, Facing, Kernel, Lens, LowPass, Map, Maps, PointShape, PointSize, Projection,
     Samples, Scene, Shading, Surfel, Up,
 };
-use epsplat::low_level::surfels::analytic::Shape;
+use epsplat::low_level::surfels::analytic::{Shape, generate};
 use epsplat::low_level::surfels::{Limits, build_facing};
 use epsplat::low_level::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::{DVec2, DVec3, Vec3};
@@ -371,6 +371,9 @@ fn flicker(scene: &Scene, options: &Settings) -> f64 {
 #[test]
 fn shapes_that_rise_flicker_less_than_flat_ones() {
     let mut scene = common::scenes::generated(Shape::Checkerboard, 10_000, |_| true);
+    let color = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+    let colors = generate(Shape::Checkerboard, 10_000).map(|sample| color(sample.color));
+    scene.colors = Colors::Srgb8(colors.collect());
     let mut random = Random(11);
     for surfel in &mut scene.surfels {
         // A twentieth of the spacing off the surface.

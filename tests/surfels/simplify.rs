@@ -574,6 +574,10 @@ fn disks_as_in_the_thesis_keep_texture_coordinates() {
     for ((disk, own), [along_u, along_v]) in disks.surfels.iter().zip(&kept.centers).zip(&kept.slopes) {
         let expected = place(center(disk));
         assert!((f64::from(own[0]) - expected[0]).abs() + (f64::from(own[1]) - expected[1]).abs() < 1e-5, "{disk:?}");
+        // A disk that reaches no other point on its side of the seam has no slopes.
+        if [along_u, along_v].iter().all(|slope| **slope == [0.0; 3]) {
+            continue;
+        }
         // Slopes across the seam would be as steep as its jump.
         assert!((along_u[0] - 0.5).abs() < 0.1 && (along_v[1] + 0.5).abs() < 0.05, "{disk:?} {along_u:?} {along_v:?}");
         straight += usize::from((along_u[0] - 0.5).abs() < 0.02);

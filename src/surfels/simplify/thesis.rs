@@ -146,8 +146,8 @@ impl Selection {
 }
 
 /// The slopes of texture coordinates in the plane of the point `seed`, per world unit, by least
-/// squares over the points that the splat reaches without crossing a seam. Each is zero if points
-/// have no texture coordinates.
+/// squares over the points that the splat reaches without crossing a seam. All are zero, that is
+/// unknown, if it reaches none, or if points have no texture coordinates.
 fn slopes(seed: u32, growth: &Growth, samples: &Samples) -> Slopes {
     if samples.places.is_empty() {
         return Slopes::default();

@@ -390,7 +390,7 @@ fn broken_kernels_are_noticed() {
         ),
         ("judge.wgsl", "> SINE_SLACK * (norm3(s)", "> -0.2 * (norm3(s)"),
         ("judge.wgsl", "leaning(record, ray, s, t, norm3(relative));", "vec2<f32>(-0.2 * norm3(s) * norm3(t), 0.0);"),
-        ("judge.wgsl", "&& shows_back(node.first + k)", ""),
+        ("judge.wgsl", "if (shows_back(node.first + k)) {", "if (true) {"),
         ("select.wgsl", " - countOneBits(backs_of(fate));", ";"),
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),

@@ -90,6 +90,11 @@ impl Frame {
         self.maps.get_mut(&map).map(Vec::as_mut_slice)
     }
 
+    /// Returns the colour, and the values of each map, without a copy.
+    pub fn into_values(self) -> (Vec<[f32; 4]>, BTreeMap<Map, Vec<f32>>) {
+        (self.color, self.maps)
+    }
+
     /// Returns a hash of the bits of the colour and of each map, by name, as 16 digits.
     ///
     /// Frames of one scene, view and options have one set of hashes on every adapter; the guide

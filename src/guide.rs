@@ -37,3 +37,7 @@ pub mod adapters {}
 /// The papers' pictures.
 #[cfg_attr(doc, doc = include_str!("guide/papers.md"))]
 pub mod papers {}
+
+/// The package for Python.
+#[cfg_attr(doc, doc = include_str!("guide/python.md"))]
+pub mod python {}

@@ -233,7 +233,10 @@ impl Renderer {
         // Many views would give a line each.
         let is_told = !self.views;
         let marks = self.options.marks.marks();
-        marks.check(&self.camera(view)?)?;
+        // Framing a view looks at all points, so a frame without marks does it only once.
+        if marks != Marks::default() {
+            marks.check(&self.camera(view)?)?;
+        }
         let up = self.scene().up.axis();
         self.rendered(view, (is_told, up), progress)?.marked(marks)
     }

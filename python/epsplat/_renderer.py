@@ -1,0 +1,160 @@
+"""Renderers."""
+
+from __future__ import annotations
+
+from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
+
+from . import _epsplat
+from ._errors import UsageError
+from ._frames import Frames
+from ._progress import stages
+from ._scene import Scene
+from ._view import View, views
+
+Progress = Optional[Callable[..., Any]]
+
+
+class Renderer:
+    """Renders views of a scene. Surfels, buffers and kernels are kept from call to call.
+
+    The interpreter's lock is released meanwhile, so that other threads go on; several threads may
+    share a renderer, which then serves one after another. Ctrl-C stops a render.
+
+    Parameters
+    ----------
+    scene : Scene
+    width, height : pixels, 1024 each by default
+        For views that have no size of their own.
+    wgsl : dict of str
+        WGSL texts in place of built-in files, such as ``{"kernel_ellipse.wgsl": text}``.
+    progress : ``tqdm.tqdm``, or a function ``progress(what, done, units)``
+    options
+        Those of ``epsplat render``: aov (maps beside the colour), epsilon, kernel, shading, light,
+        background, composite, samples, backend ("gpu", "raster" or "reference"), adapter, near and
+        others.
+
+    Raises
+    ------
+    UsageError
+        For options that do not exist, have a wrong value or do not go together.
+    DeviceError
+        If no adapter fits.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        width: Optional[int] = None,
+        height: Optional[int] = None,
+        *,
+        wgsl: Optional[Mapping[str, str]] = None,
+        progress: Progress = None,
+        **options: Any,
+    ):
+        if not isinstance(scene, Scene):
+            raise TypeError("a renderer needs a Scene: make it with epsplat.read or epsplat.Scene")
+        if (width is None) != (height is None):
+            raise UsageError("a picture needs both width and height, or neither")
+        if width is not None:
+            options["size"] = (width, height)
+        self._scene = scene
+        wgsl = None if wgsl is None else dict(wgsl)
+        self._renderer, self.notes = _epsplat.Renderer.of(scene._scene, options, wgsl, stages(progress))
+
+    def render(
+        self,
+        viewmats: Any = None,
+        Ks: Any = None,
+        *,
+        convention: str = "opencv",
+        progress: Progress = None,
+    ) -> Frames:
+        """Renders views.
+
+        Parameters
+        ----------
+        viewmats : (C, 4, 4) world-to-camera matrices, a View, or a sequence of Views
+            Without it, one view shows the whole scene.
+        Ks : (C, 3, 3) or (3, 3) intrinsics, pixels; only with matrices
+        convention : "opencv" or "opengl", the camera axes of the matrices
+
+        Returns
+        -------
+        Frames
+            Arrays of shape (C, H, W, ...), float32.
+
+        Raises
+        ------
+        UsageError
+            For views of different sizes, or matrices that are no camera.
+        KeyboardInterrupt
+            After Ctrl-C; the renderer can be used again.
+        """
+        made = _epsplat.Renderer.render(self._renderer, _views(viewmats, Ks, convention), stages(progress))
+        return Frames(made)
+
+    def look_at(self, eye: Any, target: Any, up: Any = None, fov: Optional[float] = None, **options: Any) -> Frames:
+        """Renders the view from ``eye`` to ``target``; see :func:`epsplat.look_at`."""
+        return self.render(View(eye=eye, target=target, up=up, fov=fov, **options))
+
+    def turntable(self, count: int, **options: Any) -> List[View]:
+        """Returns ``count`` views on a circle around the scene, counter-clockwise from above.
+
+        Options are those of :class:`View` that do not place the camera: from_, elevation, fov, size.
+        """
+        return [View._of(view) for view in self._renderer.turntable(count, options)]
+
+    def orthophoto(
+        self,
+        pixel_size: float,
+        bounds: Optional[Sequence[float]] = None,
+        *,
+        up: Any = None,
+        progress: Progress = None,
+    ) -> Frames:
+        """Renders the map from straight above, north (+y) at the top.
+
+        Parameters
+        ----------
+        pixel_size : the edge of a pixel, world units
+        bounds : (xmin, ymin, xmax, ymax), world units; all data by default
+
+        Returns
+        -------
+        Frames
+            One picture; its ``extent`` is (xmin, xmax, ymin, ymax), as matplotlib takes it.
+        """
+        options = {"pixel_size": pixel_size, "bounds": bounds, "up": up}
+        return Frames(self._renderer.map(options, stages(progress)))
+
+    @property
+    def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
+        """The least and the greatest corner of the box of the scene's centres, world units."""
+        least, greatest = self._renderer.bounds
+        return tuple(least), tuple(greatest)
+
+    def __repr__(self) -> str:
+        return f"<epsplat.Renderer of {self._scene!r}>"
+
+
+def _views(viewmats: Any, Ks: Any, convention: str) -> List[_epsplat.View]:
+    """Returns the views of the arguments of ``render``."""
+    if viewmats is None:
+        if Ks is not None:
+            raise UsageError("intrinsics need matrices: give viewmats too")
+        return []
+    if isinstance(viewmats, View):
+        viewmats = [viewmats]
+    is_views = isinstance(viewmats, (list, tuple)) and any(isinstance(view, View) for view in viewmats)
+    if is_views:
+        if Ks is not None:
+            raise UsageError("views have their own intrinsics: leave Ks out")
+        if not all(isinstance(view, View) for view in viewmats):
+            raise UsageError("views and matrices cannot be mixed: give one kind")
+        return [view._view for view in viewmats]
+    if Ks is None:
+        raise UsageError("matrices need intrinsics: give Ks too")
+    made: Union[List[View], Any] = views(viewmats, Ks, convention)
+    if not made:
+        raise UsageError("viewmats: the array is empty, and there is nothing to render")
+    return [view._view for view in made]

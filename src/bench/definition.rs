@@ -12,6 +12,7 @@ use crate::io::ClassOpacities;
 use crate::plan::{BackendName, Settings};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
+use crate::surfels::hierarchy::NodeBounds;
 use crate::surfels::sampling::Priority;
 use crate::surfels::simplify::Tolerance;
 use crate::truth::DEFAULT_GRID;
@@ -80,6 +81,9 @@ pub struct SceneEntry {
     /// Whether surfels keep their clip lines and curvature; by default both.
     #[serde(default)]
     pub rims: Rims,
+    /// Parts of the disks below that nodes of levels of detail bound; by default rims.
+    #[serde(default, deserialize_with = "parsed")]
+    pub bounds: Option<NodeBounds>,
     /// The texture of the mesh in `file`, relative to the definition's folder.
     pub texture: Option<PathBuf>,
     /// Whether the texture is looked up per pixel. Otherwise each surfel has one colour from it.
@@ -88,6 +92,8 @@ pub struct SceneEntry {
     /// Simplifies the surfels as `epsplat simplify --shape cap` does, within this tolerance.
     #[serde(default, deserialize_with = "parsed")]
     pub simplify: Option<Tolerance>,
+    /// With `simplify`: selects disks as `epsplat simplify --cover thesis:R` does, with this R.
+    pub cover: Option<f64>,
     /// A generated surface in place of a file.
     ///
     /// Sphere, torus, plane, checkerboard, text, shells or crossing.
@@ -177,6 +183,12 @@ pub enum Making {
     /// As [`Bsp`](Self::Bsp), with one radius for all surfels.
     #[serde(rename = "bsp:global")]
     BspGlobal,
+    /// As [`Bsp`](Self::Bsp), by the circumspheres of the clusters.
+    #[serde(rename = "bsp:circumsphere")]
+    BspCircumsphere,
+    /// As [`BspGlobal`](Self::BspGlobal), by the circumspheres of the clusters.
+    #[serde(rename = "bsp:global-circumsphere")]
+    BspGlobalCircumsphere,
     /// As [`Knn`](Self::Knn), with disks as large as the triangles at a mesh's vertices.
     Qsplat,
     /// As `epsplat sample` does: `count` samples of a mesh, with ellipses that cover it.

@@ -133,6 +133,9 @@ impl SceneEntry {
         if self.simplify.is_some() && !(self.surfels.samples() && self.surfels != Making::Hybrid) {
             return Err("simplify: it needs surfels that are samples of a mesh".into());
         }
+        if self.cover.is_some_and(|ratio| self.simplify.is_none() || !(ratio > 0.0 && ratio <= 1.0)) {
+            return Err("cover: it needs simplify, and is a ratio from 0 to 1".into());
+        }
         not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
         not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
         if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {

@@ -15,12 +15,12 @@ use crate::io::{self, Mesh, Points, ReadOptions, Texture};
 use crate::memory;
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::{Camera, Colors, Scene, Surfel};
+use crate::scene::{Camera, Colors, Scene};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
 use crate::surfels::hybrid::Hybrid;
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, sample};
-use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
+use crate::surfels::simplify::{self, SplatShape, Tolerance, as_in_the_thesis, simplify_in_texture};
 use crate::surfels::{
     FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, hierarchy, hybrid,
     with_triangles,
@@ -96,7 +96,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
     let (points, mut surface, left) = source(definition, entry, point, texture.as_ref(), progress)?;
     let points = match entry.simplify {
-        Some(tolerance) => simplified(points, tolerance, progress)?,
+        Some(tolerance) => simplified(points, (tolerance, entry.cover), progress)?,
         None => points,
     };
     let mut scene = match texture.filter(|_| entry.lookup) {
@@ -132,11 +132,11 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty() && footprint_px > 0.0) {
-        enlarge(&mut scene, (wanted / footprint_px) as f32);
+        scene.enlarge((wanted / footprint_px) as f32);
         footprint_px = wanted;
     }
     if definition.configs.iter().any(Config::cuts) && !scene.surfels.is_empty() {
-        (scene, _) = hierarchy::build(scene, progress)?;
+        (scene, _) = hierarchy::build_with(scene, entry.bounds.unwrap_or_default(), progress)?;
     }
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
 }
@@ -176,18 +176,6 @@ fn source(
     })
 }
 
-/// Scales all disks by `factor`. The levels of detail are dropped, as they have the old sizes.
-fn enlarge(scene: &mut Scene, factor: f32) {
-    scene.hierarchy = None;
-    let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
-    for surfel in &mut scene.surfels {
-        *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
-    }
-    if let Colors::Textured(textured) = &mut scene.colors {
-        *textured = textured.enlarged(factor);
-    }
-}
-
 /// Returns `points` and, with a `shirt`, a copy that is moved along the normals by that distance.
 fn dressed(points: Points, shirt: Option<f64>) -> Vec<Points> {
     let Some(out) = shirt else { return vec![points] };
@@ -198,9 +186,15 @@ fn dressed(points: Points, shirt: Option<f64>) -> Vec<Points> {
     vec![points, moved]
 }
 
-/// Simplifies points as `epsplat simplify --shape cap` does.
-fn simplified(points: Points, tolerance: Tolerance, progress: &dyn Progress) -> Result<Points> {
+/// Simplifies points as `epsplat simplify --shape cap` does, or `--cover thesis:R` with the ratio R
+/// in `cover`.
+fn simplified(points: Points, (tolerance, cover): (Tolerance, Option<f64>), progress: &dyn Progress) -> Result<Points> {
     let (scene, _, coordinates) = build_at_vertices(vec![points], progress)?;
+    if let Some(ratio) = cover {
+        let tolerance = tolerance.in_world(scene.bounds().extent().length());
+        let (scene, coordinates, _) = as_in_the_thesis((&scene, &coordinates), tolerance, ratio, progress)?;
+        return Ok(simplify::points(&scene, coordinates, SplatShape::Disk));
+    }
     let options = simplify::Options { tolerance, shape: SplatShape::Cap, relaxations: 0 };
     let (scene, coordinates, _) = simplify_in_texture(&scene, &coordinates, &options, progress)?;
     Ok(simplify::points(&scene, coordinates, SplatShape::Cap))
@@ -281,6 +275,8 @@ fn of_file(
         Making::Ellipse => sized(Size::Ellipse)?,
         Making::Bsp => sized(Size::Bsp(Triangle::default()))?,
         Making::BspGlobal => sized(Size::BspGlobal(Triangle::default()))?,
+        Making::BspCircumsphere => sized(Size::Bsp(Triangle::Circumsphere))?,
+        Making::BspGlobalCircumsphere => sized(Size::BspGlobal(Triangle::Circumsphere))?,
         Making::Qsplat => {
             let bare = Points { faces: read(file)?.faces, ..bare()? };
             let options = FromPoints { size: Size::Qsplat, ..FromPoints::default() };

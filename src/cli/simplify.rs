@@ -5,10 +5,10 @@ use std::str::FromStr;
 
 use clap::Args;
 use epsplat::io::{Points, ply};
+use epsplat::low_level::surfels;
 use epsplat::low_level::surfels::simplify::{
     Options, Report, SplatShape, Tolerance, as_in_the_thesis, points, simplify_in_texture,
 };
-use epsplat::low_level::surfels::{self, Coordinates};
 use epsplat::options::InputOptions;
 use epsplat::{Error, Files, Result};
 
@@ -122,8 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Cover::Cells => simplify_in_texture(&scene, &coordinates, &options, &bars)?,
         Cover::Thesis(ratio) => {
             let tolerance = options.tolerance.in_world(scene.bounds().extent().length());
-            let (simplified, report) = as_in_the_thesis(&scene, tolerance, ratio, &bars)?;
-            (simplified, Coordinates::default(), report)
+            as_in_the_thesis((&scene, &coordinates), tolerance, ratio, &bars)?
         }
     };
     let left = Points { beside, ..points(&simplified, coordinates, shape) };

@@ -55,8 +55,9 @@ group! {
         /// Draw each disk as an inscribed polygon of N sides, 3 to 16
         #[cfg_attr(feature = "cli", arg(long, value_name = "N", hide_short_help = true))]
         pub outline: Option<Outline>,
-        /// Size of a node that --lod compares: extent (the image of its bounding sphere) or area
-        /// (the image of its ellipse, as in Pajarola 2003) [default: extent]
+        /// Size of a node that --lod compares: extent (the image of its bounding sphere), area
+        /// (the image of its ellipse, as in Pajarola 2003) or square (the square over the longer
+        /// axis of that image) [default: extent]
         #[cfg_attr(feature = "cli", arg(long, value_name = "HOW", requires = "cut", hide_short_help = true))]
         pub lod_measure: Option<DetailMeasure>,
         /// Shape that nodes are drawn as: cap (curved like the surface below them) or disk (flat)

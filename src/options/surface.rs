@@ -31,7 +31,8 @@ group! {
         #[cfg_attr(feature = "cli", arg(long, value_name = "FILTER", hide_short_help = true))]
         pub lowpass: Option<LowPass>,
         /// Surfels to leave out: auto (those that face away, if a closed mesh hides them), back
-        /// (all that face away) or none [default: auto]
+        /// (all that face away), cones (nodes of --lod below which all face away, by their cones
+        /// of normals alone) or none [default: auto]
         #[cfg_attr(feature = "cli", arg(long, value_name = "SIDE", hide_short_help = true))]
         pub cull: Option<Cull>,
         /// Do not blend surfels of different files: each pixel shows the surface of the nearest

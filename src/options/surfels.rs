@@ -47,6 +47,9 @@ pub struct SurfelOptions {
     /// RULE is circumsphere, global or global-circumsphere
     #[cfg_attr(feature = "cli", arg(long = "surfel-size", id = "surfel_size", value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"], hide_short_help = true))]
     pub size: Option<Size>,
+    /// Scale all surfels by this factor: smaller ones show where each lies, larger ones close holes
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FACTOR", hide_short_help = true))]
+    pub radius_scale: Option<f64>,
     /// Image that paints the surfels by their texture coordinates: .png, .jpg, .bmp or .tga
     ///
     /// It replaces the surfels' own colours; `epsplat sample` writes texture coordinates. If the

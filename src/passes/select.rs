@@ -8,6 +8,9 @@
 //! other node by its children. The cut depends only on the tree, the camera and [`Wanted`], the
 //! options of the cut.
 //!
+//! With culling, surfels that face away are left out of the cut too. Those that face away by less
+//! than rounding errors are kept; pass [`project`](super::project) leaves them out.
+//!
 //! With fades, the cuts of [`STEPS`] sizes, from half the requested size up, are drawn at once. A
 //! node or surfel belongs to the cuts of its [`Fade`](crate::scene::Fade), which follows from its
 //! size and the sizes of the nodes above it. When a node's size passes one of the `STEPS` sizes,
@@ -27,8 +30,8 @@ use crate::plan::steps::{Kernel, Over, Run};
 use crate::scene::cut::Fate;
 use crate::scene::detail::finest;
 use crate::scene::fade::STEPS;
-use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
+use crate::scene::hierarchy::{FAN_OUT, Node};
+use crate::scene::{Camera, Cull, Cut, Detail, DetailMeasure, Hierarchy, Projection, Scene};
 
 /// The pass's files and constants. Its kernels are [`CHOOSING`].
 pub const PASS: Pass = Pass {
@@ -36,8 +39,9 @@ pub const PASS: Pass = Pass {
     files: |needs| {
         let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
         let fades = if needs.fades { "select_fades.wgsl" } else { "select_fades_absent.wgsl" };
+        let backs = if needs.curved { "backs_curved.wgsl" } else { "backs_flat.wgsl" };
         if needs.levels {
-            vec!["select.wgsl", "judge.wgsl", "balls_cut.wgsl", fades, low]
+            vec!["select.wgsl", "judge.wgsl", backs, "balls_cut.wgsl", fades, low]
         } else {
             vec!["select_absent.wgsl"]
         }
@@ -45,8 +49,13 @@ pub const PASS: Pass = Pass {
     kernels: |_| Vec::new(),
     constants: |making| match making.needs.levels {
         true => {
-            let extent = making.options.detail_measure == DetailMeasure::Extent;
-            vec![("MEASURES_EXTENT", u32::from(extent).into())]
+            let is = |measure: DetailMeasure| u32::from(making.options.detail_measure == measure).into();
+            let cones = making.needs.cull_back || making.options.cull == Cull::Cones;
+            vec![
+                ("MEASURES_EXTENT", is(DetailMeasure::Extent)),
+                ("MEASURES_SQUARE", is(DetailMeasure::Square)),
+                ("CULL_CONES", u32::from(cones).into()),
+            ]
         }
         false => Vec::new(),
     },
@@ -82,8 +91,12 @@ pub struct Wanted {
     pub detail: Detail,
     /// How the size of a node is measured.
     pub measure: DetailMeasure,
-    /// Whether surfels that face away are left out.
+    /// Whether nodes are left out if everything below them faces away.
+    pub cones: bool,
+    /// Whether surfels that face away are left out too.
     pub backs_out: bool,
+    /// Whether the curvature of surfels is drawn.
+    pub caps: bool,
     /// Whether coarser and finer cuts fade into each other.
     pub fades: bool,
     /// How far outside the image, in pixels, a node is still drawn: the reach of the low-pass
@@ -97,7 +110,8 @@ impl Wanted {
         let samples = DVec2::new(options.samples.across.into(), options.samples.down.into());
         let margin = (cull::filter_reach(&Design::of(options)) + 2.0) / samples;
         let Settings { detail, detail_measure: measure, detail_fades: fades, .. } = *options;
-        Self { detail, measure, backs_out, fades, margin }
+        let cones = backs_out || options.cull == Cull::Cones;
+        Self { detail, measure, cones, backs_out, caps: options.draws_caps(), fades, margin }
     }
 }
 
@@ -107,14 +121,15 @@ impl Wanted {
 /// A smaller size draws more splats, with few exceptions: a node at the image's edge may be divided
 /// into children that are mostly out of view. So a search by powers of two, then by bisection,
 /// finds a size that draws at most the requested number, and hardly fewer. Nodes that reach the
-/// near depth are divided at any size, so even the coarsest cut may draw more than requested. With
+/// near depth are divided at any size, so even the coarsest cut may draw more than requested.
+/// Single surfels that face away count, as they may not be in memory yet. With
 /// fades, some sizes may draw more splats than there are surfels. If the request allows the
 /// smallest size, that size is returned without a search.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
     let fits_at = |size: f64| {
         let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
-        bounded(hierarchy, origin, camera, &wanted, splats).is_some()
+        bounded(hierarchy, (origin, camera), &wanted, splats, |_| false).is_some()
     };
     // The size found is just above the size of some node, which a device may round to the other
     // side of it. The returned size is therefore slightly larger, and it must fit too.
@@ -135,15 +150,44 @@ const BALL_ROUNDING: f64 = 1e-6;
 /// A device's error in a sine.
 const SINE_SLACK: f64 = 1e-5;
 
-/// The cut of `hierarchy` in the view of `camera`. Node positions are relative to `origin`.
-pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Cut {
-    bounded(hierarchy, origin, camera, wanted, u64::MAX).unwrap_or_default()
+/// The cut of `scene`, whose tree is `hierarchy`, in the view of `camera`.
+pub fn reference(scene: &Scene, hierarchy: &Hierarchy, camera: &Camera, wanted: &Wanted) -> Cut {
+    let away = |index: u32| wanted.backs_out && shows_back(scene, index as usize, camera, wanted.caps);
+    bounded(hierarchy, (scene.origin, camera), wanted, u64::MAX, away).unwrap_or_default()
 }
 
-/// The same as [`reference`]; `None` if the cut has more than `most` surfels and nodes.
-fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
-    let fate = |index: u32| fate(&hierarchy.nodes[index as usize], hierarchy.low(index), (origin, camera), wanted, 0.0);
-    Cut::of(hierarchy, most, fate)
+/// The cut without the surfels that are `away`; `None` if it has more than `most` surfels and
+/// nodes. Node positions are relative to the origin in `at`.
+fn bounded(
+    hierarchy: &Hierarchy,
+    at: (DVec3, &Camera),
+    wanted: &Wanted,
+    most: u64,
+    away: impl Fn(u32) -> bool,
+) -> Option<Cut> {
+    let fate = |index: u32| fate(&hierarchy.nodes[index as usize], hierarchy.low(index), at, wanted, 0.0);
+    // Crowded leaves, whose surfels coincide, keep all of them.
+    let few = |leaf: &Node| leaf.count as usize <= FAN_OUT;
+    Cut::of(hierarchy, most, fate, |leaf, surfel| few(leaf) && away(surfel))
+}
+
+/// Whether no pixel can show the front of a surfel, by more than a device's error. If `caps` is
+/// set, surfels may curve ([`Curve::faces_away`](super::curved::Curve::faces_away)).
+fn shows_back(scene: &Scene, index: usize, camera: &Camera, caps: bool) -> bool {
+    let [s, t] = [scene.surfels[index].s, scene.surfels[index].t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let relative = scene.center(index) - (camera.eye - scene.origin);
+    let (ray, closeness) = match camera.projection {
+        Projection::Pinhole => (relative.normalize_or_zero(), relative.length().recip()),
+        Projection::Orthographic => (camera.rotation.row(2), 0.0),
+    };
+    let across = s.cross(t);
+    let (size, n) = (across.length(), across.normalize_or_zero());
+    let cap = scene.caps.get(index).copied().filter(|_| caps).unwrap_or_default();
+    let [uu, uv, vv] = cap.0.map(|height| f64::from(height).abs());
+    let high = (cap.extremes()[1] * closeness).min(1.0);
+    let lean = cap.slope(ray.dot(t.cross(n)), ray.dot(n.cross(s))).length() + size * high;
+    let magnitude = s.length() * t.length() + (uu + 2.0 * uv + vv) * (s.length() + t.length());
+    ray.dot(across) - lean > SINE_SLACK * magnitude
 }
 
 /// Whether a render may need the children or surfels of a node: whether the twin, or a device
@@ -161,12 +205,12 @@ pub fn may_divide(node: &Node, low: DVec3, at: (DVec3, &Camera), wanted: &Wanted
 /// `slack` is a tolerance in units of the device's error: with it, nodes that are nearly in view
 /// count as in view, and nodes that are nearly divided count as divided.
 fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wanted, slack: f64) -> Fate {
-    let Wanted { detail, measure, backs_out, fades, margin } = *wanted;
+    let Wanted { detail, measure, cones, backs_out, fades, margin, .. } = *wanted;
     let size = detail.pixels(camera.pixels() as f64);
     let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - (camera.eye - origin);
     let radius = f64::from(node.radius) + (1.0 + slack) * BALL_ROUNDING * center.length();
     let at = camera.rotation * center;
-    let [turned, spread] = if backs_out { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
+    let [turned, spread] = if cones { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
     let outside = at.z + radius < camera.near || camera.is_beside_image(at, radius, margin * (1.0 + slack));
     if outside || turned > spread + (1.0 + slack) * SINE_SLACK {
         return Fate::Unseen;
@@ -177,7 +221,7 @@ fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wa
     let seen = seen * (1.0 + slack * (SIZE_SLACK - 1.0));
     // A node whose plane faces away would be culled even if surfels below it are visible, so it is
     // divided.
-    if turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
+    if !backs_out || turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
 }
 
 /// The number of cuts that divide a node of apparent size `seen`, where the requested size is
@@ -265,7 +309,7 @@ mod tests {
             let mut last = usize::MAX;
             for size in [0.0, 250.0, 1000.0, 6000.0, 1e9] {
                 for measure in [DetailMeasure::Area, DetailMeasure::Extent] {
-                    let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::Pixels(size), measure, false));
+                    let cut = reference(&scene, &tree, &camera, &wanted(Detail::Pixels(size), measure, false));
                     let drawn = cut.surfels.iter().flat_map(|(range, _)| range.clone());
                     let mut all: Vec<u32> =
                         cut.nodes.iter().flat_map(|&(index, _)| below(&tree, index)).chain(drawn).collect();
@@ -291,11 +335,11 @@ mod tests {
     /// The part of a fading cut that belongs to one size equals the cut of that size without fades.
     #[test]
     fn cuts_that_fade_are_cuts_of_sizes_from_half_on() {
-        let (_, tree) = sphere();
+        let (scene, tree) = sphere();
         let camera = camera(DVec3::new(0.0, 0.7, 2.0), Lens::Fov(50.0));
         let of = |size: f64, fades: bool| {
             let wanted = Wanted { fades, ..wanted(Detail::Pixels(size), DetailMeasure::Extent, false) };
-            reference(&tree, DVec3::ZERO, &camera, &wanted)
+            reference(&scene, &tree, &camera, &wanted)
         };
         for size in [1000.0, 4000.0] {
             let all = of(size, true);
@@ -316,7 +360,7 @@ mod tests {
     /// At most the requested number is drawn, and hardly fewer.
     #[test]
     fn a_number_of_splats_is_kept() {
-        let (_, tree) = sphere();
+        let (scene, tree) = sphere();
         let camera = camera(DVec3::new(0.0, 0.7, 3.0), Lens::Fov(50.0));
         let few = [(1, 1), (10, 1), (300, 250), (2000, 1900), (7999, 7900), (8000, 8000), (1 << 40, 8000)];
         let fading = [(1, 1), (10, 1), (300, 220), (2000, 1900), (8000, 8000), (9000, 8000)];
@@ -325,7 +369,7 @@ mod tests {
             let options = Settings { detail: Detail::Splats(splats), detail_fades, ..Settings::default() };
             let wanted = Wanted::of(&options, false);
             let detail = sized(&tree, DVec3::ZERO, &camera, &wanted);
-            let drawn = reference(&tree, DVec3::ZERO, &camera, &Wanted { detail, ..wanted }).len() as u64;
+            let drawn = reference(&scene, &tree, &camera, &Wanted { detail, ..wanted }).len() as u64;
             assert!((least..=splats).contains(&drawn), "{splats}: {drawn} at {detail:?}");
         }
     }
@@ -362,7 +406,7 @@ mod tests {
             [(DVec3::new(0.0, 0.0, 0.4), false), (DVec3::new(0.2, 0.1, 1.6), false), (DVec3::new(0.2, 0.1, 1.6), true)]
         {
             let camera = camera(eye, Lens::Fov(40.0));
-            let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::FINEST, DetailMeasure::Area, back));
+            let cut = reference(&scene, &tree, &camera, &wanted(Detail::FINEST, DetailMeasure::Area, back));
             let drawn: std::collections::BTreeSet<u32> =
                 cut.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
             assert!(cut.nodes.is_empty() && drawn.len() < 5000 && drawn.len() > 50, "{}", drawn.len());
@@ -375,6 +419,8 @@ mod tests {
                 let away = Vec3::from_array(surfel.center).dot((camera.eye - center).as_vec3()) < 0.0;
                 assert!(outside || (back && away), "{index}: {x} {y}");
             }
+            let turned = |index: &u32| shows_back(&scene, *index as usize, &camera, true);
+            assert_eq!(drawn.iter().any(turned), !back);
         }
     }
 }

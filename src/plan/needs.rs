@@ -154,7 +154,7 @@ fn may_be_small(options: &Settings) -> bool {
 pub fn culls_back(facts: &Facts, camera: &Camera, options: &Settings) -> bool {
     match options.cull {
         _ if options.facing.is_some() || facts.solid => false,
-        Cull::None => false,
+        Cull::None | Cull::Cones => false,
         Cull::Back => facts.oriented,
         // Back faces show through the surfaces in front of them.
         Cull::Auto if composited(facts, options) != Composite::Opaque => false,

@@ -88,7 +88,7 @@ pub(super) fn cut(scene: &Scene, facts: &Facts, camera: &Camera, options: &Setti
     facts.nodes_of(options)?;
     let tree = scene.hierarchy.as_deref()?;
     let backs_out = culls_back(facts, camera, options);
-    let cut = select::reference(tree, scene.origin, camera, &Wanted::of(options, backs_out));
+    let cut = select::reference(scene, tree, camera, &Wanted::of(options, backs_out));
     let cull = if backs_out { Cull::Back } else { Cull::None };
     Some((cut.scene(scene, tree, options.draws_node_caps()), Settings { cull, ..options.clone() }))
 }

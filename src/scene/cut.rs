@@ -36,9 +36,14 @@ impl Fate {
 }
 
 impl Cut {
-    /// Builds the cut from the root down by the `fate` of each node that is reached. None if it has
-    /// more than `most` surfels and nodes.
-    pub(crate) fn of(hierarchy: &Hierarchy, most: u64, fate: impl Fn(u32) -> Fate + Sync) -> Option<Self> {
+    /// Builds the cut from the root down by the `fate` of each node that is reached, without the
+    /// surfels of leaves that are `out`. None if it has more than `most` surfels and nodes.
+    pub(crate) fn of(
+        hierarchy: &Hierarchy,
+        most: u64,
+        fate: impl Fn(u32) -> Fate + Sync,
+        out: impl Fn(&Node, u32) -> bool,
+    ) -> Option<Self> {
         let (mut cut, mut drawn) = (Self::default(), 0);
         // Nodes that are reached, and in how many of the cuts.
         let mut frontier: Vec<(u32, u8)> = vec![(0, STEPS)];
@@ -46,8 +51,12 @@ impl Cut {
             let fates: Vec<Fate> = frontier.par_iter().with_min_len(256).map(|&(index, _)| fate(index)).collect();
             let mut below = Vec::new();
             for ((index, to), fate) in frontier.into_iter().zip(fates) {
-                let Node { first, count, leaf, .. } = hierarchy.nodes[index as usize];
+                let node = &hierarchy.nodes[index as usize];
+                let Node { first, count, leaf, .. } = *node;
                 let Fate::Divided(divided) = fate else { continue };
+                if leaf && count == 1 && out(node, first) {
+                    continue;
+                }
                 let from = match count {
                     // A leaf of one surfel is drawn as the surfel, which may have clip lines and a
                     // cap.
@@ -60,12 +69,15 @@ impl Cut {
                 if from < to {
                     cut.nodes.push((index, Fade { from, to }));
                 }
+                drawn += u64::from(from < to);
                 if from > 0 && leaf {
-                    cut.surfels.push((first..first + count, Fade { from: 0, to: from }));
+                    let known = cut.surfels.len();
+                    let kept = first..first + count;
+                    add(&mut cut.surfels, kept, Fade { from: 0, to: from }, |surfel| !out(node, surfel));
+                    drawn += cut.surfels[known..].iter().map(|(range, _)| range.len() as u64).sum::<u64>();
                 } else if from > 0 {
                     below.extend((first..first + count).map(|child| (child, from)));
                 }
-                drawn += u64::from(from < to) + if from > 0 && leaf { u64::from(count) } else { 0 };
                 if drawn > most {
                     return None;
                 }
@@ -84,7 +96,7 @@ impl Cut {
             let short = f64::from(hierarchy.nodes[index as usize].radius) < length;
             if short { Fate::DRAWN } else { Fate::DIVIDED }
         };
-        Self::of(hierarchy, u64::MAX, fate).unwrap_or_default()
+        Self::of(hierarchy, u64::MAX, fate, |_, _| false).unwrap_or_default()
     }
 
     /// The number of surfels and nodes that are drawn.
@@ -136,5 +148,16 @@ impl Cut {
             Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
         }
         cut
+    }
+}
+
+/// Adds those of `surfels` that are `kept` to `ranges`, as few ranges.
+fn add(ranges: &mut Vec<(Range<u32>, Fade)>, surfels: Range<u32>, fade: Fade, kept: impl Fn(u32) -> bool) {
+    let first = ranges.len();
+    for surfel in surfels.filter(|surfel| kept(*surfel)) {
+        match ranges[first..].last_mut() {
+            Some((range, _)) if range.end == surfel => range.end += 1,
+            _ => ranges.push((surfel..surfel + 1, fade)),
+        }
     }
 }

@@ -98,6 +98,9 @@ pub enum DetailMeasure {
     /// surfels lie off the node's cap ([`Node::radius`]).
     #[default]
     Extent,
+    /// The area of the square whose side is the longer axis of the ellipse's image. This
+    /// reading of Pajarola 2003 comes nearest to the numbers in its Table 2.
+    Square,
 }
 
 impl FromStr for DetailMeasure {
@@ -105,15 +108,16 @@ impl FromStr for DetailMeasure {
 
     fn from_str(text: &str) -> Result<Self, Error> {
         let named = Self::ALL.into_iter().find(|(_, name, _)| *name == text).map(|(measure, ..)| measure);
-        named.ok_or_else(|| Error::Usage(format!("nodes are measured by area or extent, not {text:?}")))
+        named.ok_or_else(|| Error::Usage(format!("nodes are measured by area, extent or square, not {text:?}")))
     }
 }
 
 impl DetailMeasure {
     /// All measures with their names and descriptions.
-    pub const ALL: [(Self, &'static str, &'static str); 2] = [
+    pub const ALL: [(Self, &'static str, &'static str); 3] = [
         (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
         (Self::Extent, "extent", "the area of its bounding sphere's image, larger where surfels lie off its cap"),
+        (Self::Square, "square", "the area of the square over the longer axis of its image"),
     ];
 
     /// The size of a node in square pixels. `center` is its centre relative to the eye, in world
@@ -135,6 +139,10 @@ impl DetailMeasure {
             Self::Area => {
                 let [s, t] = [node.surfel.s, node.surfel.t].map(image);
                 PI * s.perp_dot(t).abs()
+            }
+            Self::Square => {
+                let [s, t] = [node.surfel.s, node.surfel.t].map(|axis| image(axis).length_squared());
+                4.0 * s.max(t)
             }
             Self::Extent => {
                 let depth = if camera.projection == Projection::Pinhole { at.z } else { 1.0 };

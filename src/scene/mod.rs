@@ -14,6 +14,7 @@ pub mod composite;
 mod copies;
 pub mod cut;
 pub(crate) mod detail;
+mod enlarged;
 pub mod eye_dome;
 pub mod facing;
 pub mod fade;

@@ -131,6 +131,8 @@ pub enum Cull {
     None,
     /// Leaves out all surfels that face away.
     Back,
+    /// Leaves out nodes of levels of detail if all normals below them face away, and nothing else.
+    Cones,
 }
 
 impl FromStr for Cull {
@@ -141,7 +143,8 @@ impl FromStr for Cull {
             "auto" => Ok(Self::Auto),
             "none" => Ok(Self::None),
             "back" => Ok(Self::Back),
-            _ => Err(Error::Usage(format!("surfels are culled auto, none or back, not {text:?}"))),
+            "cones" => Ok(Self::Cones),
+            _ => Err(Error::Usage(format!("surfels are culled auto, none, back or cones, not {text:?}"))),
         }
     }
 }

@@ -23,6 +23,15 @@ impl Request<'_> {
         if self.options.points.facing.is_some() && self.scene.options.colors.color_by == Some(ColorBy::Normal) {
             return Err(Error::Usage("--facing leaves points no normals: leave it or --color-by normal out".into()));
         }
+        if let Some(factor) = self.surfels().radius_scale {
+            if !(1e-6..=1e6).contains(&factor) {
+                return Err(Error::Usage(format!("--radius-scale is a factor from 1e-6 to 1e6, not {factor}")));
+            }
+            if !settings.detail.is_finest() {
+                let what = "levels of detail have radii of their own: leave --radius-scale out, or --lod and --splats";
+                return Err(Error::Usage(what.into()));
+            }
+        }
         if self.surfels().textures.is_empty() {
             return Ok(settings);
         }

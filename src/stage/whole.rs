@@ -108,7 +108,10 @@ fn paints(request: &Request<'_>) -> bool {
 
 /// Builds the surfels of all inputs, and colours them if the options ask for colours by normals.
 pub(super) fn surfels_of(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
-    let (scene, preparation) = uncolored(request, inputs, progress)?;
+    let (mut scene, preparation) = uncolored(request, inputs, progress)?;
+    if let Some(factor) = request.surfels().radius_scale {
+        scene.enlarge(factor as f32);
+    }
     match request.scene.options.colors.color_by {
         Some(ColorBy::Normal) => Ok((by_normals(scene), preparation)),
         _ => Ok((scene, preparation)),

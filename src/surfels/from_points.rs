@@ -68,6 +68,9 @@ pub struct Surfels {
     /// For [`Size::Bsp`], the number of positions whose cluster of three points is collinear; else
     /// 0.
     pub collinear: u64,
+    /// For [`Size::BspGlobal`], the number of positions around which the one radius leaves gaps, as
+    /// their neighbours are farther away; else 0.
+    pub sparse: u64,
 }
 
 impl Surfels {
@@ -76,6 +79,7 @@ impl Surfels {
         let mut notes = self.preparation.notes();
         let mut counted = |count: u64, what: &str| notes.extend((count > 0).then(|| format!("{count} points {what}")));
         counted(self.collinear, "are in collinear clusters, and got the mean length of their edges as their size");
+        counted(self.sparse, "are too sparse for one radius, which leaves holes there: take --size bsp or knn");
         let distinct = self.preparation.distinct_positions.unwrap_or(self.preparation.surfels);
         counted(self.preparation.surfels - distinct, "coincide with another one");
         notes
@@ -155,7 +159,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     preparation.limited_by_neighbours = Some(sizes.limited(distinct.of_point()));
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(&Listed(count, |index| (DVec3::from_array(points.positions[index]), radius(index)))).1;
-    Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
+    Ok(Surfels { points, preparation, parts, collinear: sizes.collinear, sparse: sizes.sparse })
 }
 
 /// The preparation as far as it is known before the surfels are computed.

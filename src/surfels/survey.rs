@@ -46,7 +46,8 @@ pub struct Survey {
     pub preparation: Preparation,
     /// The scene's origin, world coordinates.
     pub origin: DVec3,
-    /// The largest half-axis, world units: of all points that have one, and of the examined surfels.
+    /// The largest half-axis, world units: of all points that have one, and of the examined
+    /// surfels.
     pub largest_radius: f32,
     /// How well the surfels cover the surface; None for Gaussians, and if all points are at one
     /// position. Of a sampled cloud, its counts are estimates.

@@ -400,6 +400,30 @@ fn sizes_are_chosen_without_a_file_between() {
     assert!(std::fs::read(with).unwrap() == std::fs::read(without).unwrap());
 }
 
+/// `--radius-scale` draws smaller or larger surfels; what has no meaning is refused.
+#[test]
+fn surfels_are_scaled_and_choices_without_meaning_are_refused() {
+    let folder = Folder::new();
+    let [sphere, image] = ["sphere.ply", "x.exr"].map(|file| folder.path(file));
+    succeeds(&["generate", "sphere", "--count", "300", "-o", text(&sphere)]);
+    let options = ["--size", "64x64", "--backend", "reference", "--samples", "1", "-o", text(&image)];
+    let seen = |factor: &str| {
+        succeeds(&[&["render", text(&sphere), "--radius-scale", factor], &options[..]].concat());
+        let frame = epsplat::io::exr::read(&image).unwrap();
+        frame.color.iter().filter(|color| color[3] > 0.0).count()
+    };
+    let [small, own, large] = ["0.2", "1", "1.5"].map(seen);
+    assert!(2 * small < own && own < large, "{small} {own} {large}");
+    let refuses = |more: &[&str], words: &[&str]| {
+        fails(&[&["render", text(&sphere)], more, &options[..]].concat(), 2, words);
+    };
+    refuses(&["--radius-scale", "0"], &["--radius-scale is a factor", "not 0"]);
+    refuses(&["--radius-scale", "nan"], &["--radius-scale is a factor"]);
+    refuses(&["--radius-scale", "0.5", "--lod", "4px"], &["radii of their own", "--lod"]);
+    refuses(&["--cull", "cones"], &["take --lod or --splats with --cull cones"]);
+    refuses(&["--cull", "fronts"], &["none, back or cones"]);
+}
+
 #[test]
 fn info_tells_what_is_missing_and_which_command_supplies_it() {
     let folder = Folder::new();

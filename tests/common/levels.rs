@@ -50,7 +50,7 @@ pub fn tree(scene: &Scene) -> &Hierarchy {
 /// Returns the cut that the twin selects, and the options to draw it with.
 pub fn cut(scene: &Scene, camera: &Camera, options: &Settings) -> (Cut, Settings) {
     let back = options.cull == Cull::Back;
-    let cut = select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(
+    let cut = select::reference(scene, tree(scene), camera, &Wanted::of(options, back)).scene(
         scene,
         tree(scene),
         options.draws_node_caps(),
@@ -70,7 +70,9 @@ pub fn cut(scene: &Scene, camera: &Camera, options: &Settings) -> (Cut, Settings
         caps,
         ..whole
     };
-    (Cut { scene: cut, facts }, Settings { detail: Detail::FINEST, ..options.clone() })
+    // A scene without levels has no cones of normals.
+    let cull = if options.cull == Cull::Cones { Cull::None } else { options.cull };
+    (Cut { scene: cut, facts }, Settings { detail: Detail::FINEST, cull, ..options.clone() })
 }
 
 pub fn frame(source: &dyn Source, camera: &Camera, options: &Settings, backend: &Backend) -> Frame {

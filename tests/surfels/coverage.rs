@@ -4,13 +4,15 @@
 use crate::common;
 
 use std::f64::consts::PI;
+use std::path::Path;
 
 use common::meshes::sphere;
 use common::scenes::generated;
-use epsplat::io::Mesh;
+use epsplat::io::{Mesh, Points};
 use epsplat::low_level::metrics::{Coverage, SurfaceDistances, coverage};
 use epsplat::low_level::scene::Scene;
 use epsplat::low_level::surfels::analytic::Shape;
+use epsplat::low_level::surfels::{FromPoints, Size, Triangle, build, from_points};
 use epsplat::low_level::truth::TriangleTree;
 
 fn square() -> Mesh {
@@ -52,6 +54,38 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
         let worst = holed.worst_view.unwrap();
         assert!(!holed.is_hole_free() && worst.from[2] > 0.9 && worst.hole_share > 1.5 * share, "{worst:?}");
     }
+}
+
+/// Sizes from clusters of three points (paper 001, section 3.3) cover the bunny. One radius for all
+/// covers even points only.
+#[test]
+fn sizes_by_clusters_cover_a_scan() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/bunny.obj");
+    let mesh = epsplat::io::read_mesh(&file, &()).unwrap();
+    let made = |positions: Vec<[f64; 3]>, size: Size| {
+        let options = FromPoints { size, ..FromPoints::default() };
+        from_points(vec![Points { positions, ..Points::default() }], &options, &()).unwrap()
+    };
+    let of = |size: Size, factor: f32| {
+        let points = made(mesh.positions.clone(), size).points;
+        let (mut scene, _) = build(vec![points], &()).unwrap();
+        scene.enlarge(factor);
+        coverage(&TriangleTree::new(&mesh).unwrap(), &scene, 16, 128, &()).unwrap().hole_share.unwrap()
+    };
+    for size in [Size::Bsp(Triangle::MeanEdge), Size::Bsp(Triangle::Circumsphere), Size::BspGlobal(Triangle::MeanEdge)]
+    {
+        let [whole, part] = [1.0, 0.35].map(|factor| of(size, factor));
+        // The control: disks a third as large leave holes.
+        assert!(whole < 1e-3 && part > 0.01, "{size:?} {whole} {part}");
+    }
+    let note = |step: f64| {
+        let fine = (0..2500).map(|k| [f64::from(k % 50) * 0.2, f64::from(k / 50) * 0.2, 0.0]);
+        let coarse = (0..100).map(|k| [20.0 + f64::from(k % 10) * step, f64::from(k / 10) * step, 0.0]);
+        let made = made(fine.chain(coarse).collect(), Size::BspGlobal(Triangle::MeanEdge));
+        (made.sparse, made.notes().iter().any(|note| note.contains("too sparse for one radius")))
+    };
+    let ((many, said), (few, _)) = (note(1.0), note(0.2));
+    assert!((90..=130).contains(&many) && said && few < 25, "{many} {said} {few}");
 }
 
 #[test]

@@ -18,12 +18,12 @@ use epsplat::low_level::metrics::SurfaceDistances;
 use epsplat::low_level::metrics::coverage::coverage;
 use epsplat::low_level::scene::{Clip, Colors, Scene, Surfel};
 use epsplat::low_level::surfels::analytic::{Shape, generate};
-use epsplat::low_level::surfels::build;
 use epsplat::low_level::surfels::sampling::voxels::Voxel;
 use epsplat::low_level::surfels::sampling::{MeshSurface, Method, Priority, sample};
 use epsplat::low_level::surfels::simplify::{
     Options, Report, SplatShape, Tolerance, as_in_the_thesis, grown, simplify, written,
 };
+use epsplat::low_level::surfels::{Coordinates, build};
 use epsplat::low_level::truth::{DiskTree, TriangleTree};
 use glam::{DVec3, Vec3};
 
@@ -524,7 +524,10 @@ fn colours_are_means_over_what_is_covered() {
 #[test]
 fn disks_as_in_the_thesis_conquer_every_point() {
     let (tolerance, sphere) = (0.004, shape(Shape::Sphere, 6_000));
-    let by = |scene: &Scene, ratio: f64| as_in_the_thesis(scene, tolerance, ratio, &()).unwrap();
+    let by = |scene: &Scene, ratio: f64| {
+        let (disks, _, report) = as_in_the_thesis((scene, &Coordinates::default()), tolerance, ratio, &()).unwrap();
+        (disks, report)
+    };
     let (disks, report) = by(&sphere, 0.6);
     assert_eq!((report.selected, report.surfels), (disks.surfels.len() as u64, 6_000));
     assert!(report.max_deviation <= tolerance * (1.0 + 1e-9) && report.mean_deviation < 0.5 * tolerance, "{report:?}");
@@ -548,6 +551,40 @@ fn disks_as_in_the_thesis_conquer_every_point() {
     // With so few points, all are neighbours.
     let three = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], Some(vec![[0.0, 0.0, 1.0]; 3]));
     assert_eq!(by(&three, 1.0).1.selected, 1);
+}
+
+/// Disks as in the thesis keep the texture coordinates of the points from which they grew, with
+/// slopes that cross no seam.
+#[test]
+fn disks_as_in_the_thesis_keep_texture_coordinates() {
+    // u = x / 2 + 1 / 2 with a seam at x = 0.4, from where on it is 0.3 less; v = 1 / 2 - y / 2.
+    let place = |at: DVec3| [0.5 + 0.5 * at.x - if at.x > 0.4 { 0.3 } else { 0.0 }, 0.5 - 0.5 * at.y];
+    let plane = shape(Shape::Plane, 2500);
+    let wave = |at: DVec3| DVec3::new(at.x, at.y, 0.006 * (9.0 * at.x).sin());
+    let mut waved = plane.clone();
+    for (surfel, flat) in waved.surfels.iter_mut().zip(&plane.surfels) {
+        surfel.center = wave(center(flat)).as_vec3().to_array();
+    }
+    let centers = waved.surfels.iter().map(|surfel| place(center(surfel)).map(|c| c as f32)).collect();
+    let coordinates = Coordinates { centers, slopes: vec![[[0.0; 3]; 2]; 2500], ..Coordinates::default() };
+    let (disks, kept, _) = as_in_the_thesis((&waved, &coordinates), 0.004, 0.6, &()).unwrap();
+    let count = disks.surfels.len();
+    assert!((10..2200).contains(&count) && kept.centers.len() == count && kept.slopes.len() == count, "{count}");
+    let mut straight = 0;
+    for ((disk, own), [along_u, along_v]) in disks.surfels.iter().zip(&kept.centers).zip(&kept.slopes) {
+        let expected = place(center(disk));
+        assert!((f64::from(own[0]) - expected[0]).abs() + (f64::from(own[1]) - expected[1]).abs() < 1e-5, "{disk:?}");
+        // A disk that reaches no other point on its side of the seam has no slopes.
+        if [along_u, along_v].iter().all(|slope| **slope == [0.0; 3]) {
+            continue;
+        }
+        // Slopes across the seam would be as steep as its jump.
+        assert!((along_u[0] - 0.5).abs() < 0.1 && (along_v[1] + 0.5).abs() < 0.05, "{disk:?} {along_u:?} {along_v:?}");
+        straight += usize::from((along_u[0] - 0.5).abs() < 0.02);
+    }
+    assert!(straight > count / 2, "{straight} of {count}");
+    let (_, none, _) = as_in_the_thesis((&waved, &Coordinates::default()), 0.004, 0.6, &()).unwrap();
+    assert_eq!(none, Coordinates::default());
 }
 
 #[test]

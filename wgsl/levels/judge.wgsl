@@ -2,14 +2,18 @@
 // in the image, or that nothing below it is visible. A cut that divides a node draws what is below
 // the node in its place: its surfels, or its children, which may be divided in turn.
 // Twin: src/passes/select.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xbe73f2f4fd74cada
 // #import axes_*::{growth}
+// #import backs_*::{leaning}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
 // #import camera_*::{axis_image, ball_sine, is_beside}
 // #import camera_orthographic|perspective::{ray_to}
 // #import layout::{Surfel, TreeNode, held}
+// #import low_part::{low_part}
 // #import project::{CULL_BACK, rotate_plain}
 // #import select_fades::{ALL_CUTS, cuts_that_divide}
-// #import vectors::{cross3, dot3, norm3}
+// #import vectors::{cross3, dot2, dot3, norm3}
+// #import words|words_long::{surfel_at}
 
 // Kinds of nodes.
 const KIND_SHIFT: u32 = 30u;
@@ -24,10 +28,18 @@ const UNSEEN: u32 = 0x7fu;
 const CUTS_MASK: u32 = 0x7fu;
 // A flag beside that number: all children of the node are drawn without being judged.
 const CHILDREN_DRAWN: u32 = 0x80u;
+// From this bit on: a bit for each surfel of a leaf that faces away and is left out.
+const BACKS_SHIFT: u32 = 8u;
+// The most surfels in a leaf, unless they all coincide.
+const FAN_OUT: u32 = 8u;
 
 // If set, the size of a node is that of its bounding ball, as seen in the middle of the image; else
-// that of the image of its ellipse.
+// that of the image of its ellipse, or of the square over the longer axis of that image.
 override MEASURES_EXTENT: bool;
+override MEASURES_SQUARE: bool;
+
+// Whether nodes are left out if everything below them faces away.
+override CULL_CONES: bool;
 
 const PI: f32 = 3.14159265;
 
@@ -83,6 +95,9 @@ fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
     }
     let s = axis_image(center, rotate_plain(vector(surfel.s) * held.unit)) * held.levels.yz;
     let t = axis_image(center, rotate_plain(vector(surfel.t) * held.unit)) * held.levels.yz;
+    if (MEASURES_SQUARE) {
+        return 4.0 * max(dot2(s, s), dot2(t, t));
+    }
     return PI * abs(s.x * t.y - s.y * t.x);
 }
 
@@ -114,21 +129,55 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         return UNSEEN;
     }
     var faces = true;
-    if (CULL_BACK) {
+    if (CULL_CONES) {
         let away = turned_away(node, surfel, relative, ball.radius);
         if (away.x > away.y) {
             return UNSEEN;
         }
         // A node whose plane faces away would be culled although surfels below it may be visible,
         // so it is divided.
-        faces = away.x <= 0.0;
+        faces = !CULL_BACK || away.x <= 0.0;
+        if (CULL_BACK && node.below == ((LEAF << KIND_SHIFT) | 1u) && shows_back(node.first)) {
+            return UNSEEN;
+        }
     }
     let divided = reaches_near(ball) || !faces;
     let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, is_whole(node));
     // Otherwise children must be judged: neither the image area of a child's ellipse nor the side
     // that it shows follows from the node's own position and size.
-    let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
-    return cuts | select(0u, CHILDREN_DRAWN, unjudged);
+    let unjudged = MEASURES_EXTENT && !CULL_CONES && draws_children(node, ball);
+    var backs = 0u;
+    if (CULL_BACK && kind_of(node) == LEAF && cuts > 0u) {
+        backs = backs_below(node) << BACKS_SHIFT;
+    }
+    return cuts | select(0u, CHILDREN_DRAWN, unjudged) | backs;
+}
+
+// A bit for each surfel of a leaf that faces away, wherever it is seen. Crowded leaves keep all.
+fn backs_below(node: TreeNode) -> u32 {
+    let count = node.below & COUNT_MASK;
+    let judged = select(0u, count, count <= FAN_OUT);
+    var backs = 0u;
+    for (var k = 0u; k < judged; k++) {
+        if (shows_back(node.first + k)) {
+            backs |= 1u << k;
+        }
+    }
+    return backs;
+}
+
+// Whether no pixel can show a surfel's front. Pass `project` finds out with more digits, so what
+// hardly shows its back is kept. The half-axes may be nearly parallel, so the margin is relative to
+// the product of their lengths.
+fn shows_back(record: u32) -> bool {
+    let surfel = surfel_at(record);
+    let s = vector(surfel.s) * held.unit;
+    let t = vector(surfel.t) * held.unit;
+    let low = low_part(record) * held.unit - held.eye_low.xyz;
+    let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + low;
+    let ray = ray_to(relative);
+    let lean = leaning(record, ray, s, t, norm3(relative));
+    return dot3(ray, cross3(s, t)) - lean.x > SINE_SLACK * (norm3(s) * norm3(t) + lean.y);
 }
 
 // The number of cuts that divide the node, among those that reach it; or UNSEEN.
@@ -140,4 +189,9 @@ fn cuts_of(fate: u32) -> u32 {
 fn is_last(node: TreeNode, fate: u32) -> bool {
     let kind = kind_of(node);
     return kind == LEAF || kind == PART_OF_LEAF || (kind == INNER && (fate & CHILDREN_DRAWN) != 0u);
+}
+
+// The surfels of a leaf that are left out, a bit each.
+fn backs_of(fate: u32) -> u32 {
+    return select(0u, fate >> BACKS_SHIFT, CULL_BACK);
 }

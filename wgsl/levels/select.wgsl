@@ -8,10 +8,10 @@
 // the chosen surfels and nodes from the branch's buffers, without copies. Cuts that fade into each
 // other (select_fades.wgsl) are all chosen at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x30e9f9710db2c928
+// All loops end, by 1 of src/gpu/loops.rs: 0x25ad9e96dd21fa72
 // #import attributes::{attribute_word, attributes}
 // #import balls_cut::{drawn_radius, enclose}
-// #import judge::{CHILDREN_DRAWN, COUNT_MASK, INNER, OTHER_BRANCH, UNSEEN, cuts_of, fate_of}
+// #import judge::{COUNT_MASK, CUTS_MASK, INNER, OTHER_BRANCH, UNSEEN, backs_of, cuts_of, fate_of}
 // #import judge::{is_last, kind_of, vector}
 // #import layout::{BATCH, Branch, TreeNode, WORKGROUP, hold_view, linear_index, page}
 // #import low_part::{low_part}
@@ -116,7 +116,8 @@ fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
     if (cuts == UNSEEN) {
         return vec2<u32>(0u);
     }
-    let below = select(0u, node.below & COUNT_MASK, cuts > 0u && kind_of(node) != OTHER_BRANCH);
+    let left = (node.below & COUNT_MASK) - countOneBits(backs_of(fate));
+    let below = select(0u, left, cuts > 0u && kind_of(node) != OTHER_BRANCH);
     let itself = select(0u, 1u, cuts < reached_in);
     return select(vec2<u32>(itself, below), vec2<u32>(itself + below, 0u), is_last(node, fate));
 }
@@ -165,7 +166,7 @@ fn set_grid(at: u32, nodes: u32) {
 fn judged(node: TreeNode, index: u32, reached_in: u32) -> u32 {
     let record = branch.surfels + index;
     let fate = fate_of(node, surfel_at(record), low_part(record));
-    return select((fate & CHILDREN_DRAWN) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
+    return select((fate & ~CUTS_MASK) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
 }
 
 // Judges the nodes of a range of the frontier, and returns the sum of their left_by().
@@ -196,9 +197,13 @@ fn spread(node: TreeNode, index: u32, fate: u32, reached_in: u32, start: vec2<u3
         reached[node.first] = cuts;
     }
     let below = node.first + select(0u, branch.surfels, kind_of(node) == INNER);
-    let drawn = start.x + counts.x - at;
+    let backs = backs_of(fate);
+    let drawn = start.x + counts.x - at + select(0u, countOneBits(backs), counts.x > 0u);
     for (var k = 0u; k < drawn; k++) {
-        choose(at + k, below + k, 0u, cuts);
+        if (((backs >> min(k, 31u)) & 1u) == 0u) {
+            choose(at, below + k, 0u, cuts);
+            at++;
+        }
     }
     for (var k = 0u; k < counts.y; k++) {
         frontier[start.y + k] = node.first + k;

@@ -68,7 +68,8 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     // A point always shows at the pixel that it lies in, like a square of that pixel's size.
     let own = abs(uv.xy) * (2.0 / change);
     let rho2 = select(min(dot2(beside, beside), largest2(own)), largest2(beside), SQUARE);
-    let depth = flat_.depth - rise(rho2) * radius_across(splat);
+    // The corners of squares are beyond the shape's rim, where a study may let it fall further.
+    let depth = flat_.depth - rise(select(rho2, dot2(beside, beside), SQUARE)) * radius_across(splat);
     var spot: Spot;
     return Fragment(rho2 <= 1.0 && depth >= held.near, depth, rho2, 1.0, spot);
 }

@@ -38,7 +38,7 @@ fn has_triangles(facts: &Facts) -> bool {
 }
 
 /// Combinations of options that are rejected for every scene.
-pub(super) const OPTIONS: [Clash; 29] = [
+pub(super) const OPTIONS: [Clash; 30] = [
     Clash {
         applies: |options, _| options.facing.is_some() && (is_lit(options) || options.maps.has(Map::Normal)),
         sentence: "points that face the camera have no normals: take --shading unlit and no normal map",
@@ -54,6 +54,10 @@ pub(super) const OPTIONS: [Clash; 29] = [
     Clash {
         applies: |options, _| options.facing.is_some() && options.cull == Cull::Back,
         sentence: "points that face the camera have no backs: leave --cull back out",
+    },
+    Clash {
+        applies: |options, _| options.cull == Cull::Cones && options.detail.is_finest(),
+        sentence: "cones of normals are those of levels of detail: take --lod or --splats with --cull cones",
     },
     Clash {
         applies: |options, _| options.facing.is_some() && options.outline.is_some(),
@@ -274,8 +278,10 @@ pub(super) const SCENES: [SceneClash; 20] = [
         sentence: "3D Gaussians have no normals: leave the map normal out, or take --flatten to make surfels of them",
     },
     SceneClash {
-        applies: |facts, options, _| options.cull == Cull::Back && !facts.oriented && facts.surfels > 0,
-        sentence: "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
+        applies: |facts, options, _| {
+            matches!(options.cull, Cull::Back | Cull::Cones) && !facts.oriented && facts.surfels > 0
+        },
+        sentence: "only surfels whose normals have a side face away, and not all of these do: leave --cull out, or give \
                    normals a side with epsplat surfels",
     },
     SceneClash {

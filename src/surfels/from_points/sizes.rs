@@ -9,7 +9,10 @@ use crate::surfels::estimate::{LONE_RADIUS, RADIUS_RANGE};
 use crate::surfels::graph::NeighbourGraph;
 use crate::surfels::planes::Neighbourhoods;
 use crate::surfels::positions::DistinctPositions;
-use crate::surfels::sizes::{Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius};
+use crate::surfels::sizes::{
+    LEAST, RADIUS_NEIGHBOURS, Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius,
+    offsets, open_radius,
+};
 
 /// The sizes of the surfels at positions, in the units of [`DistinctPositions`].
 pub(super) struct Sizes {
@@ -22,6 +25,8 @@ pub(super) struct Sizes {
     ellipses: Vec<[DVec3; 2]>,
     /// The number of positions whose cluster of three points is collinear.
     pub(super) collinear: u64,
+    /// The number of positions around which one radius for all leaves gaps.
+    pub(super) sparse: u64,
     /// Scaled units per world unit.
     scale: f64,
 }
@@ -34,14 +39,19 @@ impl Sizes {
         options: &FromPoints,
         progress: &dyn Progress,
     ) -> Self {
-        let (mut ellipses, mut collinear) = (Vec::new(), 0);
+        let (mut ellipses, mut collinear, mut sparse) = (Vec::new(), 0, 0);
         let radii: Vec<f64> = match options.size {
             Size::Bsp(triangle) => {
                 let (radii, degenerate) = bsp_radii(distinct, triangle, progress);
                 collinear = degenerate;
                 radii
             }
-            Size::BspGlobal(triangle) => vec![common_radius(distinct, triangle, progress); distinct.len()],
+            Size::BspGlobal(triangle) => {
+                let radius = common_radius(distinct, triangle, progress);
+                let needed = |at: u32| LEAST * open_radius(offsets(distinct, graph, at, RADIUS_NEIGHBOURS));
+                sparse = (0..distinct.len() as u32).into_par_iter().filter(|at| needed(*at) > radius).count() as u64;
+                vec![radius; distinct.len()]
+            }
             Size::Qsplat => {
                 let own = largest_at(distinct, measured.unwrap_or_default()).into_par_iter().enumerate();
                 // Vertices of no triangle are sized like points.
@@ -69,7 +79,7 @@ impl Sizes {
                 .and_then(|at| lone_radius((distinct, graph), at, normal))
         };
         let limits = local_limits(graph, &radii, options.limits.largest_ratio, lone);
-        Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
+        Self { size: options.size, radii, limits, ellipses, collinear, sparse, scale: distinct.scale() }
     }
 
     /// Returns the half-axes of points with the normals `point_normals` (None for disks), and the

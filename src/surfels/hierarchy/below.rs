@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::NodeBounds;
 use super::octree::{Octree, Set};
 use super::sums::Scales;
 use crate::scene::hierarchy::{Node, NodeAndLow};
@@ -34,12 +35,13 @@ pub(super) struct Known {
     /// Whether centres have parts beyond f32 ([`Scene::low`]).
     pub low: bool,
     pub scales: Scales,
+    pub bounds: NodeBounds,
 }
 
 impl Known {
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &Scene, bounds: NodeBounds) -> Self {
         let Scene { origin, oriented, .. } = *scene;
-        Self { origin, oriented, low: !scene.low.is_empty(), scales: Scales::of(scene) }
+        Self { origin, oriented, low: !scene.low.is_empty(), scales: Scales::of(scene), bounds }
     }
 }
 

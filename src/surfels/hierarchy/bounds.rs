@@ -5,12 +5,12 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Made;
 use super::below::{Below, Disk, Known};
 use super::curvature;
 use super::lattice::Lattice;
 use super::rims::{Bound, Bounding, Curve, ROUNDED_UP, Shape, cone, longest, tilt};
 use super::sums::Sums;
+use super::{Made, NodeBounds};
 use crate::scene::hierarchy::Node;
 use crate::scene::{Scene, Surfel};
 
@@ -54,15 +54,18 @@ pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) ->
 ///
 /// The caller sets the node's `first`, `count` and `leaf`.
 pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: &B, known: &Known) -> Made {
-    let Known { origin, oriented, scales, .. } = known;
+    let Known { origin, oriented, scales, bounds, .. } = known;
     let (normal, sided) = sums.normal(*oriented);
     let covariance = sums.covariance(lattice, scales);
-    let shape = Shape::of(covariance, normal);
+    let shape = match bounds {
+        NodeBounds::Rims => Shape::of(covariance, normal),
+        NodeBounds::Squares => Shape::of(sums.covariance_of_centers(lattice), normal),
+    };
     // The normal of the half-axes as they are stored, rounded.
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
     let mean = lattice.position(sums.moments.mean());
-    let curves = sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
+    let curves = *bounds == NodeBounds::Rims && sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
     let heights = if curves { curvature::heights(of, below, mean, plane) } else { curvature::FLAT };
     // A paraboloid with its apex at the mean would lie off the surface by its mean height, so the
     // apex is shifted by as much to the other side.
@@ -74,7 +77,7 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let low = if known.low { top - rounded.as_dvec3() } else { DVec3::ZERO }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
     let curve = Curve::of(heights, plane);
-    let bounding = Bounding { center, normal: stored, shape, curve, scale: shape.scale() };
+    let bounding = Bounding { center, normal: stored, shape, curve, scale: shape.scale(), bounds: *bounds };
     let all = bound(&bounding, (of, sums.moments.count), below, sided);
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
@@ -82,7 +85,10 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let cap = curvature::cap(heights, lengths);
     let ball = all.radius.max(factor + cap.highest());
     let off = OFF_CAP * curvature::off_cap(heights, [covariance, centers], plane);
-    let size = ball.hypot(off).min(MOST_LARGER * ball);
+    let size = match bounds {
+        NodeBounds::Rims => ball.hypot(off).min(MOST_LARGER * ball),
+        NodeBounds::Squares => ball,
+    };
     let node = Node {
         surfel: Surfel { center: rounded.to_array(), s, t },
         cap,

@@ -20,6 +20,7 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
+use std::str::FromStr;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -39,6 +40,40 @@ use crate::{Error, Progress, Result};
 /// [`Error::Usage`] if the scene has no surfels, 2^32 or more, Gaussians, or surfels that are
 /// painted by textures.
 pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierarchy>)> {
+    build_with(scene, NodeBounds::Rims, progress)
+}
+
+/// The parts of the disks below that the ellipse of a node bounds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NodeBounds {
+    /// The rims of the disks below the node, on the node's cap. Its shape is that of the covariance
+    /// of the disks.
+    #[default]
+    Rims,
+    /// The squares about the disks below the node, on the node's plane; nodes are flat, and their
+    /// spheres are as small as possible. Its shape is that of the covariance of the disks' centres.
+    /// This is Pajarola 2003, section 3.4, to the letter.
+    Squares,
+}
+
+impl FromStr for NodeBounds {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "rims" => Ok(Self::Rims),
+            "squares" => Ok(Self::Squares),
+            _ => Err(Error::Usage(format!("nodes bound rims or squares, not {text:?}"))),
+        }
+    }
+}
+
+/// As [`build`], with nodes that bound what `bounds` says.
+///
+/// # Errors
+///
+/// As [`build`].
+pub fn build_with(scene: Scene, bounds: NodeBounds, progress: &dyn Progress) -> Result<(Scene, Arc<Hierarchy>)> {
     let Ok(count) = u32::try_from(scene.surfels.len()) else {
         return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {}", scene.surfels.len())));
     };
@@ -55,7 +90,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     let (tree, points) = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
     progress.end();
     let (scene, places) = sorted(&tree, points, scene);
-    let (tree, known) = ((&tree, &places[..]), Known::of(&scene));
+    let (tree, known) = ((&tree, &places[..]), Known::of(&scene, bounds));
     let hierarchy = if known.low {
         let (made, _) = nodes::nodes::<Made>(tree, &scene, &known, progress);
         let (nodes, low) = made.into_iter().unzip();

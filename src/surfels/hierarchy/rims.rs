@@ -1,9 +1,10 @@
 //! Bounds how far surfels and child nodes reach when they are projected onto a node's plane or cap.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use glam::{DMat2, DVec2, DVec3};
 
+use super::NodeBounds;
 use super::below::Disk;
 use super::curvature;
 use super::sums::normal_of;
@@ -178,6 +179,7 @@ pub(super) struct Bounding {
     pub curve: Curve,
     /// [`Shape::scale`].
     pub scale: f64,
+    pub bounds: NodeBounds,
 }
 
 impl Bounding {
@@ -188,7 +190,10 @@ impl Bounding {
         let own = normal_of(surfel);
         let mut bound = Bound::NOTHING;
         if most.rim > known.rim {
-            bound.rim = self.rim(disk, own, known.rim);
+            bound.rim = match self.bounds {
+                NodeBounds::Rims => self.rim(disk, own, known.rim),
+                NodeBounds::Squares => self.corner(disk),
+            };
         }
         if most.radius > known.radius {
             let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -205,6 +210,14 @@ impl Bounding {
             };
         }
         bound
+    }
+
+    /// The largest |(u, v)| of a corner of the square about a disk, projected along the node's
+    /// normal.
+    fn corner(&self, Disk { surfel, center, .. }: &Disk) -> f64 {
+        let [s, t] = [surfel.s, surfel.t].map(|axis| self.shape.seen(DVec3::from_array(axis.map(f64::from))));
+        let at = self.shape.seen(center - self.center);
+        [at + s + t, at + s - t, at - s + t, at - s - t].map(DVec2::length).into_iter().fold(0.0, f64::max)
     }
 
     /// The [`Bound::rim`] of a surfel with the unit normal `own`. If it does not exceed `known`,
@@ -257,7 +270,8 @@ impl Bounding {
     pub fn of_node(&self, node: &Node, low: [f32; 3]) -> Bound {
         let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
         let offset = center + low - self.center;
-        let radius = f64::from(node.radius) * ROUNDED_UP;
+        let wider = if self.bounds == NodeBounds::Squares { SQRT_2 } else { 1.0 };
+        let radius = f64::from(node.radius) * wider * ROUNDED_UP;
         // Cosine and sine of three angles: `angle` between the two normals, `angles` with the cone
         // added, and `turned` with the rounding margin added too.
         let turned = |by: DVec2, cosine: f64| by.rotate(DVec2::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt()));
@@ -334,7 +348,8 @@ mod tests {
             let seen = [s, t].map(|axis| axis / axis.length_squared());
             let shape = Shape { s, t, seen };
             let curve = Curve::of(curved, [s, normal.cross(s), normal]);
-            let bounding = Bounding { center: DVec3::ZERO, normal, shape, curve, scale: shape.scale() };
+            let bounding =
+                Bounding { center: DVec3::ZERO, normal, shape, curve, scale: shape.scale(), bounds: NodeBounds::Rims };
             let lean = vector();
             let (middle, own) = (vector() * 3.0, (normal + 1.5 * lean).normalize());
             let spread = 0.5 * number().abs().powi(2);
@@ -383,7 +398,8 @@ mod tests {
     fn angles_of_nodes_add_up() {
         let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
         let curve = Curve::of([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
-        let bounding = Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, curve, scale: 1.0 };
+        let bounding =
+            Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, curve, scale: 1.0, bounds: NodeBounds::Rims };
         let of = |angle: f64, cone: f32| {
             let (sine, cosine) = angle.sin_cos();
             let surfel = Surfel { center: [0.0; 3], s: [cosine as f32, 0.0, -sine as f32], t: [0.0, 1.0, 0.0] };

@@ -41,8 +41,6 @@ pub(super) fn distribute(priorities: &[f64], count: usize) -> Vec<usize> {
     let none = priorities.iter().all(|priority| usable(*priority) == 0.0);
     let of = |voxel: usize| if none { 1.0 } else { usable(priorities[voxel]) };
     let mut samples = vec![0; priorities.len()];
-    // Multiples of the golden ratio modulo 1 are evenly spread for any number of them.
-    let offset = |voxel: usize| ((voxel as f64 + 0.5) * 0.618_033_988_749_894_9).fract();
     let bids = (0..priorities.len()).map(|voxel| Bid { worth: of(voxel) / offset(voxel), voxel });
     let mut heap: BinaryHeap<Bid> = bids.filter(|bid| bid.worth > 0.0).collect();
     for _ in 0..count {
@@ -54,9 +52,52 @@ pub(super) fn distribute(priorities: &[f64], count: usize) -> Vec<usize> {
     samples
 }
 
+/// As [`distribute`], but fewer samples than voxels with a positive priority go to the voxels of
+/// the highest priorities, one each (Tien 2008, section 3.2). The thesis advises against it, as the
+/// other voxels get none.
+///
+/// Among voxels of equal priority, those with a sample are evenly spread.
+pub(super) fn distribute_by_rank(priorities: &[f64], count: usize) -> Vec<usize> {
+    let usable = |voxel: &usize| priorities[*voxel].is_finite() && priorities[*voxel] > 0.0;
+    let mut ranked: Vec<usize> = (0..priorities.len()).filter(usable).collect();
+    if count >= ranked.len() {
+        return distribute(priorities, count);
+    }
+    ranked.sort_by(|a, b| {
+        let spread = |voxel: usize| offset(voxel);
+        priorities[*b].total_cmp(&priorities[*a]).then(spread(*a).total_cmp(&spread(*b)))
+    });
+    let mut samples = vec![0; priorities.len()];
+    ranked[..count].iter().for_each(|voxel| samples[*voxel] = 1);
+    samples
+}
+
+/// Multiples of the golden ratio modulo 1 are evenly spread for any number of them.
+fn offset(voxel: usize) -> f64 {
+    ((voxel as f64 + 0.5) * 0.618_033_988_749_894_9).fract()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn too_few_samples_go_to_the_highest_priorities() {
+        let priorities: Vec<f64> = (0..1250).map(|k| if k < 1000 { 1.0 } else { 4.0 }).collect();
+        let of = |samples: Vec<usize>| [&samples[..1000], &samples[1000..]].map(|part| part.iter().sum::<usize>());
+        assert_eq!(of(distribute_by_rank(&priorities, 250)), [0, 250]);
+        assert_eq!(of(distribute_by_rank(&priorities, 100)), [0, 100]);
+        assert_eq!(of(distribute_by_rank(&priorities, 400)), [150, 250]);
+        // Shares of the priority's sum give half to each kind.
+        let [low, high] = of(distribute(&priorities, 250));
+        assert!(low.abs_diff(high) <= 4, "{low} {high}");
+        // Enough samples are distributed as ever.
+        assert_eq!(distribute_by_rank(&priorities, 6600), distribute(&priorities, 6600));
+        assert_eq!(distribute_by_rank(&[0.0, 2.0, f64::NAN], 3), [0, 3, 0]);
+        // Equal voxels in a row get samples evenly: no quarter has less than its share.
+        let some = distribute_by_rank(&[1.0; 400], 100);
+        assert!(some.chunks(100).all(|part| part.iter().sum::<usize>().abs_diff(25) <= 2), "{some:?}");
+    }
 
     #[test]
     fn quotas_follow_priorities() {

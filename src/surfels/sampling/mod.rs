@@ -73,6 +73,7 @@ pub enum Method<'a> {
         depth: Option<u32>,
     },
     /// By the priority of voxels, at the points that Tien 2008 uses (section 3.2): a baseline.
+    /// Fewer samples than voxels go to those of the highest priorities.
     Projected {
         /// The priority function.
         priority: &'a PriorityFunction<'a>,
@@ -168,13 +169,13 @@ pub fn sample(
             points(&surface, &places, normals_at(&surface, &places), colors)
         }
         Method::Projected { priority, depth } => {
-            let (voxels, quotas, _) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
+            let (voxels, quotas, _) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress);
             let places = projected::places(&surface, &voxels, &quotas);
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
             covering(&surface, &places, colors, &mut sampling, progress)?
         }
         Method::Stratified { priority, depth } => {
-            let (voxels, quotas, fair) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
+            let (voxels, quotas, fair) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress);
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
@@ -189,7 +190,7 @@ pub fn sample(
 fn divided(
     surface: &MeshSurface<'_>,
     count: usize,
-    (priority, depth): (&PriorityFunction<'_>, Option<u32>),
+    (method, priority, depth): (&Method<'_>, &PriorityFunction<'_>, Option<u32>),
     sampling: &mut Sampling,
     progress: &dyn Progress,
 ) -> (Vec<Voxel>, Vec<usize>, Vec<f64>) {
@@ -199,7 +200,10 @@ fn divided(
     sampling.halvings = halvings;
     sampling.undone = depth.map_or(0, |depth| depth - halvings);
     let priorities = priority(surface, &voxels);
-    let quotas = distribute::distribute(&priorities, count);
+    let quotas = match method {
+        Method::Projected { .. } => distribute::distribute_by_rank(&priorities, count),
+        Method::Stratified { .. } | Method::Uniform => distribute::distribute(&priorities, count),
+    };
     progress.end();
     sampling.voxels = voxels.len() as u64;
     sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;

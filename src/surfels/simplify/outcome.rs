@@ -76,7 +76,7 @@ pub(super) struct Deviations {
 }
 
 /// The gradients of u and v, per world unit.
-type Slopes = [[f32; 3]; 2];
+pub(super) type Slopes = [[f32; 3]; 2];
 
 /// A selected splat, as it is written.
 struct Chosen {

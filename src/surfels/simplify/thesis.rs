@@ -20,12 +20,14 @@ use std::collections::BinaryHeap;
 use rayon::prelude::*;
 
 use super::Report;
+use super::outcome::Slopes;
 use super::samples::Samples;
 use crate::progress::Progress;
 use crate::scene::scene::low_parts;
 use crate::scene::{Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
+use crate::surfels::texture::{in_world, slopes_along};
 
 /// The number of neighbours of a point, K in the thesis.
 const NEIGHBOURS: usize = 10;
@@ -122,6 +124,8 @@ impl Growth {
 struct Selection {
     /// The points from which the splats grew, and their radii, scaled units.
     splats: Vec<(u32, f64)>,
+    /// The slopes of the splats' texture coordinates; zero if points have none.
+    slopes: Vec<Slopes>,
     /// The largest distance of a point from the plane of a splat that conquers it, scaled units.
     largest: f64,
     /// The sum of these distances, weighted by surface area elements, and the sum of the elements.
@@ -131,6 +135,7 @@ struct Selection {
 impl Selection {
     fn add(&mut self, (seed, radius): (u32, f64), growth: &Growth, (samples, graph): (&Samples, &Graph)) {
         self.splats.push((seed, radius));
+        self.slopes.push(slopes(seed, growth, samples));
         for &(point, _) in &growth.reached {
             let offset = samples.positions.position(point) - samples.positions.position(seed);
             let (off, element) = (offset.dot(samples.normals[seed as usize]).abs(), graph.elements[point as usize]);
@@ -138,6 +143,22 @@ impl Selection {
             self.sums = [self.sums[0] + element * off, self.sums[1] + element];
         }
     }
+}
+
+/// The slopes of texture coordinates in the plane of the point `seed`, per world unit, by least
+/// squares over the points that the splat reaches without crossing a seam. All are zero, that is
+/// unknown, if it reaches none, or if points have no texture coordinates.
+fn slopes(seed: u32, growth: &Growth, samples: &Samples) -> Slopes {
+    if samples.places.is_empty() {
+        return Slopes::default();
+    }
+    let (s, t) = samples.normals[seed as usize].any_orthonormal_pair();
+    let reached = growth.reached.iter().map(|(point, _)| *point);
+    let steps = reached.filter(|point| *point != seed && !samples.has_seam(seed, *point)).map(|point| {
+        let (offset, gain) = samples.step(seed, point);
+        (offset / samples.positions.scale(), gain)
+    });
+    in_world(slopes_along([s, t], steps), [s, t])
 }
 
 /// Selects splats as in the thesis.
@@ -181,22 +202,27 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
 }
 
 /// Simplifies `scene` as in the thesis, to disks that are each centred at a surfel and have its
-/// colour. The tolerance is in world units; a disk conquers the points within `ratio` times its
-/// radius.
+/// colour and texture coordinates. The tolerance is in world units; a disk conquers the points
+/// within `ratio` times its radius.
 ///
 /// # Errors
 ///
 /// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 surfels.
 pub fn as_in_the_thesis(
-    scene: &Scene,
+    (scene, coordinates): (&Scene, &Coordinates),
     tolerance: f64,
     ratio: f64,
     progress: &dyn Progress,
-) -> crate::Result<(Scene, Report)> {
-    let samples = Samples::new(scene, &Coordinates::default())?;
+) -> crate::Result<(Scene, Coordinates, Report)> {
+    let samples = Samples::new(scene, coordinates)?;
     let scale = samples.positions.scale();
-    let Selection { splats: selected, largest, sums: [off, area] } =
+    let Selection { splats: selected, slopes, largest, sums: [off, area] } =
         select(&samples, tolerance * scale, ratio, progress);
+    let mut kept = Coordinates { atlas: coordinates.atlas, ..Coordinates::default() };
+    if !samples.places.is_empty() {
+        kept.centers = selected.iter().map(|(point, _)| samples.places[*point as usize].as_vec2().to_array()).collect();
+        kept.slopes = slopes;
+    }
     let disk = |&(point, radius): &(u32, f64)| {
         // The disk of a point that conquers no other point is as large as that point's surfel.
         let radius = if radius > 0.0 { radius } else { samples.radii[point as usize] } / scale;
@@ -222,5 +248,5 @@ pub fn as_in_the_thesis(
         beyond_tolerance: 0,
     };
     let Scene { origin, encoded, oriented, closed, up, .. } = *scene;
-    Ok((Scene { origin, surfels, low, colors, encoded, oriented, closed, up, ..Scene::default() }, report))
+    Ok((Scene { origin, surfels, low, colors, encoded, oriented, closed, up, ..Scene::default() }, kept, report))
 }

@@ -10,7 +10,7 @@ use crate::surfels::gaps::{Cell, MOST_CORNERS, is_beside};
 pub(crate) const RADIUS_NEIGHBOURS: usize = 8;
 
 /// The least half-axis of a point with neighbours all around, in mean distances.
-const LEAST: f64 = 0.6;
+pub(crate) const LEAST: f64 = 0.6;
 
 /// The least half-axis of a point without neighbours on one side, in mean distances: 1.2 spacings
 /// on a square grid.

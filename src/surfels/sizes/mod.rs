@@ -13,7 +13,7 @@ use std::str::FromStr;
 use glam::DVec3;
 
 pub(crate) use self::bsp::{bsp_radii, common_radius};
-pub(crate) use self::cell::{RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
+pub(crate) use self::cell::{LEAST, RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
 pub(crate) use self::ellipse::shape;
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;

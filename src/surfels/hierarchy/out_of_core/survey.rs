@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::super::below::Known;
 use super::super::sums::Scales;
-use super::super::{as_in_a_file, split};
+use super::super::{NodeBounds, as_in_a_file, split};
 use super::sources::{Read, Sources, usable};
 use crate::io::Points;
 use crate::scene::scene::shows;
@@ -403,7 +403,7 @@ impl Look {
             others.colors = None;
         }
         let scales = Scales::within(looks.range, matches!(empty.colors, Colors::Srgb8(_)), looks.longest);
-        let known = Known { origin: empty.origin, oriented: empty.oriented, low, scales };
+        let known = Known { origin: empty.origin, oriented: empty.oriented, low, scales, bounds: NodeBounds::Rims };
         let has = Has { low, ..looks.has };
         others.clips = others.clips.filter(|_| has.clips);
         others.caps = others.caps.filter(|_| has.caps);

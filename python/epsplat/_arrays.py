@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -53,9 +53,14 @@ def _converted(name: str, numbers: np.ndarray, dtype: Any) -> np.ndarray:
     raise NoMemoryError(f"the system has no memory for a copy of {name}: about {needed} MiB are needed")
 
 
-def floats(name: str, value: Any) -> np.ndarray:
-    """Returns ``value`` as an array of float32 or float64, in the byte order of the machine."""
+def floats(name: str, value: Any, rows: Optional[int] = None) -> np.ndarray:
+    """Returns ``value`` as an array of float32 or float64, in the byte order of the machine.
+
+    An array of another number of ``rows`` is refused before it is copied.
+    """
     numbers = array(name, value)
+    if rows is not None and numbers.shape[:1] != (rows,):
+        raise UsageError(f"{name}: the shape is {numbers.shape}, and {rows} rows are needed")
     if numbers.dtype in (np.float32, np.float64) and numbers.dtype.isnative:
         return numbers
     if numbers.dtype.kind not in "iuf":
@@ -63,10 +68,10 @@ def floats(name: str, value: Any) -> np.ndarray:
     return _converted(name, numbers, np.float32 if numbers.dtype == np.float16 else np.float64)
 
 
-def colors(name: str, value: Any) -> np.ndarray:
+def colors(name: str, value: Any, rows: int) -> np.ndarray:
     """Returns colours: uint8 stay as they are, other numbers become floats."""
     numbers = array(name, value)
-    return numbers if numbers.dtype == np.uint8 else floats(name, numbers)
+    return numbers if numbers.dtype == np.uint8 else floats(name, numbers, rows)
 
 
 def indices(name: str, value: Any) -> np.ndarray:

@@ -67,8 +67,11 @@ class Scene:
         up: Optional[str] = None,
         **options: Any,
     ):
+        points = _arrays.array("positions", positions)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise _arrays.UsageError(f"positions: the shape is {points.shape}, and (N, 3) is needed")
+        points, rows = _arrays.floats("positions", points), len(points)
         given = {
-            "positions": positions,
             "normals": normals,
             "radii": radii,
             "half_axes": half_axes,
@@ -77,12 +80,13 @@ class Scene:
         }
         if up not in (None, "y", "z"):
             raise _arrays.UsageError(f"up: it is 'y' or 'z', not {up!r}")
-        arrays = {name: _arrays.floats(name, value) for name, value in given.items() if value is not None}
+        arrays = {name: _arrays.floats(name, value, rows) for name, value in given.items() if value is not None}
+        arrays["positions"] = points
         if colors is not None:
-            arrays["colors"] = _arrays.colors("colors", colors)
+            arrays["colors"] = _arrays.colors("colors", colors, rows)
         if triangles is not None:
             arrays["triangles"] = _arrays.indices("triangles", triangles)
-        arrays["attributes"] = {name: _arrays.floats(name, values) for name, values in (attributes or {}).items()}
+        arrays["attributes"] = {name: _arrays.floats(name, values, rows) for name, values in (attributes or {}).items()}
         arrays["up"] = up
         self._scene = _epsplat.Scene.of_arrays(arrays, options)
 

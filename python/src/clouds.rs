@@ -67,8 +67,7 @@ pub fn surfels(
     let orientation = of_all(py, &orient)?;
     let options = FromPoints { size, orientation, estimate_normals, limits };
     let from = scene.scene.clone();
-    let (made, mut notes) =
-        run(py, progress, |progress| from_points(inputs(&from, progress)?, &options, progress))?;
+    let (made, mut notes) = run(py, progress, |progress| from_points(inputs(&from, progress)?, &options, progress))?;
     notes.extend(made.notes());
     let report = json!({ "surfels": made.preparation.surfels, "parts": made.parts });
     Ok((Scene::of(made.points), report.to_string(), notes))

@@ -23,7 +23,8 @@ pub fn frame(color: &Bound<'_, PyAny>, maps: Option<&Bound<'_, PyDict>>) -> PyRe
     let mut frame = Frame::of_colors(side(width)?, side(height)?, colors);
     for (name, values) in maps.into_iter().flatten() {
         let name: String = name.extract()?;
-        let row = MAPS.iter().find(|row| row.name == name).ok_or_else(|| usage(py, &format!("there is no map {name}")))?;
+        let row =
+            MAPS.iter().find(|row| row.name == name).ok_or_else(|| usage(py, &format!("there is no map {name}")))?;
         let values: Vec<f32> = match values.cast::<PyArrayDyn<u32>>() {
             Ok(numbers) => numbers.try_readonly()?.as_array().iter().map(|number| f32::from_bits(*number)).collect(),
             Err(_) => values.cast::<PyArrayDyn<f32>>()?.try_readonly()?.as_array().iter().copied().collect(),

@@ -55,7 +55,10 @@ impl Scope {
             Self::Renderer => {
                 let camera = all(CameraOptions::augment_args(command.clone())).into_iter();
                 let camera = camera.filter(|arg| OF_ALL_VIEWS.contains(&arg.get_id().as_str()));
-                all(DeviceOptions::augment_args(RenderOptions::augment_args(command))).into_iter().chain(camera).collect()
+                all(DeviceOptions::augment_args(RenderOptions::augment_args(command)))
+                    .into_iter()
+                    .chain(camera)
+                    .collect()
             }
             Self::View => all(CameraOptions::augment_args(command)),
         }
@@ -100,7 +103,8 @@ pub fn arguments(scope: Scope, keywords: &Bound<'_, PyDict>) -> PyResult<Vec<Str
 /// Appends the arguments that give `arg` its value.
 fn push(arg: &Arg, value: &Bound<'_, PyAny>, arguments: &mut Vec<String>) -> PyResult<()> {
     let long = arg.get_long().unwrap_or_default();
-    let bare = matches!(arg.get_action(), ArgAction::SetTrue) || arg.get_num_args().is_some_and(|n| n.min_values() == 0);
+    let bare =
+        matches!(arg.get_action(), ArgAction::SetTrue) || arg.get_num_args().is_some_and(|n| n.min_values() == 0);
     if let Ok(switch) = value.cast::<PyBool>()
         && bare
     {

@@ -53,7 +53,13 @@ impl View {
 
     /// The views of a file of cameras, with the names of their pictures.
     #[staticmethod]
-    fn of_file(py: Python<'_>, path: PathBuf, size: (u32, u32), scale: Option<f64>, pinholes: bool) -> PyResult<Vec<Self>> {
+    fn of_file(
+        py: Python<'_>,
+        path: PathBuf,
+        size: (u32, u32),
+        scale: Option<f64>,
+        pinholes: bool,
+    ) -> PyResult<Vec<Self>> {
         let named = cameras::read(&path, size).map_err(|error| exception(py, &error))?;
         let view = |camera: cameras::NamedCamera| {
             if let (Some(model), false) = (camera.undrawn, pinholes) {

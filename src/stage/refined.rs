@@ -262,16 +262,18 @@ mod tests {
     fn triangles_that_no_number_of_parts_straightens_are_counted() {
         let fisheye = Camera::posed((200, 200), Lens::Fisheye(180.0), DVec3::ZERO, DMat3::IDENTITY, 0.01).unwrap();
         let few = refined_within(&wall(), &fisheye, 20).unwrap();
-        assert!(few.scene.triangles.len() <= 24, "{}", few.scene.triangles.len());
+        // Each of the two may have 20 parts, and the last halving makes up to three more.
+        assert!(few.scene.triangles.len() <= 46, "{}", few.scene.triangles.len());
         assert!(few.note().unwrap().starts_with("this lens bends 2 of 2 triangles so much that "));
         assert_eq!(refined(&wall(), &fisheye).unwrap().note(), None);
     }
 
     /// The number of parts grows with the logarithm of a triangle's size, also if it passes through
-    /// the eye.
+    /// the eye. A lens that nearly sees the direction behind it needs many more: that direction is a
+    /// circle in its image.
     #[test]
     fn the_number_of_parts_is_that_of_what_is_in_view() {
-        for lens in [Lens::Fisheye(180.0), Lens::Fisheye(300.0)] {
+        for lens in [Lens::Fisheye(120.0), Lens::Fisheye(180.0)] {
             let camera = Camera::posed((200, 200), lens, DVec3::ZERO, DMat3::IDENTITY, 0.01).unwrap();
             for height in [1.0, 0.0] {
                 let parts = |size: f64| {

@@ -163,7 +163,7 @@ fn images_of_leaning_lenses_are_covered_up_to_their_corners() {
     let surfels: Vec<Surfel> = (0..81 * 81).map(|k| Surfel::disk(place(k), Vec3::NEG_Z, 0.06)).collect();
     let wall = Scene { surfels, ..Scene::default() };
     for lean in [0.0, 0.02, 0.05] {
-        for rest in [[0.0, lean], [lean, 0.0]] {
+        for rest in [[0.0, lean], [lean, 0.0], [-lean, lean]] {
             let optics = Optics::of(Form::Perspective).with_radial([1e-6, 0.0, 0.0, 0.0]).with_tangential(rest);
             let camera = posed((200, 200), Lens::Curved(optics, [100.0; 4]));
             for backend in [Backend::Reference, Backend::gpu(gpu.clone())] {

@@ -29,8 +29,11 @@ fn looking(folder: &Folder, lens: &str) -> std::path::PathBuf {
     folder.file("t.json", format!(r#"{{{lens}, "frames": [{frame}]}}"#))
 }
 
-/// Pixels that miss the ground, and those whose depth is off by more than a hundredth. Rays within
-/// two degrees of the horizon do not count.
+/// Pixels that show the ground, those that miss it, and those whose depth is off. Rays within two
+/// degrees of the horizon do not count.
+///
+/// Edges may lie a quarter of a pixel beside their images, which changes a depth by that many times
+/// its change from row to row, and depths of edges may err by a thousandth.
 fn faults(camera: &Camera, depths: &[f32], size: f64) -> [usize; 3] {
     let mut counts = [0; 3];
     for (pixel, depth) in depths.iter().enumerate() {
@@ -41,9 +44,11 @@ fn faults(camera: &Camera, depths: &[f32], size: f64) -> [usize; 3] {
         let on_ground = ray.y > 0.035 * ray.length() && at.x.abs() < 0.99 * size && at.z.abs() < 0.99 * size;
         if camera.shows(x, y) && on_ground {
             let off = (f64::from(*depth) * ray.y - 1.0).abs();
+            // The angle below the horizon, in pixels of a lens that the distortion scales by up to 0.85.
+            let below = 0.85 * camera.fy * ray.y / ray.x.hypot(ray.z);
             counts[0] += 1;
             counts[1] += usize::from(!depth.is_finite());
-            counts[2] += usize::from(depth.is_finite() && off > 0.01);
+            counts[2] += usize::from(depth.is_finite() && off > 2e-3 + 0.25 / below);
         }
     }
     counts
@@ -74,10 +79,7 @@ fn large_triangles_have_no_holes_and_right_depths() {
                 let all = [&["render", text(&mesh), "--near", "0.01", "--backend", backend][..], &line].concat();
                 let [shown, missing, off] = faults(&camera, &depths(&folder, &all), size);
                 eprintln!("{name} {size} {backend}: {missing} of {shown} missing, {off} depths off");
-                assert!(
-                    shown > 15_000 && missing == 0 && off <= usize::from(size > 1e4),
-                    "{name} {size} {backend}: {missing} {off}"
-                );
+                assert!(shown > 15_000 && missing == 0 && off == 0, "{name} {size} {backend}: {missing} {off}");
             }
         }
     }

@@ -101,8 +101,8 @@ impl CameraFile {
         Self { size: Some(size), lens, ..self }
     }
 
-    /// This camera as a pinhole with the focal lengths of its model and the same principal point, if
-    /// its lens has such; `None` for other cameras.
+    /// This camera as a pinhole with the focal lengths of its model and the same principal point,
+    /// if its lens has such; `None` for other cameras.
     pub fn as_pinhole(&self) -> Option<Self> {
         match self.lens {
             Lens::Curved(optics, [fx, fy, cx, cy]) => {

@@ -237,12 +237,19 @@ impl Triangles {
     }
 
     /// How far the image's alpha at a point of a triangle exceeds the least that shows
-    /// ([`Texture::least_alpha`]), relative to it; negative where the triangle is left out. None if
-    /// all of the triangle shows. `parts` and `spread` are those of [`Self::texture_at`].
+    /// ([`Texture::least_alpha`]), relative to it and to the texels of the triangle, among which it
+    /// changes; negative where the triangle is left out. None if all of the triangle shows. `parts`
+    /// and `spread` are those of [`Self::texture_at`].
     pub fn excess_alpha(&self, triangle: usize, parts: [f64; 3], spread: f64) -> Option<f64> {
         let (painted, mipmap) = self.painted_by(triangle)?;
         let least = f64::from(mipmap.least_alpha());
-        (least > 0.0).then(|| seen(painted, mipmap, parts, spread)[3] / least - 1.0)
+        if least == 0.0 {
+            return None;
+        }
+        let [a, b, c] = painted.places.map(|place| DVec2::from_array(place.map(f64::from)));
+        let [width, height] = mipmap.levels()[0].size().map(f64::from);
+        let texels = (b - a).abs().max((c - a).abs()) * DVec2::new(width, height);
+        Some((seen(painted, mipmap, parts, spread)[3] / least - 1.0) / (1.0 + texels.element_sum()))
     }
 
     /// The filtered premultiplied colour of a triangle's texture; white without one. A point of a

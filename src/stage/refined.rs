@@ -269,8 +269,8 @@ mod tests {
     }
 
     /// The number of parts grows with the logarithm of a triangle's size, also if it passes through
-    /// the eye. A lens that nearly sees the direction behind it needs many more: that direction is a
-    /// circle in its image.
+    /// the eye. A lens that nearly sees the direction behind it needs many more: that direction is
+    /// a circle in its image.
     #[test]
     fn the_number_of_parts_is_that_of_what_is_in_view() {
         for lens in [Lens::Fisheye(120.0), Lens::Fisheye(180.0)] {

@@ -299,7 +299,10 @@ fn triangles((center, size): (DVec3, f64), random: &mut Random) -> Mesh {
         mesh.colors = Some(Colors::Linear(mesh.positions.iter().map(|_| color(random).map(|c| c as f32)).collect()));
     }
     if random.one_in(3) {
-        let texels = (0..64).map(|_| [random.below(256) as u8, random.below(256) as u8, 90, 255]).collect();
+        let mut texels: Vec<_> = (0..64).map(|_| [random.below(256) as u8, random.below(256) as u8, 90, 255]).collect();
+        // Half of the images have holes.
+        let has_holes = texels[0][1] < 128;
+        texels.iter_mut().filter(|texel| has_holes && texel[0] < 80).for_each(|texel| texel[3] = 0);
         let texture = Some(Arc::new(Texture::new(8, 8, texels).unwrap()));
         mesh.materials = vec![Material { name: "m".into(), diffuse: [1.0; 4], texture, image: None }];
         mesh.material = Some(vec![0; mesh.triangles.len()]);

@@ -88,7 +88,7 @@ const TANGENTIAL_ROUNDS: u32 = 8u;
 // as found.
 const FOUND: f32 = 1e-4;
 
-// What the distortion adds to a point of the plane times the radial factor.
+// The sum of what the distortion adds to a point of the plane times the radial factor.
 fn leaning(e: vec2<f32>) -> vec2<f32> {
     let r_2 = dot2(e, e);
     let p = held.lens[2].xy;

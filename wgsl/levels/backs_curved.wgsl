@@ -11,7 +11,7 @@
 // How far the product of ray and normal may be smaller on the cap of a surfel than on its plane:
 // where the cap is highest, and steepest toward the eye (Curve::faces_away in
 // src/passes/curved.rs). And the magnitude of the terms. The unit of both is |s x t|.
-fn leaning(record: u32, ray: vec3<f32>, s: vec3<f32>, t: vec3<f32>, distance: f32) -> vec2<f32> {
+fn lean_of_surfel(record: u32, ray: vec3<f32>, s: vec3<f32>, t: vec3<f32>, distance: f32) -> vec2<f32> {
     let at = record * ATTRIBUTE_WORDS + CAP_WORD;
     let heights = bitcast<vec3<f32>>(vec3<u32>(chosen[at], chosen[at + 1u], chosen[at + 2u])) * held.unit;
     let across = cross3(s, t);

@@ -2,9 +2,9 @@
 // in the image, or that nothing below it is visible. A cut that divides a node draws what is below
 // the node in its place: its surfels, or its children, which may be divided in turn.
 // Twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xbe73f2f4fd74cada
+// All loops end, by 1 of src/gpu/loops.rs: 0x30d8edbe699a7ca2
 // #import axes_*::{growth}
-// #import backs_*::{leaning}
+// #import backs_*::{lean_of_surfel}
 // #import ball::{Ball, FILTER_REACH, ball_at, reaches_near}
 // #import camera_*::{axis_image, ball_sine, is_beside}
 // #import camera_orthographic|perspective::{ray_to}
@@ -176,7 +176,7 @@ fn shows_back(record: u32) -> bool {
     let low = low_part(record) * held.unit - held.eye_low.xyz;
     let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + low;
     let ray = ray_to(relative);
-    let lean = leaning(record, ray, s, t, norm3(relative));
+    let lean = lean_of_surfel(record, ray, s, t, norm3(relative));
     return dot3(ray, cross3(s, t)) - lean.x > SINE_SLACK * (norm3(s) * norm3(t) + lean.y);
 }
 

@@ -44,7 +44,8 @@ fn faults(camera: &Camera, depths: &[f32], size: f64) -> [usize; 3] {
         let on_ground = ray.y > 0.035 * ray.length() && at.x.abs() < 0.99 * size && at.z.abs() < 0.99 * size;
         if camera.shows(x, y) && on_ground {
             let off = (f64::from(*depth) * ray.y - 1.0).abs();
-            // The angle below the horizon, in pixels of a lens that the distortion scales by up to 0.85.
+            // The angle below the horizon, in pixels of a lens that the distortion scales by up to
+            // 0.85.
             let below = 0.85 * camera.fy * ray.y / ray.x.hypot(ray.z);
             counts[0] += 1;
             counts[1] += usize::from(!depth.is_finite());
@@ -85,7 +86,8 @@ fn large_triangles_have_no_holes_and_right_depths() {
     }
 }
 
-/// A telephoto lens sees the inside of a triangle whose corners and edges are far outside its image.
+/// A telephoto lens sees the inside of a triangle whose corners and edges are far outside its
+/// image.
 #[test]
 fn triangles_that_cover_the_image_show_without_their_corners() {
     let folder = Folder::new();

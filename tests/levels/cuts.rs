@@ -389,7 +389,11 @@ fn broken_kernels_are_noticed() {
             "seen_disk(center.z, 1.01 * node.radius * held.unit);",
         ),
         ("judge.wgsl", "> SINE_SLACK * (norm3(s)", "> -0.2 * (norm3(s)"),
-        ("judge.wgsl", "leaning(record, ray, s, t, norm3(relative));", "vec2<f32>(-0.2 * norm3(s) * norm3(t), 0.0);"),
+        (
+            "judge.wgsl",
+            "lean_of_surfel(record, ray, s, t, norm3(relative));",
+            "vec2<f32>(-0.2 * norm3(s) * norm3(t), 0.0);",
+        ),
         ("judge.wgsl", "if (shows_back(node.first + k)) {", "if (true) {"),
         ("select.wgsl", " - countOneBits(backs_of(fate));", ";"),
         ("select.wgsl", "return before;", "return before + counts;"),

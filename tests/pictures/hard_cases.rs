@@ -217,8 +217,8 @@ fn a_broken_kernel_fails_a_hard_case() {
         ),
         (
             "facing.wgsl",
-            "rise(rho2) * radius_across",
-            "0.9999 * rise(rho2) * radius_across",
+            "rise(select(rho2, dot2(beside, beside), SQUARE)) * radius_across",
+            "0.9999 * rise(select(rho2, dot2(beside, beside), SQUARE)) * radius_across",
             "cones through each other",
         ),
         ("facing.wgsl", "1.0 && depth >= held.near", "1.0", "spheres at the near depth"),

@@ -34,7 +34,11 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
         let model = random.below(PARAMETERS.len());
         cameras.extend([id, model as u32].map(u32::to_le_bytes).as_flattened());
         cameras.extend([1 + random.below(99) as u64, 16].map(u64::to_le_bytes).as_flattened());
-        (0..PARAMETERS[model]).for_each(|_| cameras.extend(random.between(1.0, 50.0).to_le_bytes()));
+        // Coefficients of lenses follow the focal lengths and the principal point.
+        for k in 0..PARAMETERS[model] {
+            let value = if k < 4 { random.between(1.0, 50.0) } else { random.between(0.01, 0.5) };
+            cameras.extend(value.to_le_bytes());
+        }
 
         let turn = random.between(-3.0, 3.0);
         let pose = [turn.cos(), turn.sin(), 0.0, 0.0, random.between(-1.0, 1.0), 0.0, random.between(1.0, 5.0)];

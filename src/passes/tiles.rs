@@ -142,6 +142,14 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
+/// The number of pixels that the bounds of all splats have together in the view of `camera`,
+/// estimated from the sample in `facts`.
+pub fn covered(facts: &Facts, camera: &Camera, options: &Settings) -> f64 {
+    let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+    let sum: f64 = sampled(facts, camera, options).map(pixels).sum();
+    sum * facts.surfels as f64 / facts.sample.len().max(1) as f64
+}
+
 /// Width and height in pixels of the bounds of each splat of the sample in `facts` that the view of
 /// `camera` shows.
 fn sampled(facts: &Facts, camera: &Camera, options: &Settings) -> impl Iterator<Item = [u32; 2]> {
@@ -160,8 +168,8 @@ pub fn likely(facts: &Facts, camera: &Camera, (needs, options): (&SceneNeeds, &S
         && sampled(facts, camera, options).any(|[width, height]| u64::from(width) * u64::from(height) > most)
 }
 
-/// The longest list that tiles draw. Mesa's llvmpipe ends the loops of an invocation after 65,535
-/// rounds in total, and the last test of a loop's condition counts as a round. An entry that is
+/// The longest list that tiles draw on software adapters. Mesa's llvmpipe ends the loops of an
+/// invocation after 65,535 rounds in total, and the last test of a loop's condition counts as a round. An entry that is
 /// fetched alone takes four rounds: one to fetch it, one to draw it, and a last test for each half
 /// of the tile. When entries are fetched in eights, eight entries take 19 rounds if both halves
 /// draw them. A tile has two lists.

@@ -53,7 +53,7 @@ impl Run<'_> {
         let [entries, longest] = counted.first().copied().unwrap_or_default().map(u64::from);
         let entries = entries + entries / 4;
         let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
-        if entries > most || longest > LONGEST {
+        if entries > most || (self.gpu.adapter.is_software() && longest > LONGEST) {
             self.by_tiles = false;
             self.unlisted = true;
             self.known.crowded |= gathers;

@@ -33,7 +33,7 @@ use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
-use crate::passes::{eye_dome, index};
+use crate::passes::{eye_dome, index, tiles};
 use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Camera, Detail, EyeDome, KernelFaults, Map};
@@ -195,6 +195,21 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let wanted = Wanted::of(&options, culls_back(facts, camera, &options));
         let tree = self.source.levels();
         tree.map_or(self.detail, |tree| select::sized(tree, facts.origin, camera, &wanted))
+    }
+
+    /// The number of surfels of the scene.
+    pub(crate) fn surfels(&self) -> u64 {
+        self.kept.facts.surfels
+    }
+
+    /// The number of samples that splats cover in the view of `camera`, estimated from some of them
+    /// by the rectangles about their images. 0 if nodes are drawn in place of surfels.
+    pub(crate) fn fragments(&self, camera: &Camera) -> f64 {
+        let Kept { facts, options, .. } = &self.kept;
+        match self.detail.is_finest() {
+            true => tiles::covered(facts, camera, options) * f64::from(options.samples.count()),
+            false => 0.0,
+        }
     }
 
     /// Counts of wrong weights of a kernel that the user wrote; None for built-in kernels.

@@ -98,7 +98,7 @@ pub enum DetailMeasure {
     /// surfels lie off the node's cap ([`Node::radius`]).
     #[default]
     Extent,
-    /// The area of the square whose side is the longer axis of the ellipse's image. This
+    /// The area of the square whose side is the longer of the images of the ellipse's two axes. This
     /// reading of Pajarola 2003 comes nearest to the numbers in its Table 2.
     Square,
 }
@@ -117,7 +117,7 @@ impl DetailMeasure {
     pub const ALL: [(Self, &'static str, &'static str); 3] = [
         (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
         (Self::Extent, "extent", "the area of its bounding sphere's image, larger where surfels lie off its cap"),
-        (Self::Square, "square", "the area of the square over the longer axis of its image"),
+        (Self::Square, "square", "the area of the square over the longer image of its axes"),
     ];
 
     /// The size of a node in square pixels. `center` is its centre relative to the eye, in world

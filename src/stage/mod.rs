@@ -19,6 +19,7 @@ mod map;
 mod memory;
 mod meshes;
 mod octrees;
+mod overdraw;
 mod refined;
 mod renderer;
 mod settings;

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use super::in_part::{Part, Parts};
 use super::{
-    Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory, refined,
+    Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory, overdraw,
+    refined,
 };
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
@@ -267,6 +268,8 @@ impl Renderer {
                 tell(&view);
                 let bent = is_told.then(|| lens::note(scene, &camera)).flatten();
                 bent.iter().for_each(|line| progress.note(line));
+                let slow = is_told.then(|| overdraw::note(renderer.surfels(), renderer.fragments(&camera))).flatten();
+                slow.iter().for_each(|line| progress.note(line));
                 let rendered = match refined::refined(scene, &camera) {
                     Some(refined) => {
                         refined.note().iter().filter(|_| is_told).for_each(|line| progress.note(line));

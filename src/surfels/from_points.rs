@@ -159,7 +159,8 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     preparation.limited_by_neighbours = Some(sizes.limited(distinct.of_point()));
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(&Listed(count, |index| (DVec3::from_array(points.positions[index]), radius(index)))).1;
-    Ok(Surfels { points, preparation, parts, collinear: sizes.collinear, sparse: sizes.sparse })
+    let (collinear, sparse) = (sizes.collinear, sizes.sparse(distinct.of_point()));
+    Ok(Surfels { points, preparation, parts, collinear, sparse })
 }
 
 /// The preparation as far as it is known before the surfels are computed.

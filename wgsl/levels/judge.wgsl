@@ -34,7 +34,7 @@ const BACKS_SHIFT: u32 = 8u;
 const FAN_OUT: u32 = 8u;
 
 // If set, the size of a node is that of its bounding ball, as seen in the middle of the image; else
-// that of the image of its ellipse, or of the square over the longer axis of that image.
+// that of the image of its ellipse, or of the square over the longer of the images of its two axes.
 override MEASURES_EXTENT: bool;
 override MEASURES_SQUARE: bool;
 

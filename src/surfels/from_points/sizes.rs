@@ -25,8 +25,8 @@ pub(super) struct Sizes {
     ellipses: Vec<[DVec3; 2]>,
     /// The number of positions whose cluster of three points is collinear.
     pub(super) collinear: u64,
-    /// The number of positions around which one radius for all leaves gaps.
-    pub(super) sparse: u64,
+    /// The positions around which one radius for all leaves gaps; empty with other sizes.
+    sparse: Vec<bool>,
     /// Scaled units per world unit.
     scale: f64,
 }
@@ -39,7 +39,7 @@ impl Sizes {
         options: &FromPoints,
         progress: &dyn Progress,
     ) -> Self {
-        let (mut ellipses, mut collinear, mut sparse) = (Vec::new(), 0, 0);
+        let (mut ellipses, mut collinear, mut sparse) = (Vec::new(), 0, Vec::new());
         let radii: Vec<f64> = match options.size {
             Size::Bsp(triangle) => {
                 let (radii, degenerate) = bsp_radii(distinct, triangle, progress);
@@ -49,7 +49,7 @@ impl Sizes {
             Size::BspGlobal(triangle) => {
                 let radius = common_radius(distinct, triangle, progress);
                 let needed = |at: u32| LEAST * open_radius(offsets(distinct, graph, at, RADIUS_NEIGHBOURS));
-                sparse = (0..distinct.len() as u32).into_par_iter().filter(|at| needed(*at) > radius).count() as u64;
+                sparse = (0..distinct.len() as u32).into_par_iter().map(|at| needed(at) > radius).collect();
                 vec![radius; distinct.len()]
             }
             Size::Qsplat => {
@@ -105,6 +105,12 @@ impl Sizes {
     pub(super) fn limited(&self, of_point: &[u32]) -> u64 {
         let limited = |position: usize| self.radii[position] > self.limits[position];
         of_point.par_iter().filter(|position| limited(**position as usize)).count() as u64
+    }
+
+    /// The number of points that lie too sparsely for the one radius of all.
+    pub(super) fn sparse(&self, of_point: &[u32]) -> u64 {
+        let is_sparse = |position: &&u32| self.sparse.get(**position as usize).is_some_and(|sparse| *sparse);
+        of_point.par_iter().filter(is_sparse).count() as u64
     }
 
     fn world(&self, length: f64) -> f64 {

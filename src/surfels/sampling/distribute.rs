@@ -37,31 +37,37 @@ impl PartialOrd for Bid {
 /// Voxels whose priority is not positive get no samples. If no priority is positive, all voxels
 /// count as equal.
 pub(super) fn distribute(priorities: &[f64], count: usize) -> Vec<usize> {
+    distributed(priorities, vec![0; priorities.len()], count)
+}
+
+/// Distributes `count` more samples to voxels that have `samples`.
+fn distributed(priorities: &[f64], mut samples: Vec<usize>, count: usize) -> Vec<usize> {
     let usable = |priority: f64| if priority.is_finite() && priority > 0.0 { priority } else { 0.0 };
     let none = priorities.iter().all(|priority| usable(*priority) == 0.0);
     let of = |voxel: usize| if none { 1.0 } else { usable(priorities[voxel]) };
-    let mut samples = vec![0; priorities.len()];
-    let bids = (0..priorities.len()).map(|voxel| Bid { worth: of(voxel) / offset(voxel), voxel });
+    let worth = |voxel: usize, samples: usize| of(voxel) / (samples as f64 + offset(voxel));
+    let bids = (0..priorities.len()).map(|voxel| Bid { worth: worth(voxel, samples[voxel]), voxel });
     let mut heap: BinaryHeap<Bid> = bids.filter(|bid| bid.worth > 0.0).collect();
     for _ in 0..count {
         let Some(mut highest) = heap.peek_mut() else { break };
         let voxel = highest.voxel;
         samples[voxel] += 1;
-        highest.worth = of(voxel) / (samples[voxel] as f64 + offset(voxel));
+        highest.worth = worth(voxel, samples[voxel]);
     }
     samples
 }
 
-/// As [`distribute`], but fewer samples than voxels with a positive priority go to the voxels of
-/// the highest priorities, one each (Tien 2008, section 3.2). The thesis advises against it, as the
-/// other voxels get none.
+/// As [`distribute`], but each voxel with a positive priority gets a sample first. Fewer samples than
+/// such voxels go to those of the highest priorities, one each (Tien 2008, section 3.2). The thesis
+/// advises against it, as the other voxels get none.
 ///
 /// Among voxels of equal priority, those with a sample are evenly spread.
 pub(super) fn distribute_by_rank(priorities: &[f64], count: usize) -> Vec<usize> {
     let usable = |voxel: &usize| priorities[*voxel].is_finite() && priorities[*voxel] > 0.0;
     let mut ranked: Vec<usize> = (0..priorities.len()).filter(usable).collect();
     if count >= ranked.len() {
-        return distribute(priorities, count);
+        let first = (0..priorities.len()).map(|voxel| usize::from(usable(&voxel))).collect();
+        return distributed(priorities, first, count - ranked.len());
     }
     ranked.sort_by(|a, b| {
         let spread = |voxel: usize| offset(voxel);
@@ -94,6 +100,10 @@ mod tests {
         // Enough samples are distributed as ever.
         assert_eq!(distribute_by_rank(&priorities, 6600), distribute(&priorities, 6600));
         assert_eq!(distribute_by_rank(&[0.0, 2.0, f64::NAN], 3), [0, 3, 0]);
+        // As many as voxels leave none empty.
+        assert_eq!(of(distribute_by_rank(&priorities, 1250)), [1000, 250]);
+        assert!(distribute_by_rank(&priorities, 1300).iter().all(|samples| *samples > 0));
+        assert!(distribute(&priorities, 1250).contains(&0));
         // Equal voxels in a row get samples evenly: no quarter has less than its share.
         let some = distribute_by_rank(&[1.0; 400], 100);
         assert!(some.chunks(100).all(|part| part.iter().sum::<usize>().abs_diff(25) <= 2), "{some:?}");

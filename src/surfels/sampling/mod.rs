@@ -169,13 +169,13 @@ pub fn sample(
             points(&surface, &places, normals_at(&surface, &places), colors)
         }
         Method::Projected { priority, depth } => {
-            let (voxels, quotas, _) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress);
+            let (voxels, quotas, _) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress)?;
             let places = projected::places(&surface, &voxels, &quotas);
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
             covering(&surface, &places, colors, &mut sampling, progress)?
         }
         Method::Stratified { priority, depth } => {
-            let (voxels, quotas, fair) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress);
+            let (voxels, quotas, fair) = divided(&surface, count, (method, priority, *depth), &mut sampling, progress)?;
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
@@ -193,13 +193,19 @@ fn divided(
     (method, priority, depth): (&Method<'_>, &PriorityFunction<'_>, Option<u32>),
     sampling: &mut Sampling,
     progress: &dyn Progress,
-) -> (Vec<Voxel>, Vec<usize>, Vec<f64>) {
+) -> Result<(Vec<Voxel>, Vec<usize>, Vec<f64>)> {
     progress.begin("dividing the mesh", 0);
     let most = if depth.is_some() { MOST_VOXELS.max(count) } else { count / FOR_EACH_VOXEL };
     let (voxels, halvings) = voxels::voxels(surface, depth, most);
     sampling.halvings = halvings;
     sampling.undone = depth.map_or(0, |depth| depth - halvings);
     let priorities = priority(surface, &voxels);
+    if priorities.len() != voxels.len() {
+        let (given, needed) = (priorities.len(), voxels.len());
+        return Err(Error::Usage(format!(
+            "a priority function returns a number for each of {needed} voxels, not {given}"
+        )));
+    }
     let quotas = match method {
         Method::Projected { .. } => distribute::distribute_by_rank(&priorities, count),
         Method::Stratified { .. } | Method::Uniform => distribute::distribute(&priorities, count),
@@ -212,7 +218,7 @@ fn divided(
     let usable = |priority: &f64| if priority.is_finite() && *priority > 0.0 { *priority } else { 0.0 };
     let sum = priorities.iter().map(usable).sum::<f64>().max(f64::MIN_POSITIVE);
     let fair = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
-    (voxels, quotas, fair)
+    Ok((voxels, quotas, fair))
 }
 
 /// The samples, with half-axes such that their disks cover the surface.

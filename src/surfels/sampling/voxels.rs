@@ -38,18 +38,24 @@ struct Cell {
 /// The largest number of halvings: a voxel has at least 2^-60 of the box's volume.
 const DEEPEST: u32 = 60;
 
+/// The most parts of triangles in all voxels, for each triangle and each voxel that is allowed. Where
+/// many large triangles lie close together, each voxel has parts of all of them.
+const MOST_PATCHES: usize = 16;
+
 /// Divides a surface into voxels (Tien 2008, section 3.1); returns them and the number of halvings.
 ///
 /// Its bounding box is halved across its longest side, and the halves in turn; halves that meet no
 /// triangle are dropped. This ends after `depth` halvings, or before there would be more than
-/// `most` voxels.
+/// `most` voxels or too many parts of triangles ([`MOST_PATCHES`]).
 pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> (Vec<Voxel>, u32) {
     let all = (0..surface.triangles.len() as u32).collect();
     let mut cells = vec![Cell { bounds: surface.bounds, triangles: all }];
     let mut halvings = 0;
     for _ in 0..depth.unwrap_or(DEEPEST).min(DEEPEST) {
         let halves: Vec<Cell> = cells.par_iter().flat_map_iter(|cell| halves(surface, cell)).collect();
-        if halves.len() > most.max(1) {
+        let patches: usize = halves.iter().map(|half| half.triangles.len()).sum();
+        let most_patches = surface.triangles.len().saturating_add(most).saturating_mul(MOST_PATCHES);
+        if halves.len() > most.max(1) || patches > most_patches {
             break;
         }
         cells = halves;

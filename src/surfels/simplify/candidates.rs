@@ -16,8 +16,10 @@ use crate::Progress;
 /// A point whose cell this many splats cover needs no splat of its own.
 pub(super) const ENOUGH: u32 = 48;
 
-/// The stride between the points of the first round.
+/// The least stride between the points of the first round, and the most points of this round. It
+/// knows nothing of what is covered yet, and on a plane each of its splats grows over all points.
 const FIRST_STRIDE: u32 = 64;
+const FIRST_POINTS: u32 = 1024;
 
 /// Splats, and the pieces that each covers.
 pub(super) struct Candidates {
@@ -35,7 +37,8 @@ impl Candidates {
         let mut candidates = Self { splats: Vec::new(), first_cover: vec![0], covers: Vec::new() };
         let mut covered = vec![0u32; samples.len()];
         let count = samples.len() as u32;
-        let mut stride = FIRST_STRIDE;
+        let first_stride = (count / FIRST_POINTS).next_power_of_two().max(FIRST_STRIDE);
+        let mut stride = first_stride;
         let mut first = 0;
         loop {
             let round: Vec<u32> = (first..count).step_by(stride as usize).collect();
@@ -46,7 +49,7 @@ impl Candidates {
             for cover in &candidates.covers[before..] {
                 covered[cover.cell as usize] += u32::from(cover.pieces == cells.pieces(cover.cell));
             }
-            if first == 0 && stride == FIRST_STRIDE {
+            if first == 0 && stride == first_stride {
                 first = stride / 2;
             } else if stride == 2 {
                 break;

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::Report;
 use super::outcome::Slopes;
 use super::samples::Samples;
+use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::scene::low_parts;
 use crate::scene::{Colors, Scene, Surfel};
@@ -76,8 +77,10 @@ impl Graph {
 /// The buffers of a thread that grows splats one after the other.
 #[derive(Default)]
 struct Growth {
-    /// For each point, one plus the index of the last splat that met it.
+    /// For each point, the number of the last growth that met it.
     met: Vec<u32>,
+    /// The number of the growth.
+    number: u32,
     front: BinaryHeap<Next>,
     /// The points that the last growth reached, nearest first, and their distances, scaled units.
     reached: Vec<(u32, f64)>,
@@ -88,10 +91,15 @@ impl Growth {
     /// farther from the plane than `tolerance`.
     fn grow(&mut self, seed: u32, (samples, graph): (&Samples, &Graph), tolerance: f64, limit: f64) {
         self.met.resize(samples.len(), 0);
+        if self.number == u32::MAX {
+            self.met.fill(0);
+            self.number = 0;
+        }
+        self.number += 1;
         self.front.clear();
         self.reached.clear();
         let (center, normal) = (samples.positions.position(seed), samples.normals[seed as usize]);
-        self.met[seed as usize] = seed + 1;
+        self.met[seed as usize] = self.number;
         self.front.push(Next(0.0, seed));
         while let Some(Next(nearness, point)) = self.front.pop() {
             let offset = samples.positions.position(point) - center;
@@ -101,8 +109,8 @@ impl Growth {
             self.reached.push((point, -nearness));
             for &other in &graph.neighbours[point as usize] {
                 let distance = samples.positions.position(other).distance(center);
-                if self.met[other as usize] != seed + 1 && distance <= limit {
-                    self.met[other as usize] = seed + 1;
+                if self.met[other as usize] != self.number && distance <= limit {
+                    self.met[other as usize] = self.number;
                     self.front.push(Next(-distance, other));
                 }
             }
@@ -161,9 +169,36 @@ fn slopes(seed: u32, growth: &Growth, samples: &Samples) -> Slopes {
     in_world(slopes_along([s, t], steps), [s, t])
 }
 
+/// Seeds that are grown to estimate the work, and the most points that all seeds may reach
+/// together, a quarter of an hour's work of a processor of 2026.
+const TRIED: u32 = 64;
+const MOST_REACHED: f64 = 1e10;
+
+/// Fails if all splats together reach so many points that growing them takes hours, as on a plane,
+/// where each reaches all.
+fn check_reach(samples: &Samples, graph: &Graph, tolerance: f64) -> Result<()> {
+    let step = (samples.len() as u32).div_ceil(TRIED).max(1);
+    let reach = |growth: &mut Growth, seed: u32| {
+        growth.grow(seed, (samples, graph), tolerance, f64::INFINITY);
+        growth.reached.len() as f64
+    };
+    let seeds = (0..samples.len() as u32).step_by(step as usize).collect::<Vec<_>>();
+    let reached: f64 = seeds.par_iter().map_init(Growth::default, |growth, seed| reach(growth, *seed)).sum();
+    let each = reached / seeds.len().max(1) as f64;
+    if each * samples.len() as f64 <= MOST_REACHED {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "each of {} points reaches about {each:.0} others within this tolerance, and growing takes hours: take a smaller \
+         --tolerance, or --cover cells",
+        samples.len()
+    )))
+}
+
 /// Selects splats as in the thesis.
-fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress) -> Selection {
+fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress) -> Result<Selection> {
     let graph = Graph::new(samples);
+    check_reach(samples, &graph, tolerance)?;
     progress.begin("growing splats", samples.len() as u64);
     let none = vec![false; samples.len()];
     let grown = |growth: &mut Growth, seed: u32| {
@@ -198,7 +233,7 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
         }
     }
     progress.end();
-    selected
+    Ok(selected)
 }
 
 /// Simplifies `scene` as in the thesis, to disks that are each centred at a surfel and have its
@@ -207,17 +242,23 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
 ///
 /// # Errors
 ///
-/// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 surfels.
+/// [`Error::Usage`] for more than 2^32 - 1 surfels, for a tolerance that is not finite or below 0, for
+/// a ratio that is not above 0 and at most 1, and if growing would take hours.
 pub fn as_in_the_thesis(
     (scene, coordinates): (&Scene, &Coordinates),
     tolerance: f64,
     ratio: f64,
     progress: &dyn Progress,
-) -> crate::Result<(Scene, Coordinates, Report)> {
+) -> Result<(Scene, Coordinates, Report)> {
+    if !(tolerance.is_finite() && tolerance >= 0.0 && ratio > 0.0 && ratio <= 1.0) {
+        return Err(Error::Usage(format!(
+            "a tolerance is finite and at least 0, and a ratio above 0 and at most 1: {tolerance} and {ratio} are not"
+        )));
+    }
     let samples = Samples::new(scene, coordinates)?;
     let scale = samples.positions.scale();
     let Selection { splats: selected, slopes, largest, sums: [off, area] } =
-        select(&samples, tolerance * scale, ratio, progress);
+        select(&samples, tolerance * scale, ratio, progress)?;
     let mut kept = Coordinates { atlas: coordinates.atlas, ..Coordinates::default() };
     if !samples.places.is_empty() {
         kept.centers = selected.iter().map(|(point, _)| samples.places[*point as usize].as_vec2().to_array()).collect();
@@ -249,4 +290,68 @@ pub fn as_in_the_thesis(
     };
     let Scene { origin, encoded, oriented, closed, up, .. } = *scene;
     Ok((Scene { origin, surfels, low, colors, encoded, oriented, closed, up, ..Scene::default() }, kept, report))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::Vec3;
+
+    use super::*;
+
+    /// Points on a sphere, in a known order.
+    fn sphere(count: u32) -> Scene {
+        let disk = |k: u32| {
+            let (z, angle) = (1.0 - (2.0 * k as f32 + 1.0) / count as f32, 2.399_963 * k as f32);
+            let normal = Vec3::new(angle.cos() * (1.0 - z * z).sqrt(), angle.sin() * (1.0 - z * z).sqrt(), z);
+            Surfel::disk(normal, normal, 0.1)
+        };
+        Scene { surfels: (0..count).map(disk).collect(), oriented: true, ..Scene::default() }
+    }
+
+    /// The selection is the greedy one: each time the splat that adds most.
+    #[test]
+    fn the_greatest_contribution_is_selected_first() {
+        let scene = sphere(300);
+        let samples = Samples::new(&scene, &Coordinates::default()).unwrap();
+        let (tolerance, ratio) = (0.15 * samples.positions.scale(), 0.6);
+        let graph = Graph::new(&samples);
+        let conquered = |seed: u32| {
+            let mut growth = Growth::default();
+            growth.grow(seed, (&samples, &graph), tolerance, f64::INFINITY);
+            let radius = growth.reached.iter().map(|(_, distance)| *distance).fold(0.0, f64::max);
+            let mut growth = Growth::default();
+            growth.grow(seed, (&samples, &graph), tolerance, ratio * radius);
+            growth
+        };
+        let all: Vec<Growth> = (0..300).map(conquered).collect();
+        let (mut covered, mut expected) = (vec![false; 300], Vec::new());
+        loop {
+            let adds = |seed: &u32| Next(all[*seed as usize].contribution(&graph, &covered), *seed);
+            let Some(Next(gain, seed)) = (0..300).map(|seed| adds(&seed)).max() else { break };
+            if gain == 0.0 {
+                break;
+            }
+            expected.push(seed);
+            all[seed as usize].reached.iter().for_each(|(point, _)| covered[*point as usize] = true);
+        }
+        let selected = select(&samples, tolerance, ratio, &()).unwrap();
+        assert_eq!(selected.splats.iter().map(|(seed, _)| *seed).collect::<Vec<_>>(), expected);
+        assert!((10..100).contains(&expected.len()), "{}", expected.len());
+    }
+
+    #[test]
+    fn growth_that_would_take_hours_and_numbers_without_sense_are_refused() {
+        let scene = sphere(300);
+        let by =
+            |tolerance: f64, ratio: f64| as_in_the_thesis((&scene, &Coordinates::default()), tolerance, ratio, &());
+        for (tolerance, ratio) in [(f64::NAN, 0.6), (-1.0, 0.6), (0.01, 0.0), (0.01, 1.5), (0.01, f64::NAN)] {
+            assert!(matches!(by(tolerance, ratio), Err(Error::Usage(_))), "{tolerance} {ratio}");
+        }
+        assert!(by(0.01, 1.0).is_ok());
+        let flat = |k: u32| Surfel::disk(Vec3::new((k % 400) as f32, (k / 400) as f32, 0.0), Vec3::Z, 1.0);
+        let plane = Scene { surfels: (0..120_000).map(flat).collect(), oriented: true, ..Scene::default() };
+        let error = as_in_the_thesis((&plane, &Coordinates::default()), 0.01, 0.6, &()).unwrap_err().to_string();
+        assert!(error.contains("each of 120000 points reaches about"), "{error}");
+    }
 }

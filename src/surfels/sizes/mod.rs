@@ -38,8 +38,8 @@ pub enum Size {
     /// A disk per point from clusters of three points, found by binary space partition along
     /// principal axes ("a simple scheme to render point-sampled surfaces", section 3.3).
     Bsp(Triangle),
-    /// One radius for all disks, the mean over such clusters: the section to the letter ("each
-    /// point as a surfel with fixed radius").
+    /// One radius for all disks ("each point as a surfel with fixed radius", the same section): the
+    /// mean over such clusters, without those that are no triangle of a surface.
     BspGlobal(Triangle),
     /// At each vertex of a mesh, a disk as large as the largest bounding circle of a triangle there
     /// (Rusinkiewicz and Levoy 2000).

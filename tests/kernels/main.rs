@@ -3,6 +3,7 @@
 
 mod accumulators;
 mod arithmetic;
+mod branches;
 #[path = "../common/mod.rs"]
 mod common;
 mod determinism;

@@ -2,7 +2,7 @@
 // src/scene/optics.rs has the formula; lens_perspective.wgsl and lens_fisheye.wgsl make the first
 // step.
 // Twins: src/scene/optics.rs and src/scene/optics/inverse.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x1d24bc44ea9e10f7
+// All loops end, by 1 of src/gpu/loops.rs: 0x2d4f37d84b83aa65
 // #import camera_lens::{Sight}
 // #import double::{Double, product, quotient, sum}
 // #import layout::{held}
@@ -116,7 +116,9 @@ fn undistorted(plane: vec2<f32>) -> vec3<f32> {
         }
     }
     let start = plane * select(1.0, high / wanted, wanted > 0.0);
-    if (!leans()) {
+    // The centre does not lean either. A branch on uniforms alone would be compiled for every frame
+    // (shade_lambert.wgsl).
+    if ((!leans()) | (wanted == 0.0)) {
         return vec3<f32>(start, select(0.0, 1.0, wanted <= held.lens[6].z));
     }
     var e = start;
@@ -136,8 +138,9 @@ fn undistorted(plane: vec2<f32>) -> vec3<f32> {
 
 // Whether the lens shows something at a point of the plane.
 fn shows_plane(plane: vec2<f32>) -> bool {
-    if (norm2(plane) <= held.lens[6].z) {
-        return true;
+    let is_sure = norm2(plane) <= held.lens[6].z;
+    if (is_sure | (!leans())) {
+        return is_sure;
     }
-    return leans() && undistorted(plane).z > 0.0;
+    return undistorted(plane).z > 0.0;
 }

@@ -24,10 +24,8 @@ fn see_plane(p: array<Double, 3>) -> Sight {
     // Straight ahead, all directions of (X, Y) are alike.
     let is_ahead = r.high <= 1e-12 * far.high && p[2].high > 0.0;
     sight.seen = far.high > 0.0 && (is_ahead || r.high > 0.0) && (p[2].high > 0.0 || !is_flat());
-    sight.depth = p[2];
-    if (!is_flat()) {
-        sight.depth = length_of(length_of(p[0], p[1]), p[2]);
-    }
+    let away = length_of(length_of(p[0], p[1]), p[2]);
+    sight.depth = Double(select(away.high, p[2].high, is_flat()), select(away.low, p[2].low, is_flat()));
     var turned = quotient(single(1.0), far);
     var toward = vec2<f32>(1.0, 0.0);
     if (!is_ahead && r.high > 0.0) {

@@ -143,6 +143,19 @@ impl Part {
         }
     }
 
+    /// Fails unless the part has the sums of all shares.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_picture(&self) -> Result<()> {
+        if self.header.holds == Holds::Depths {
+            return Err(Error::Usage(
+                "the parts hold nearest depths, which make no picture: draw sums with --within and merge those".into(),
+            ));
+        }
+        self.check_whole()
+    }
+
     /// The maps of the picture, as the user asked for them.
     pub fn maps(&self) -> Maps {
         self.header.subject.maps
@@ -164,12 +177,7 @@ impl Part {
     /// [`Error::Usage`] if parts are missing or hold depths, [`Error::Malformed`] for damaged values,
     /// and errors of the device.
     pub fn picture(&self, device: &DeviceOptions, progress: &dyn Progress) -> Result<Merged> {
-        if self.header.holds == Holds::Depths {
-            return Err(Error::Usage(
-                "the parts hold nearest depths, which make no picture: draw sums with --within and merge those".into(),
-            ));
-        }
-        self.check_whole()?;
+        self.check_picture()?;
         let subject = &self.header.subject;
         let backend = backend(device, progress)?;
         let source = NoneOfScene::new(subject.facts.clone());

@@ -16,7 +16,7 @@ use super::target::STANDARD;
 pub(super) fn run(arguments: &Arguments, share: Share) -> Result<()> {
     check(arguments)?;
     let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
-    Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
+    Renderer::check_part(&files, &arguments.scene, &arguments.options, &arguments.device)?;
     let within = &arguments.part.within;
     outputs::check(arguments.files(&files).chain(within.iter().map(Source::other)), [&arguments.output])?;
     let view = View::new(&arguments.camera)?;
@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &Arguments, share: Share) -> Result<()> {
 
 /// Rejects what `epsplat merge` does, and what has no parts.
 fn check(arguments: &Arguments) -> Result<()> {
-    let Arguments { output, views, camera, file, options, .. } = arguments;
+    let Arguments { output, views, camera, file, .. } = arguments;
     let usage = |what: &str| Err(Error::Usage(what.to_owned()));
     if views.cameras.is_some() || views.turntable.is_some() {
         return usage("--part draws one view: leave --cameras and --turntable out, and draw the parts of each view");
@@ -51,11 +51,6 @@ fn check(arguments: &Arguments) -> Result<()> {
     }
     if file.json.is_some() {
         return usage("a part has no report: give --json to epsplat merge");
-    }
-    if options.marks.legend || options.marks.scale_bar || options.marks.north {
-        return usage(
-            "marks are drawn on the finished picture, and a part is none: leave --legend, --scale-bar and --north out",
-        );
     }
     if output == Path::new(STANDARD) {
         return usage("a part is a file for other processes: name it, as in -o depth-1.part");

@@ -8,6 +8,7 @@ use super::header::{Header, Holds, Subject, VERSION};
 use super::merge::merge;
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
+use crate::options::{DeviceOptions, RenderOptions, SceneOptions};
 use crate::passes::digest;
 use crate::passes::order::order;
 use crate::passes::share::ShareOfScene;
@@ -17,7 +18,7 @@ use crate::render::exchange::Exchange;
 use crate::render::{self, Backend};
 use crate::scene::{Camera, Scene, Share};
 use crate::stage::renderer::{Drawn, Renderer};
-use crate::stage::{View, refined};
+use crate::stage::{Files, Inputs, Request, View, refined};
 
 impl Renderer {
     /// Draws the `share` of a view: its nearest depths, or its sums `within` the nearest depths of
@@ -62,14 +63,25 @@ impl Renderer {
         Ok(Part { name: format!("part {share}").into(), header, sections: kept.into_sections() })
     }
 
+    /// Rejects options with which a picture has no parts, before any input is read.
+    ///
+    /// # Errors
+    /// [`Error::Usage`], as [`Renderer::part`].
+    pub fn check_part(
+        files: &Files,
+        scene: &SceneOptions,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+    ) -> Result<()> {
+        let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
+        let request = Request { scene: &inputs, options, device, views: false, read: None };
+        check_marks(options)?;
+        check::options_of_parts(&request.settings()?, request.is_reference())
+    }
+
     /// The camera and the scene of a part.
     fn subject_of_part(&self, view: &View, progress: &dyn Progress) -> Result<(Camera, Arc<Scene>)> {
-        if self.options.marks.marks() != Marks::default() {
-            return Err(Error::Usage(
-                "marks are drawn on the finished picture, and a part is none: leave --legend, --scale-bar and --north out"
-                    .into(),
-            ));
-        }
+        check_marks(&self.options)?;
         check::options_of_parts(self.settings(), false)?;
         let Drawn::Whole { scene, renderer, .. } = &self.drawn else {
             return Err(Error::Usage("parts are shares of all surfels: leave --lod and --splats out".into()));
@@ -80,6 +92,16 @@ impl Renderer {
         refined.iter().filter_map(|refined| refined.note()).for_each(|line| progress.note(&line));
         Ok((camera, refined.map_or_else(|| scene.clone(), |refined| Arc::new(refined.scene))))
     }
+}
+
+/// Rejects marks.
+fn check_marks(options: &RenderOptions) -> Result<()> {
+    if options.marks.marks() == Marks::default() {
+        return Ok(());
+    }
+    let what =
+        "marks are drawn on the finished picture, and a part is none: leave --legend, --scale-bar and --north out";
+    Err(Error::Usage(what.into()))
 }
 
 /// The picture that a part belongs to.

@@ -68,7 +68,7 @@ pub use low_level::render::{FrameLayout, Plane, Receipt, Report, Target, Ticket}
 pub use low_level::scene::{Bounds, Camera, Grid, Lens, Map, Maps, Share, Side, Up};
 pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
-pub use stage::{Files, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport, Visible};
+pub use stage::{Files, Given, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport, Visible};
 #[cfg(feature = "parts")]
 pub use stage::{Merged, Part, merge};
 

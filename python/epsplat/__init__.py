@@ -14,14 +14,6 @@ True. ``--from`` is ``from_`` or ``view``, as ``from`` is a word of Python.
 No display is needed. Kernels run on the best adapter; without one, the f64 reference renders.
 """
 
-import os as _os
-import sys as _sys
-import tempfile as _tempfile
-
-# Without this variable Mesa's drivers print a line at every start: they look for a display there.
-if _sys.platform == "linux":
-    _os.environ.setdefault("XDG_RUNTIME_DIR", _tempfile.gettempdir())
-
 from ._clouds import coverage, lod, sample, simplify, surfels, visible
 from ._epsplat import __version__
 from ._errors import (
@@ -30,6 +22,7 @@ from ._errors import (
     Error,
     FileError,
     MalformedError,
+    MissingFileError,
     NoMemoryError,
     StudyError,
     UsageError,
@@ -47,6 +40,7 @@ __all__ = [
     "FileError",
     "Frames",
     "MalformedError",
+    "MissingFileError",
     "NoMemoryError",
     "Renderer",
     "Scene",

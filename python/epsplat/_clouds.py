@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import _epsplat
+from . import _arrays, _epsplat
+from ._adapter import opening
 from ._progress import stages
 from ._scene import Path, Scene, read
 from ._view import View
@@ -60,8 +62,8 @@ def surfels(
     Scene
         Its :meth:`~Scene.arrays` are the surfels; ``report`` has their number.
     """
-    arguments = (size, _texts(orient), estimate_normals, limits, stages(progress))
-    return _made(_epsplat.surfels(_scene(source), *arguments))
+    with stages(progress) as shown:
+        return _made(_epsplat.surfels(_scene(source), size, _texts(orient), estimate_normals, limits, shown))
 
 
 def sample(
@@ -85,8 +87,10 @@ def sample(
     shape : "disk" or "cap"
     depth : halvings of the mesh's box into voxels
     """
-    arguments = (count, priority, method, shape, depth, seed, stages(progress))
-    return _made(_epsplat.sample(_scene(mesh), *arguments))
+    count, seed = _arrays.whole("count", count, 1, 2**32 - 1), _arrays.whole("seed", seed, 0, 2**64 - 1)
+    depth = None if depth is None else _arrays.whole("depth", depth, 0, 2**32 - 1)
+    with stages(progress) as shown:
+        return _made(_epsplat.sample(_scene(mesh), count, priority, method, shape, depth, seed, shown))
 
 
 def simplify(
@@ -111,7 +115,9 @@ def simplify(
         Its ``report`` has the counts and deviations, world units.
     """
     text = tolerance if isinstance(tolerance, str) else f"abs:{float(tolerance)!r}"
-    return _made(_epsplat.simplify(_scene(source), text, shape, relax, stages(progress)))
+    relax = _arrays.whole("relax", relax, 0, 2**32 - 1)
+    with stages(progress) as shown:
+        return _made(_epsplat.simplify(_scene(source), text, shape, relax, shown))
 
 
 def lod(
@@ -132,10 +138,11 @@ def lod(
 
     Returns
     -------
-    dict of the numbers of surfels, nodes and levels
+    dict of the numbers of surfels, nodes and levels, and the notes
     """
-    made = _epsplat.lod(_scene(source), os.fspath(output), cut, limits, stages(progress))
-    return json.loads(made[0])
+    with stages(progress) as shown:
+        counts, notes = _epsplat.lod(_scene(source), os.fspath(output), cut, limits, shown)
+    return {**json.loads(counts), "notes": notes}
 
 
 def coverage(
@@ -150,10 +157,12 @@ def coverage(
 
     Returns
     -------
-    dict, as ``epsplat coverage --json`` writes it; distances in world units
+    dict, as ``epsplat coverage --json`` writes it, and the notes; distances in world units
     """
-    made = _epsplat.coverage(_scene(source), _scene(mesh), views, side, stages(progress))
-    return json.loads(made[0])
+    views, side = _arrays.whole("views", views, 1, 65_536), _arrays.whole("side", side, 1, 8192)
+    with stages(progress) as shown:
+        measured, notes = _epsplat.coverage(_scene(source), _scene(mesh), views, side, shown)
+    return {**json.loads(measured), "notes": notes}
 
 
 def visible(
@@ -177,5 +186,9 @@ def visible(
         ``points[visible(...) > 0]`` are the points that a view sees.
     """
     all_views = [views] if isinstance(views, View) else list(views)
-    counts, _, _ = _epsplat.visible(_scene(source), [view._view for view in all_views], options, stages(progress))
+    with stages(progress) as shown, opening():
+        counts, _, notes = _epsplat.visible(_scene(source), [view._view for view in all_views], options, shown)
+    for note in notes:
+        if note.startswith("warning: "):
+            warnings.warn(note[len("warning: ") :], stacklevel=2)
     return np.concatenate(counts) if counts else np.zeros(0, np.uint32)

@@ -30,6 +30,9 @@ class View:
     @staticmethod
     def of_file(path: str, size: Tuple[int, int], scale: Optional[float], pinholes: bool) -> List["View"]: ...
 
+class OfMap:
+    """The place of a map on the earth."""
+
 class Renderer:
     """The library's renderer."""
 
@@ -48,7 +51,11 @@ class Renderer:
 
 def encode(color: np.ndarray, format: str) -> bytes: ...
 def save(
-    path: str, color: np.ndarray, maps: Mapping[str, np.ndarray], depth_scale: Optional[float] = None
+    path: str,
+    color: np.ndarray,
+    maps: Mapping[str, np.ndarray],
+    depth_scale: Optional[float] = None,
+    place: Optional[OfMap] = None,
 ) -> None: ...
 def surfels(
     scene: Scene, size: str, orient: Sequence[str], estimate_normals: bool, keywords: Dict[str, Any], progress: Any

@@ -13,6 +13,10 @@ class FileError(Error, OSError):
     """A file could not be read or written."""
 
 
+class MissingFileError(FileError, FileNotFoundError):
+    """A file does not exist."""
+
+
 class MalformedError(Error, ValueError):
     """The content of a file violates its format."""
 
@@ -30,4 +34,9 @@ class DeviceError(Error, RuntimeError):
 
 
 class StudyError(Error, RuntimeError):
-    """A study ran, but a configuration did not do what the study states."""
+    """A study ran, but a configuration did not do what the study states.
+
+    ``rows`` has the measurements, as :func:`epsplat.study` returns them.
+    """
+
+    rows: list = []

@@ -10,6 +10,15 @@ import numpy as np
 
 from . import _epsplat
 from ._errors import UsageError
+from ._view import View
+
+
+def _exact(name: str, values: np.ndarray, dtype: Any) -> np.ndarray:
+    """Returns values as a contiguous array of a type; users may have put others in the place."""
+    try:
+        return np.ascontiguousarray(values, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{name}: it is no array of numbers: {error}") from None
 
 
 class Frames:
@@ -20,13 +29,20 @@ class Frames:
     color : (C, H, W, 4) float32
         Linear light with straight alpha; alpha is 0 where nothing is.
     maps : dict of arrays by name
-        depth (C, H, W): world units along the camera's axis, inf where nothing is.
+        depth (C, H, W): world units along the camera's axis, with a fisheye or a whole sphere from
+        the eye; inf where nothing is.
         normal (C, H, W, 3): world space, of length 1; 0 where nothing is.
-        height, weight, count, transmittance, layers, tail, decision: (C, H, W).
+        height (C, H, W): world units along the up direction; -inf where nothing is.
         index (C, H, W, 2) uint32: the input and the point in it; 4294967295 where nothing is.
-        texz (C, H, W, 3), surfaces (C, H, W, 16).
+        weight, count, transmittance (1 where nothing is), layers, tail, decision: (C, H, W).
+        texz (C, H, W, 3), surfaces (C, H, W, 16). The guide has all maps.
+    views : list of View
+        The cameras that were used, of any projection: render them again for the same picture.
     viewmats : (C, 4, 4) float64, world to camera, OpenCV axes
-    Ks : (C, 3, 3) float64, pixels; of an orthographic view pixels per world unit
+    Ks : (C, 3, 3) float64, pixels
+        Of an orthographic view pixels per world unit, of a fisheye pixels per radian; these are no
+        pinholes, and :attr:`views` has them whole. A map of more pixels than an image may have has
+        no camera.
     reports : list of dict
         Times, counts and the adapter of each picture, as ``--json`` writes them.
     notes : list of str
@@ -41,11 +57,13 @@ class Frames:
         self.maps: Dict[str, np.ndarray] = made["maps"]
         self.viewmats: np.ndarray = made["viewmats"]
         self.Ks: np.ndarray = made["Ks"]
+        self.views: List[View] = [View._of(view) for view in made["views"]]
         self.reports: List[Dict[str, Any]] = [json.loads(report) for report in made["reports"]]
         self.notes: List[str] = made["notes"]
         self.unseen: List[Optional[str]] = made["unseen"]
         self.extent: Optional[Tuple[float, float, float, float]] = None
-        if "pixel" in made:
+        self._place = made.get("place")
+        if self._place is not None:
             _, height, width, _ = self.color.shape
             left, top, pixel = made["left"], made["top"], made["pixel"]
             self.extent = (left, left + width * pixel, top - height * pixel, top)
@@ -63,9 +81,15 @@ class Frames:
         """The number of pictures."""
         return len(self.color)
 
+    def _picture(self, index: int) -> Tuple[np.ndarray, Dict[str, np.ndarray]]:
+        """Returns the colour and the maps of a picture as the compiled part takes them."""
+        whole = {name: np.uint32 for name in self.maps if self.maps[name].dtype.kind == "u"}
+        maps = {name: _exact(name, values[index], whole.get(name, np.float32)) for name, values in self.maps.items()}
+        return _exact("color", self.color[index], np.float32), maps
+
     def png(self, index: int = 0) -> bytes:
         """Returns a picture as PNG: 8-bit sRGB, straight alpha."""
-        return _epsplat.encode(self.color[index], "png")
+        return _epsplat.encode(self._picture(index)[0], "png")
 
     def save(
         self, path: Union[str, "os.PathLike[str]"], index: int = 0, depth_scale: Optional[float] = None
@@ -73,12 +97,13 @@ class Frames:
         """Writes a picture. Its extension is that of a format of the command line.
 
         .png, .jpg: the colour. .exr, .npz: the colour and all maps. .npy, .tif: the only map, or the
-        colour. The file appears whole or not at all.
+        colour. The file appears whole or not at all. A map from above keeps its place: .tif in its
+        tags, .png and .jpg in a world file.
         """
-        maps = {name: values[index] for name, values in self.maps.items()}
+        color, maps = self._picture(index)
         if os.fspath(path).lower().endswith((".png", ".jpg", ".jpeg")) and depth_scale is None:
             maps = {}
-        _epsplat.save(os.fspath(path), self.color[index], maps, depth_scale)
+        _epsplat.save(os.fspath(path), color, maps, depth_scale, self._place)
 
     def rgb(self, background: Tuple[float, float, float] = (1.0, 1.0, 1.0)) -> np.ndarray:
         """Returns 8-bit sRGB colours over a background of linear light: (C, H, W, 3) uint8."""

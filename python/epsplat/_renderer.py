@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Union
 
-from . import _epsplat
+from . import _arrays, _epsplat
+from ._adapter import opening
 from ._errors import UsageError
 from ._frames import Frames
 from ._progress import stages
@@ -29,7 +30,7 @@ class Renderer:
         WGSL texts in place of built-in files, such as ``{"kernel_ellipse.wgsl": text}``.
     progress : ``tqdm.tqdm``, or a function ``progress(what, done, units)``
     options
-        Those of ``epsplat render``: aov (maps beside the colour), epsilon, kernel, shading, light,
+        Options of ``epsplat render``: aov (maps beside the colour), epsilon, kernel, shading, light,
         background, composite, samples, backend ("gpu", "raster" or "reference"), adapter, near and
         others.
 
@@ -59,7 +60,8 @@ class Renderer:
             options["size"] = (width, height)
         self._scene = scene
         wgsl = None if wgsl is None else dict(wgsl)
-        self._renderer, self.notes = _epsplat.Renderer.of(scene._scene, options, wgsl, stages(progress))
+        with stages(progress) as shown, opening():
+            self._renderer, self.notes = _epsplat.Renderer.of(scene._scene, options, wgsl, shown)
 
     def render(
         self,
@@ -81,7 +83,7 @@ class Renderer:
         Returns
         -------
         Frames
-            Arrays of shape (C, H, W, ...), float32.
+            Arrays of shape (C, H, W, ...).
 
         Raises
         ------
@@ -90,8 +92,9 @@ class Renderer:
         KeyboardInterrupt
             After Ctrl-C; the renderer can be used again.
         """
-        made = _epsplat.Renderer.render(self._renderer, _views(viewmats, Ks, convention), stages(progress))
-        return Frames(made)
+        wanted = _views(viewmats, Ks, convention)
+        with stages(progress) as shown, opening():
+            return Frames(self._renderer.render(wanted, shown))
 
     def look_at(self, eye: Any, target: Any, up: Any = None, fov: Optional[float] = None, **options: Any) -> Frames:
         """Renders the view from ``eye`` to ``target``; see :func:`epsplat.look_at`."""
@@ -100,8 +103,9 @@ class Renderer:
     def turntable(self, count: int, **options: Any) -> List[View]:
         """Returns ``count`` views on a circle around the scene, counter-clockwise from above.
 
-        Options are those of :class:`View` that do not place the camera: from_, elevation, fov, size.
+        Options are from_, elevation, fov, size and others of :class:`View` that place no camera.
         """
+        count = _arrays.whole("count", count, 1, 100_000)
         return [View._of(view) for view in self._renderer.turntable(count, options)]
 
     def orthophoto(
@@ -125,7 +129,8 @@ class Renderer:
             One picture; its ``extent`` is (xmin, xmax, ymin, ymax), as matplotlib takes it.
         """
         options = {"pixel_size": pixel_size, "bounds": bounds, "up": up}
-        return Frames(self._renderer.map(options, stages(progress)))
+        with stages(progress) as shown, opening():
+            return Frames(self._renderer.map(options, shown))
 
     @property
     def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:

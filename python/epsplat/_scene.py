@@ -14,8 +14,10 @@ class Scene:
     """Points in arrays, as a scene. :func:`read` makes scenes of files.
 
     Arrays are of numpy, or anything that shares its memory (``__array_interface__``, the buffer
-    protocol, DLPack on the host); any strides, read-only too. N is the number of points. Points with
-    a coordinate that is not finite are left out, and the notes of a render count them.
+    protocol, DLPack on the host); any strides, read-only too. The scene shares their memory and
+    makes surfels of it when a renderer needs them: leave the numbers as they are. Numbers of other
+    types are copied once. N is the number of points. Points with a coordinate that is not finite are
+    left out, and the notes of a render count them.
 
     Parameters
     ----------
@@ -28,7 +30,7 @@ class Scene:
         radii.
     colors : (N, 3) or (N, 4)
         uint8: sRGB codes. Floats: linear light. The fourth is straight alpha.
-    alpha : (N,), 0 to 1
+    alpha : (N,) floats, 0 to 1
         Multiplies the alpha of the colours. It shows with ``composite="layers"`` or ``"sorted"``.
     texture : (N, 2)
         Texture coordinates (u, v), origin bottom left.
@@ -39,7 +41,7 @@ class Scene:
     up : "y" or "z"
         The up direction of the data; guessed without it.
     options
-        Those of ``epsplat render`` for scenes: color_by, color_map, range, surfel_size, outliers,
+        Options of ``epsplat render`` for scenes: color_by, color_map, range, surfel_size, outliers,
         smooth, mesh and others.
 
     Raises
@@ -56,6 +58,7 @@ class Scene:
     def __init__(
         self,
         positions: Any,
+        *,
         normals: Any = None,
         radii: Any = None,
         half_axes: Any = None,
@@ -75,7 +78,6 @@ class Scene:
             "normals": normals,
             "radii": radii,
             "half_axes": half_axes,
-            "alpha": alpha,
             "texture": texture,
         }
         if up not in (None, "y", "z"):
@@ -84,6 +86,8 @@ class Scene:
         arrays["positions"] = points
         if colors is not None:
             arrays["colors"] = _arrays.colors("colors", colors, rows)
+        if alpha is not None:
+            arrays["alpha"] = _arrays.light("alpha", alpha, rows)
         if triangles is not None:
             arrays["triangles"] = _arrays.indices("triangles", triangles)
         arrays["attributes"] = {name: _arrays.floats(name, values, rows) for name, values in (attributes or {}).items()}
@@ -107,7 +111,8 @@ class Scene:
         positions (N, 3) float64, and where they are known normals (N, 3), radii (N,), half_axes
         (N, 2, 3), texture (N, 2) float32, colors (N, 4) as uint8 sRGB or float32 linear,
         triangles (M, 3) int64. ``Scene(**arrays)`` has the same points; the up direction of the
-        format, and clip lines and curvature of surfels, are no arrays (:meth:`save` writes them).
+        format, clip lines and curvature of surfels, and the third half-axis of Gaussians are no
+        arrays (:meth:`save` writes them). Colours of Gaussians become linear light.
         """
         return _epsplat.arrays(self._scene)
 
@@ -150,12 +155,12 @@ def read(path: Union[Path, Iterable[Path]], **options: Any) -> Scene:
     ----------
     path : path, or an iterable of paths
     options
-        Those of ``epsplat render`` for scenes: color_by, classes, where, surfel_size and others.
+        Options of ``epsplat render`` for scenes: color_by, classes, where, surfel_size and others.
 
     Raises
     ------
-    FileError
-        For a missing file.
+    MissingFileError
+        For a missing file; it is a FileError and a FileNotFoundError.
     UsageError
         For a folder without readable files, or a wrong option.
     """

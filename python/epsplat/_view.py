@@ -1,4 +1,4 @@
-"""Cameras: x right, y down, z forward (OpenCV). Pixel (i, j) has its centre at (i + 0.5, j + 0.5)."""
+"""Cameras: x right, y down, z forward (OpenCV). The centre of pixel (i, j) is (i + 0.5, j + 0.5)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class View:
     Parameters
     ----------
     options
-        Those of ``epsplat render`` for cameras: eye, target, up (each x, y, z), from_ (or view),
-        azimuth, elevation, fov (vertical, degrees), ortho (a height in world units, or True),
+        Options of ``epsplat render`` for cameras: eye, target, up (each x, y, z), from_ (or view),
+        azimuth, elevation, fov (degrees; vertical, of a fisheye horizontal), ortho (a height in world units, or True),
         projection, intrinsics (fx, fy, cx, cy in pixels), size (width, height), near, camera (the
         path of a camera file).
     """
@@ -107,7 +107,8 @@ def cameras(
 
     Returns
     -------
-    list of View, whose ``name`` is that of its photograph
+    list of View, whose ``name`` is that of its photograph without the extension
     """
-    made = _epsplat.View.of_file(os.fspath(path), size, scale, ignore_distortion)
+    width, height = (_arrays.whole("size", side, 1, 2**32 - 1) for side in size)
+    made = _epsplat.View.of_file(os.fspath(path), (width, height), scale, ignore_distortion)
     return [View._of(view) for view in made]

@@ -1,10 +1,11 @@
 //! Functions of clouds: surfels from points, sampling, simplification, levels of detail, coverage
 //! and visible points. Each does what the command of its name does.
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 
 use epsplat::io::points::Points;
-use epsplat::io::{Mesh, ply, read_mesh};
+use epsplat::io::{Mesh, ply};
 use epsplat::low_level::metrics::SurfaceDistances;
 use epsplat::low_level::metrics::coverage::coverage as measured;
 use epsplat::low_level::scene::Cut;
@@ -12,9 +13,10 @@ use epsplat::low_level::surfels::sampling::voxels::Voxel;
 use epsplat::low_level::surfels::sampling::{MeshSurface, Method, Priority, sample as sampled};
 use epsplat::low_level::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
 use epsplat::low_level::surfels::{
-    FromPoints, Orientation, Size, build, build_at_vertices, build_within, curve, from_points, hierarchy,
+    FromPoints, Limits, Orientation, Size, build, build_at_vertices, build_within, curve, from_points, hierarchy,
 };
 use epsplat::low_level::truth::TriangleTree;
+use epsplat::options::ColorOptions;
 use epsplat::options::parse::orientation;
 use epsplat::{Error, Progress, Result, SceneOptions};
 use numpy::{PyArray1, PyArrayMethods};
@@ -28,11 +30,32 @@ use crate::scene::Scene;
 use crate::task::run;
 use crate::view::View;
 
-/// The points of a scene's inputs.
+/// The points of a scene's inputs, without the colours of an attribute.
 pub fn inputs(scene: &epsplat::Scene, progress: &dyn Progress) -> Result<Vec<Points>> {
     match scene.files().paths().is_empty() {
-        true => Ok(scene.points().to_vec()),
+        true => scene.points(progress).map(Cow::into_owned),
         false => scene.files().read(progress),
+    }
+}
+
+/// The limits of surfels: those of the scene's options, and others of `keywords`.
+fn limits(py: Python<'_>, scene: &Scene, keywords: &Bound<'_, PyDict>) -> PyResult<Limits> {
+    if scene.options.colors.color_by.is_some() {
+        return Err(usage(py, "color_by colours pictures and no surfels: give it to the scene that is rendered"));
+    }
+    let all = scene.arguments.iter().cloned().chain(arguments(Scope::Limits, keywords)?);
+    Ok(parsed(py, &all.collect::<Vec<_>>())?.scene.surfels.limits.limits())
+}
+
+/// Fails for an output that is one of the scene's files.
+fn check_output(scene: &epsplat::Scene, output: &Path) -> Result<()> {
+    let same = |path: &PathBuf| path.canonicalize().ok().zip(output.canonicalize().ok()).is_some_and(|(a, b)| a == b);
+    match scene.files().paths().iter().any(same) {
+        true => Err(Error::Usage(format!(
+            "{} would be overwritten while it is read: choose another name",
+            output.display()
+        ))),
+        false => ply::check_extension(output),
     }
 }
 
@@ -63,12 +86,14 @@ pub fn surfels(
     keywords: &Bound<'_, PyDict>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Made> {
-    let limits = parsed(py, &arguments(Scope::Scene, keywords)?)?.scene.surfels.limits.limits();
+    let limits = limits(py, scene, keywords)?;
     let size: Size = value(py, "size", size)?;
     let orientation = of_all(py, &orient)?;
     let options = FromPoints { size, orientation, estimate_normals, limits };
     let from = scene.scene.clone();
-    let (made, mut notes) = run(py, progress, |progress| from_points(inputs(&from, progress)?, &options, progress))?;
+    let (made, mut notes) = run(py, progress, |progress| {
+        from_points(inputs(&from, progress)?, &options, progress).map_err(|error| from.files().named(error))
+    })?;
     notes.extend(made.notes());
     let report = json!({ "surfels": made.preparation.surfels, "parts": made.parts });
     Ok((Scene::of(made.points), report.to_string(), notes))
@@ -94,17 +119,13 @@ fn mesh(scene: &epsplat::Scene, options: &SceneOptions, progress: &dyn Progress)
     if let [path] = scene.files().paths() {
         return options.input.file.mesh(path, progress);
     }
-    let [Points { positions, faces: Some(faces), colors, up, .. }] = scene.points() else {
-        return usage("a mesh is needed: one file, or arrays with triangles");
-    };
-    Ok(Mesh {
-        positions: positions.clone(),
-        triangles: faces.triangles.clone(),
-        normals: faces.normals.clone(),
-        colors: colors.clone(),
-        up: *up,
-        ..Mesh::default()
-    })
+    let mut points = scene.points(progress)?.into_owned();
+    match (points.pop(), points.len()) {
+        (Some(Points { positions, faces: Some(faces), colors, up, .. }), 0) => {
+            Ok(Mesh { positions, triangles: faces.triangles, normals: faces.normals, colors, up, ..Mesh::default() })
+        }
+        _ => usage("a mesh is needed: one file, or arrays with triangles"),
+    }
 }
 
 /// Covers a mesh with a given number of surfels.
@@ -170,7 +191,8 @@ pub fn simplify(
     let options = Options { tolerance, shape, relaxations: relax };
     let from = scene.scene.clone();
     let ((made, report), notes) = run(py, progress, |progress| {
-        let (scene, preparation, coordinates) = build_at_vertices(inputs(&from, progress)?, progress)?;
+        let built = build_at_vertices(inputs(&from, progress)?, progress);
+        let (scene, preparation, coordinates) = built.map_err(|error| from.files().named(error))?;
         preparation.notes().iter().for_each(|line| progress.note(line));
         let (simplified, coordinates, report) = simplify_in_texture(&scene, &coordinates, &options, progress)?;
         Ok((points(&simplified, coordinates, shape), report))
@@ -189,14 +211,15 @@ pub fn lod(
     keywords: &Bound<'_, PyDict>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, Vec<String>)> {
-    let limits = parsed(py, &arguments(Scope::Scene, keywords)?)?.scene.surfels.limits.limits();
+    let limits = limits(py, scene, keywords)?;
     if cut.is_some_and(|length| !(length.is_finite() && length > 0.0)) {
         return Err(usage(py, "cut: it is a length: give a positive number of world units"));
     }
     let from = scene.scene.clone();
     let (report, notes) = run(py, progress, |progress| {
-        ply::check_extension(&output)?;
-        let (scene, preparation) = build_within(inputs(&from, progress)?, Vec::new(), &limits, progress)?;
+        check_output(&from, &output)?;
+        let built = build_within(inputs(&from, progress)?, Vec::new(), &limits, progress);
+        let (scene, preparation) = built.map_err(|error| from.files().named(error))?;
         preparation.notes().iter().for_each(|line| progress.note(line));
         let (scene, tree) = match scene.hierarchy.clone() {
             Some(known) => (scene, known),
@@ -232,10 +255,7 @@ pub fn coverage(
     }
     let (from, of_mesh, options) = (scene.scene.clone(), of.scene.clone(), of.options.clone());
     let (report, notes) = run(py, progress, |progress| {
-        let mesh = match of_mesh.files().paths() {
-            [path] => read_mesh(path, progress)?,
-            _ => mesh(&of_mesh, &options, progress)?,
-        };
+        let mesh = mesh(&of_mesh, &options, progress)?;
         let triangles = TriangleTree::new(&mesh)?;
         if triangles.is_empty() {
             let what = "the mesh has no triangle with an area, so there is nothing to cover";
@@ -277,13 +297,19 @@ pub fn visible<'py>(
     let parsed = parsed(py, &arguments(Scope::Renderer, keywords)?)?;
     let views = views.iter().map(|view| view.with(&parsed.camera)).collect::<Result<Vec<_>>>();
     let views = views.map_err(|error| exception(py, &error))?;
-    let (from, options) = (scene.scene.clone(), scene.options.clone());
+    // Colours show nothing here.
+    let options = SceneOptions { colors: ColorOptions::default(), ..scene.options.clone() };
+    let from = scene.scene.clone();
     let (visible, notes) = run(py, progress, |progress| {
-        let scene = match from.points().is_empty() {
-            true => epsplat::Scene::from_points(inputs(&from, progress)?, &options),
-            false => from,
-        };
-        scene.visible(&views, &parsed.render, &parsed.device, progress)
+        let scene = epsplat::Scene::from_points(inputs(&from, progress)?, &options);
+        let seen = scene.visible(&views, &parsed.render, &parsed.device, progress);
+        let seen = seen.map_err(|error| from.files().named(error))?;
+        if seen.points.iter().all(|count| *count == 0) {
+            progress.note(
+                "warning: no view sees any of the points: the cameras may have other coordinates, or look elsewhere",
+            );
+        }
+        Ok(seen)
     })?;
     let counts = visible.views.into_iter().map(|counts| PyArray1::from_vec(py, counts).into_any()).collect();
     Ok((counts, visible.points, notes))
@@ -299,9 +325,10 @@ pub fn arrays<'py>(py: Python<'py>, scene: &Scene) -> PyResult<Vec<Bound<'py, Py
 
 fn of_points(py: Python<'_>, points: Points) -> PyResult<Bound<'_, PyDict>> {
     use epsplat::low_level::scene::Colors;
-    let points = match points.colors {
-        Some(Colors::Harmonics(_)) => points.in_light(),
-        _ => points,
+    // Gaussians have sRGB codes as floats.
+    let points = match points.encoded || matches!(points.colors, Some(Colors::Harmonics(_))) {
+        true => points.in_light(),
+        false => points,
     };
     let (all, rows) = (PyDict::new(py), points.positions.len());
     all.set_item("positions", PyArray1::from_vec(py, points.positions.into_flattened()).reshape([rows, 3])?)?;
@@ -340,7 +367,7 @@ fn of_points(py: Python<'_>, points: Points) -> PyResult<Bound<'_, PyDict>> {
 pub fn write(py: Python<'_>, scene: &Scene, output: PathBuf, progress: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
     let from = scene.scene.clone();
     run(py, progress, |progress| {
-        ply::check_extension(&output)?;
+        check_output(&from, &output)?;
         match &inputs(&from, progress)?[..] {
             [points] => ply::write_points(&output, points, progress),
             _ => Err(Error::Usage("one input is written at a time: make surfels of all of them first".into())),

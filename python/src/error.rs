@@ -1,5 +1,7 @@
 //! Errors of the library as exceptions. Their classes are in `epsplat/_errors.py`.
 
+use std::io::ErrorKind;
+
 use epsplat::Error;
 use pyo3::prelude::*;
 
@@ -19,7 +21,8 @@ fn class(error: &Error) -> &'static str {
 
 /// Returns the exception of an error, with the command line's sentence.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
-    named(py, class(error), &error.to_string())
+    let is_missing = matches!(error, Error::Read { source, .. } if source.kind() == ErrorKind::NotFound);
+    named(py, if is_missing { "MissingFileError" } else { class(error) }, &error.to_string())
 }
 
 /// Returns an exception of unusable arguments.

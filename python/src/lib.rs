@@ -24,7 +24,7 @@ mod _epsplat {
     #[pymodule_export]
     use crate::images::{encode, save};
     #[pymodule_export]
-    use crate::renderer::Renderer;
+    use crate::renderer::{OfMap, Renderer};
     #[pymodule_export]
     use crate::research::{compare, study};
     #[pymodule_export]

@@ -3,7 +3,7 @@
 
 use clap::builder::ArgAction;
 use clap::{Arg, Args, Command, Parser};
-use epsplat::options::Replacement;
+use epsplat::options::{LimitOptions, Replacement};
 use epsplat::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyString};
@@ -30,6 +30,8 @@ pub enum Scope {
     Scene,
     Renderer,
     View,
+    /// Functions that make surfels.
+    Limits,
 }
 
 /// Options of the camera that a renderer takes for all its views.
@@ -43,6 +45,7 @@ impl Scope {
             Self::Scene => "Scene and read",
             Self::Renderer => "Renderer",
             Self::View => "View and look_at",
+            Self::Limits => "surfels and lod",
         }
     }
 
@@ -61,6 +64,7 @@ impl Scope {
                     .collect()
             }
             Self::View => all(CameraOptions::augment_args(command)),
+            Self::Limits => all(LimitOptions::augment_args(command)),
         }
     }
 }
@@ -102,7 +106,7 @@ pub fn arguments(scope: Scope, keywords: &Bound<'_, PyDict>) -> PyResult<Vec<Str
 
 /// Appends the arguments that give `arg` its value.
 fn push(arg: &Arg, value: &Bound<'_, PyAny>, arguments: &mut Vec<String>) -> PyResult<()> {
-    let long = arg.get_long().unwrap_or_default();
+    let (long, value) = (arg.get_long().unwrap_or_default(), &plain(value)?);
     let bare =
         matches!(arg.get_action(), ArgAction::SetTrue) || arg.get_num_args().is_some_and(|n| n.min_values() == 0);
     if let Ok(switch) = value.cast::<PyBool>()
@@ -120,7 +124,11 @@ fn push(arg: &Arg, value: &Bound<'_, PyAny>, arguments: &mut Vec<String>) -> PyR
         return Ok(());
     }
     let is_list = matches!(arg.get_action(), ArgAction::Append);
-    if let Some(items) = items(value)?.filter(|items| is_list && !items.iter().all(is_number)) {
+    let items = items(value)?;
+    if items.as_ref().is_some_and(Vec::is_empty) {
+        return Ok(());
+    }
+    if let Some(items) = items.filter(|items| is_list && !items.iter().all(is_number)) {
         for item in items {
             arguments.push(format!("--{long}={}", text(&item, ",")?));
         }
@@ -129,6 +137,12 @@ fn push(arg: &Arg, value: &Bound<'_, PyAny>, arguments: &mut Vec<String>) -> PyR
     let between = if long == "size" { "x" } else { "," };
     arguments.push(format!("--{long}={}", text(value, between)?));
     Ok(())
+}
+
+/// The value, or the number of Python in the place of one of numpy.
+fn plain<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let axes = value.getattr_opt("ndim")?.and_then(|axes| axes.extract::<usize>().ok());
+    if axes == Some(0) { value.call_method0("tolist") } else { Ok(value.clone()) }
 }
 
 fn is_number(value: &Bound<'_, PyAny>) -> bool {
@@ -142,7 +156,7 @@ fn items<'py>(value: &Bound<'py, PyAny>) -> PyResult<Option<Vec<Bound<'py, PyAny
     }
     let value = if value.hasattr("tolist")? { value.call_method0("tolist")? } else { value.clone() };
     match value.try_iter() {
-        Ok(items) => items.collect::<PyResult<Vec<_>>>().map(Some),
+        Ok(items) => items.map(|item| plain(&item?)).collect::<PyResult<Vec<_>>>().map(Some),
         Err(_) => Ok(None),
     }
 }

@@ -1,9 +1,12 @@
 //! Renderers, which keep surfels, buffers and kernels from call to call.
 
 use std::num::NonZeroU32;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::thread;
+use std::time::Duration;
 
-use epsplat::{Camera, CameraOptions, DeviceOptions, Error, Progress, RenderOptions, Renderer as Kept, Result};
+use epsplat::io::place::Place;
+use epsplat::{Camera, CameraOptions, DeviceOptions, Error, Map, Progress, RenderOptions, Renderer as Kept, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -13,6 +16,10 @@ use crate::scene::Scene;
 use crate::stack::Stack;
 use crate::task::run;
 use crate::view::View;
+
+/// The place of a map on the earth, for files of it.
+#[pyclass(frozen, module = "epsplat._epsplat")]
+pub struct OfMap(pub Place);
 
 /// A renderer of one scene with one set of options.
 #[pyclass(frozen, module = "epsplat._epsplat")]
@@ -69,7 +76,8 @@ impl Renderer {
         let (stack, notes) = run(py, progress, |progress| {
             self.with(progress, |kept| {
                 let views = of_one_size(kept, views)?;
-                let mut stack = Stack::of(views.len());
+                let size = views.first().map_or(Ok([0; 2]), |view| kept.camera(view).map(|camera| size(&camera)))?;
+                let mut stack = Stack::of(views.len(), size, self.maps())?;
                 for view in &views {
                     stack.push(kept.frame(view, progress)?);
                 }
@@ -102,21 +110,24 @@ impl Renderer {
         let (made, notes) = run(py, progress, |progress| {
             self.with(progress, |kept| {
                 let grid = kept.grid(&options)?;
-                let mut stack = Stack::of(1);
+                let mut stack = Stack::of(1, [grid.columns.into(), grid.rows.into()], self.maps())?;
                 let survey = kept.map(&grid, progress, |band| {
                     stack.append(band);
                     Ok(())
                 })?;
-                stack.surveyed(&survey);
-                Ok((stack, grid))
+                // Maps may be larger than any camera's image.
+                stack.surveyed(&survey, grid.camera(0..grid.columns, 0..grid.rows).ok());
+                let keys = self.scene.files().geo_keys()?;
+                Ok((stack, Place { left: grid.left, top: grid.top, pixel: grid.pixel, keys: keys.unwrap_or_default() }))
             })
         })?;
-        let (stack, grid) = made;
+        let (stack, place) = made;
         let result = stack.into_arrays(py)?;
         result.set_item("notes", notes)?;
-        result.set_item("left", grid.left)?;
-        result.set_item("top", grid.top)?;
-        result.set_item("pixel", grid.pixel)?;
+        result.set_item("left", place.left)?;
+        result.set_item("top", place.top)?;
+        result.set_item("pixel", place.pixel)?;
+        result.set_item("place", OfMap(place))?;
         Ok(result)
     }
 
@@ -128,6 +139,11 @@ impl Renderer {
     }
 }
 
+/// Columns and rows of a picture.
+fn size(camera: &Camera) -> [u64; 2] {
+    [camera.width.into(), camera.height.into()]
+}
+
 /// Returns the cameras of several views, so that their sizes can be compared before the first one
 /// is rendered. A single view stays as it is, and describes itself in a note.
 fn of_one_size(kept: &Kept, views: Vec<epsplat::View>) -> Result<Vec<epsplat::View>> {
@@ -135,9 +151,8 @@ fn of_one_size(kept: &Kept, views: Vec<epsplat::View>) -> Result<Vec<epsplat::Vi
         return Ok(views);
     }
     let cameras: Vec<Camera> = views.iter().map(|view| kept.camera(view)).collect::<Result<_>>()?;
-    let size = |camera: &Camera| (camera.width, camera.height);
     if let Some(other) = cameras.iter().find(|camera| size(camera) != size(&cameras[0])) {
-        let ((w, h), (ow, oh)) = (size(&cameras[0]), size(other));
+        let ([w, h], [ow, oh]) = (size(&cameras[0]), size(other));
         return Err(Error::Usage(format!(
             "the views have different sizes, {w}x{h} and {ow}x{oh}: render those of one size together"
         )));
@@ -146,10 +161,29 @@ fn of_one_size(kept: &Kept, views: Vec<epsplat::View>) -> Result<Vec<epsplat::Vi
 }
 
 impl Renderer {
+    /// The maps of each picture.
+    fn maps(&self) -> impl Iterator<Item = Map> {
+        self.options.maps.aov.iter().copied()
+    }
+
+    /// Waits until no other thread has the renderer, or until this call is stopped.
+    fn locked(&self, progress: &dyn Progress) -> MutexGuard<'_, Option<Kept>> {
+        loop {
+            match self.kept.try_lock() {
+                Ok(place) => return place,
+                Err(TryLockError::Poisoned(error)) => return error.into_inner(),
+                Err(TryLockError::WouldBlock) => {
+                    progress.advance(0);
+                    thread::sleep(Duration::from_millis(1));
+                }
+            }
+        }
+    }
+
     /// Calls `work` with the library's renderer, which is made if there is none. Other threads wait
     /// meanwhile.
     fn with<T>(&self, progress: &dyn Progress, work: impl FnOnce(&mut Kept) -> Result<T>) -> Result<T> {
-        let mut place = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut place = self.locked(progress);
         // Work that is stopped unwinds from here, and leaves no renderer in an unknown state.
         let mut kept = match place.take() {
             Some(kept) => kept,

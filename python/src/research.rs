@@ -11,7 +11,7 @@ use epsplat::low_level::report;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::exception;
+use crate::error::{exception, usage};
 use crate::images::frame;
 use crate::task::run;
 
@@ -41,6 +41,9 @@ pub fn study(
     out: Option<PathBuf>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String, Vec<String>, Vec<String>)> {
+    if runs.is_some_and(|runs| !(1..=10_000).contains(&runs)) {
+        return Err(usage(py, "runs lie between 1 and 10000"));
+    }
     let ((study, failures), notes) = run(py, progress, |progress| {
         let mut definition = Definition::read(&path)?;
         if quick {

@@ -2,18 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use epsplat::{Camera, Frame, Map, Picture, Survey};
+use epsplat::{Camera, Frame, Map, Picture, Result, Survey};
 use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::view::arrays;
+use crate::arrays::check_memory;
+use crate::view::{View, arrays};
 
 /// Pictures of one size.
 #[derive(Default)]
 pub struct Stack {
     /// The number of pictures that are to come.
     count: usize,
+    /// The number of their pixels.
+    pixels: usize,
     width: u32,
     height: u32,
     color: Vec<f32>,
@@ -26,9 +29,17 @@ pub struct Stack {
 }
 
 impl Stack {
-    /// A stack for this many pictures.
-    pub fn of(count: usize) -> Self {
-        Self { count, ..Self::default() }
+    /// A stack for this many pictures of a size, with these maps.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::NoMemory`](epsplat::Error::NoMemory) if the system has less memory than they need.
+    pub fn of(count: usize, [width, height]: [u64; 2], maps: impl IntoIterator<Item = Map>) -> Result<Self> {
+        let pixels = (count as u64).saturating_mul(width.saturating_mul(height));
+        let values = 4 + maps.into_iter().map(|map| map.width() as u64).sum::<u64>();
+        let what = if count == 1 { "a picture".into() } else { format!("{count} pictures") };
+        check_memory(&format!("{what} of {width}x{height}"), pixels.saturating_mul(4 * values))?;
+        Ok(Self { count, pixels: usize::try_from(pixels).unwrap_or(usize::MAX), ..Self::default() })
     }
 
     /// Adds a picture.
@@ -46,14 +57,15 @@ impl Stack {
     pub fn append(&mut self, frame: Frame) {
         (self.width, self.height) = (frame.width, self.height + frame.height);
         let (color, maps) = frame.into_values();
-        joined(&mut self.color, color.into_flattened(), self.count);
+        joined(&mut self.color, color.into_flattened(), 4 * self.pixels);
         for (map, values) in maps {
-            joined(self.maps.entry(map).or_default(), values, self.count);
+            joined(self.maps.entry(map).or_default(), values, map.width() * self.pixels);
         }
     }
 
-    /// Adds the report of a map.
-    pub fn surveyed(&mut self, survey: &Survey) {
+    /// Adds the report of a map, and its camera if there is one.
+    pub fn surveyed(&mut self, survey: &Survey, camera: Option<Camera>) {
+        self.cameras.extend(camera);
         self.reports.push(serde_json::to_string(&survey.report).unwrap_or_default());
         self.unseen.push(survey.unseen.as_ref().map(|unseen| unseen.sentence()));
     }
@@ -61,7 +73,7 @@ impl Stack {
     /// Returns `color` (C, H, W, 4) and the maps (C, H, W) or (C, H, W, K) as arrays, with the
     /// cameras' matrices, the reports and the sentences about empty pictures.
     pub fn into_arrays(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-        let Self { count, width, height, color, maps, cameras, reports, unseen } = self;
+        let Self { count, width, height, color, maps, cameras, reports, unseen, .. } = self;
         let size = [count, height as usize, width as usize];
         let result = PyDict::new(py);
         result.set_item("color", shaped(py, color, size, 4)?)?;
@@ -78,6 +90,9 @@ impl Stack {
         let (poses, intrinsics) = arrays(py, &cameras)?;
         result.set_item("maps", arrays_of_maps)?;
         result.set_item("viewmats", poses)?;
+        let views = cameras.into_iter().enumerate();
+        let views = views.map(|(index, camera)| View::known(camera.into(), format!("of picture {index}")));
+        result.set_item("views", views.collect::<Vec<_>>())?;
         result.set_item("Ks", intrinsics)?;
         result.set_item("reports", reports)?;
         result.set_item("unseen", unseen)?;
@@ -85,11 +100,11 @@ impl Stack {
     }
 }
 
-/// Appends values, without a copy if they are all.
+/// Appends values to those that will be `count`, without a copy if these are all.
 fn joined(all: &mut Vec<f32>, values: Vec<f32>, count: usize) {
     if all.is_empty() {
         *all = values;
-        all.reserve_exact(all.len() * count.saturating_sub(1));
+        all.reserve_exact(count.saturating_sub(all.len()));
     } else {
         all.extend(values);
     }

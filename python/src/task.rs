@@ -4,7 +4,7 @@
 use std::any::Any;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -51,6 +51,8 @@ impl Shared {
         }
         let (events, _) = &mut *self.lock();
         match (events.back_mut(), event) {
+            // A look at whether to stop.
+            (_, Event::Advance(0)) => {}
             (Some(Event::Advance(done)), Event::Advance(more)) => *done += more,
             (_, event) => events.push_back(event),
         }
@@ -117,6 +119,23 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
     format!("the library failed unexpectedly: {text}")
 }
 
+/// The process whose threads work; 0 before the first call.
+static OWNER: AtomicU32 = AtomicU32::new(0);
+
+/// Fails in a process that was forked from one that worked: it has none of the threads.
+fn check_process(py: Python<'_>) -> PyResult<()> {
+    let own = std::process::id();
+    match OWNER.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+        Err(owner) if owner != own => Err(named(
+            py,
+            "DeviceError",
+            "this process was forked from one that used epsplat, and has none of its threads: start processes by \
+             multiprocessing's method spawn or forkserver",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Runs `work` and returns its result and its notes.
 ///
 /// # Errors
@@ -127,6 +146,7 @@ pub fn run<T: Send>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&dyn Progress) -> epsplat::Result<T> + Send,
 ) -> PyResult<(T, Vec<String>)> {
+    check_process(py)?;
     let shared = Shared::default();
     let (mut notes, mut failed) = (Vec::new(), None);
     let outcome = thread::scope(|scope| {

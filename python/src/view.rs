@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use epsplat::glam::{DMat3, DVec3};
-use epsplat::io::camera::{CameraFile, Pose};
+use epsplat::io::camera::{self, CameraFile, Pose};
 use epsplat::io::cameras;
 use epsplat::{CameraOptions, Lens};
 use numpy::{PyArray1, PyArrayMethods};
@@ -13,12 +13,14 @@ use pyo3::types::PyDict;
 use crate::arrays::wide;
 use crate::error::{exception, usage};
 use crate::options::{Scope, arguments, parsed};
+use crate::task::run;
 
 /// A view before the renderer's size is known.
 #[derive(Clone)]
 enum Kind {
     Options(Box<CameraOptions>),
-    File(Box<CameraFile>),
+    /// A camera of a file or of matrices, with the size and near depth that options give.
+    File(Box<CameraFile>, Box<CameraOptions>),
     Known(Box<epsplat::View>),
 }
 
@@ -38,16 +40,25 @@ impl View {
     fn of_options(py: Python<'_>, keywords: &Bound<'_, PyDict>) -> PyResult<Self> {
         let arguments = arguments(Scope::View, keywords)?;
         let options = parsed(py, &arguments)?.camera;
+        let kind = match &options.file {
+            Some(path) => {
+                let (file, _) = run(py, None, |_| camera::read(path))?;
+                Kind::File(Box::new(file), Box::new(options))
+            }
+            None => Kind::Options(Box::new(options)),
+        };
+        let made = Self { kind, name: arguments.join(" ") };
         // Finds faults before a renderer takes the view.
-        epsplat::View::new(&options).map_err(|error| exception(py, &error))?;
-        Ok(Self { kind: Kind::Options(Box::new(options)), name: arguments.join(" ") })
+        made.with(&CameraOptions::default()).map_err(|error| exception(py, &error))?;
+        Ok(made)
     }
 
-    /// The views of world-to-camera matrices (C, 3 or 4 rows of 4, joined) and intrinsics (C, 9).
+    /// The views of world-to-camera matrices (C, 16) and intrinsics (C, 9), row after row.
     #[staticmethod]
     fn of_matrices(py: Python<'_>, poses: &Bound<'_, PyAny>, intrinsics: &Bound<'_, PyAny>) -> PyResult<Vec<Self>> {
-        let poses = wide::<16>("viewmats", poses, None)?;
-        let intrinsics = wide::<9>("Ks", intrinsics, Some(poses.len()))?;
+        let failed = |error| exception(py, &error);
+        let poses = wide::<16>("viewmats", poses, None).map_err(failed)?;
+        let intrinsics = wide::<9>("Ks", intrinsics, Some(poses.len())).map_err(failed)?;
         poses.iter().zip(&intrinsics).enumerate().map(|(index, (pose, k))| matrices(py, index, pose, k)).collect()
     }
 
@@ -60,7 +71,10 @@ impl View {
         scale: Option<f64>,
         pinholes: bool,
     ) -> PyResult<Vec<Self>> {
-        let named = cameras::read(&path, size).map_err(|error| exception(py, &error))?;
+        if scale.is_some_and(|factor| !(factor.is_finite() && factor > 0.0)) {
+            return Err(usage(py, "scale: a factor is a positive number"));
+        }
+        let (named, _) = run(py, None, |_| cameras::read(&path, size))?;
         let view = |camera: cameras::NamedCamera| {
             if let (Some(model), false) = (camera.undrawn, pinholes) {
                 let what = format!(
@@ -73,7 +87,7 @@ impl View {
             }
             let pinhole = camera.camera.as_pinhole().filter(|_| pinholes);
             let file = pinhole.unwrap_or(camera.camera).scaled(scale.unwrap_or(1.0));
-            Ok(Self { kind: Kind::File(Box::new(file)), name: camera.name })
+            Ok(Self { kind: Kind::File(Box::new(file), Box::default()), name: camera.name })
         };
         named.into_iter().map(view).collect()
     }
@@ -95,19 +109,20 @@ impl View {
         match &self.kind {
             Kind::Options(options) => {
                 let options = CameraOptions {
-                    size: options.size.or(all.size.filter(|_| options.file.is_none())),
+                    size: options.size.or(all.size),
                     near: options.near.or(all.near),
                     ..(**options).clone()
                 };
                 epsplat::View::new(&options)
             }
-            Kind::File(file) => {
+            Kind::File(file, options) => {
                 let options = CameraOptions {
-                    size: all.size.filter(|_| file.size.is_none()),
-                    near: all.near,
-                    ..CameraOptions::default()
+                    size: options.size.or(all.size.filter(|_| file.size.is_none())),
+                    near: options.near.or(all.near.filter(|_| file.near.is_none())),
+                    ..(**options).clone()
                 };
-                epsplat::View::of_file(&options, (**file).clone(), Path::new(&self.name), None)
+                let path = options.file.as_deref().unwrap_or(Path::new(&self.name));
+                epsplat::View::of_file(&options, (**file).clone(), path, None)
             }
             Kind::Known(view) => Ok((**view).clone()),
         }
@@ -151,7 +166,7 @@ fn matrices(py: Python<'_>, index: usize, pose: &[f64; 16], k: &[f64; 9]) -> PyR
     }
     let lens = Lens::Intrinsics([k[0], k[4], k[2], k[5]]);
     let file = CameraFile { size: None, lens, pose: Pose::Rigid(rotation, eye), near: None };
-    Ok(View { kind: Kind::File(Box::new(file)), name })
+    Ok(View { kind: Kind::File(Box::new(file), Box::default()), name })
 }
 
 /// Returns the matrices of cameras: world-to-camera (C, 4, 4) and intrinsics (C, 3, 3).

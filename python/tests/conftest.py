@@ -1,4 +1,4 @@
-"""What the tests share: models of the repository, and its program."""
+"""Fixtures of all tests: models of the repository, and its program."""
 
 import json
 import os

@@ -34,7 +34,11 @@ def array(draw, rows, tail):
             values = np.asarray(values.astype(dtype))
         except (TypeError, ValueError, OverflowError):
             return values
-    kind = draw.integers(7)
+    kind = draw.integers(8)
+    if kind == 7 and values.dtype.kind in "iuf" and values.ndim:
+        record = np.zeros(len(values), [("flag", "u1"), ("values", values.dtype, values.shape[1:])])
+        record["values"] = values
+        return record["values"]
     if kind == 0 and values.ndim:
         return values[::-1]
     if kind == 1:

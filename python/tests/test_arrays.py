@@ -1,6 +1,9 @@
 """Arrays in, arrays out."""
 
 import array as buffers
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -33,7 +36,15 @@ def test_any_memory_gives_the_same_bits(sphere):
         def __dlpack_device__(self):
             return narrow.__dlpack_device__()
 
+    # Rows of 22 bytes, and numbers at odd addresses.
+    packed = np.zeros(5000, [("xyz", "f4", 3), ("i", "f4"), ("ring", "u2"), ("t", "f4")])
+    packed["xyz"] = narrow
+    odd = np.zeros(5000, [("flag", "u1"), ("xyz", "f8", 3)])
+    odd["xyz"] = narrow
     kinds = {
+        "packed records": packed["xyz"],
+        "odd addresses": odd["xyz"],
+        "masked, but nowhere": np.ma.masked_array(narrow, mask=np.zeros_like(narrow, bool)),
         "f64": narrow.astype(np.float64),
         "other byte order": narrow.astype(">f4"),
         "columns first": np.asfortranarray(narrow),
@@ -76,6 +87,10 @@ def test_codes_are_srgb_and_floats_are_linear(sphere):
     assert abs(color(codes)[0] - 0.503) < 1e-3
     assert abs(color(np.full((5000, 3), 0.25))[1] - 0.25) < 1e-6
     assert abs(color(np.full((5000, 4), 0.25, np.float32))[1] - 0.25) < 1e-6
+    # Fields of packed records too.
+    rows = np.zeros(5000, [("x", "u1"), ("rgb", "u1", 3), ("light", "f4", 3)])
+    rows["rgb"], rows["light"] = 188, 0.25
+    assert abs(color(rows["rgb"])[0] - 0.503) < 1e-3 and abs(color(rows["light"])[1] - 0.25) < 1e-6
 
 
 def test_given_sizes_and_normals_are_used(sphere):
@@ -113,7 +128,13 @@ BAD = {
     "half-axes of two": dict(positions=GOOD, half_axes=GOOD),
     "colours of five": dict(positions=GOOD, colors=np.zeros((N, 5))),
     "colours of text": dict(positions=GOOD, colors="red"),
+    "colours of 16 bits": dict(positions=GOOD, colors=np.full((N, 3), 65535, np.uint16)),
+    "colours of int64": dict(positions=GOOD, colors=[[255, 0, 0]] * N),
     "alpha of one": dict(positions=GOOD, alpha=[1.0]),
+    "alpha of codes": dict(positions=GOOD, alpha=np.full(N, 255, np.uint8)),
+    "masked": dict(positions=np.ma.masked_greater(GOOD, 7.0)),
+    "a filter of files": dict(positions=GOOD, where="Z[:1]"),
+    "classes of files": dict(positions=GOOD, classes="2"),
     "triangles of floats": dict(positions=GOOD, triangles=[[0.0, 1.0, 2.0]]),
     "triangles out of range": dict(positions=GOOD, triangles=[[0, 1, 5]]),
     "triangles below zero": dict(positions=GOOD, triangles=[[0, 1, -1]]),
@@ -131,11 +152,54 @@ def test_bad_arrays_are_one_exception(arguments):
 
 
 def test_more_points_than_memory_are_refused():
-    for dtype in [np.float32, np.float64, np.uint16, np.dtype(">f4")]:
-        claimed = np.broadcast_to(np.zeros((1, 3), dtype), (2**36, 3))
+    def claimed(dtype, rows):
+        return np.broadcast_to(np.zeros((1, 3), dtype), (rows, 3))
+
+    # Of other types a copy is needed at once.
+    for dtype in [np.uint16, np.dtype(">f4")]:
         with pytest.raises(epsplat.NoMemoryError, match="MiB") as error:
-            epsplat.Scene(claimed)
+            epsplat.Scene(claimed(dtype, 2**36))
         assert isinstance(error.value, MemoryError)
+    for dtype in [np.float32, np.float64]:
+        with pytest.raises(epsplat.UsageError, match="4294967295"):
+            epsplat.Scene(claimed(dtype, 2**36))
+        scene = epsplat.Scene(claimed(dtype, 2**32 - 1))
+        with pytest.raises(epsplat.NoMemoryError, match="MiB"):
+            epsplat.Renderer(scene, 64, 48, backend="reference")
+    with pytest.raises(epsplat.NoMemoryError, match="triangles"):
+        epsplat.Scene(GOOD, triangles=claimed(np.int64, 2**36))
+
+
+def test_pictures_that_memory_cannot_hold_are_refused(reference):
+    views = reference.turntable(1000, size=(8192, 8192))
+    with pytest.raises(epsplat.NoMemoryError, match="1000 pictures of 8192x8192"):
+        reference.render(views)
+    assert np.isfinite(reference.render().depth).any()
+
+
+def test_a_scene_shares_the_memory_of_its_arrays():
+    """Neither float32 nor float64 is copied."""
+    program = """
+import epsplat, numpy as np
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096
+draw = np.random.default_rng(1)
+normals = draw.normal(size=(1_000_000, 3)).astype(np.float32)
+radii = np.full(1_000_000, 0.001, np.float32)
+# The first scene loads code.
+scenes = [epsplat.Scene(normals[:9])]
+for positions in (normals, normals.astype(np.float64)):
+    own = resident()
+    scenes.append(epsplat.Scene(positions, normals=normals, radii=radii))
+    print((resident() - own) / 1e6)
+"""
+    if not os.path.exists("/proc/self/statm"):
+        pytest.skip("the system tells no resident memory by /proc")
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    bytes_a_point = [float(line) for line in done.stdout.split()]
+    # A copy of positions would have 12 bytes or more.
+    assert len(bytes_a_point) == 2 and max(bytes_a_point) < 1, bytes_a_point
 
 
 def test_points_that_are_not_finite_are_left_out_and_counted(sphere):

@@ -27,7 +27,7 @@ def test_a_wrong_option_is_refused_with_the_sentence_of_the_command_line(sphere)
 
 
 def test_a_missing_file_is_an_os_error():
-    with pytest.raises(OSError, match="cannot read"):
+    with pytest.raises(FileNotFoundError, match="cannot read"):
         epsplat.read("no such file.ply")
     with pytest.raises(epsplat.FileError):
         epsplat.read(pathlib.Path("no such file.ply"))
@@ -58,6 +58,9 @@ def test_values_of_all_kinds_are_understood(sphere):
     assert frames.color.shape == (1, 24, 32, 4) and sorted(frames.maps) == ["depth", "normal"]
     assert np.allclose(frames.color[0, 0, 0], [1.0, 0.5, 0.25, 1.0])
     assert frames.maps["normal"].shape == (1, 24, 32, 3)
+    more = dict(legend=np.False_, light=list(np.float32([1, 1, 1])), aov=[], samples=np.array(1))
+    plain = epsplat.Renderer(scene, 32, 24, backend="reference", **more).render()
+    assert plain.maps == {}
 
 
 def test_repr_says_what_it_is(sphere, reference):

@@ -55,6 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(parts.iter().map(Source::other), [output].into_iter().chain(&file.json))?;
     let read = parts.iter().map(|path| Part::read(path)).collect::<Result<Vec<_>>>()?;
     let part = merge(&read)?;
+    if part.adapters().len() > 1 {
+        let adapters = part.adapters().join(", ");
+        note(&format!("several adapters drew the parts, and their bits may differ: {adapters}"));
+    }
     if output.extension().is_some_and(|extension| extension == "part") {
         if file.format.is_some() || file.depth_scale.is_some() || file.json.is_some() {
             let what = "a file of parts is no picture: leave --format, --depth-scale and --json out, or name an image";

@@ -90,9 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut options = RenderOptions::default();
     options.surface.epsilon = arguments.epsilon;
     let visible = scene.visible(&views, &options, &arguments.device, &bars).map_err(|error| files.named(error))?;
-    let (points, counts) = visible.of_points(scene.points(), arguments.least)?;
+    let inputs = scene.points(&bars)?;
+    let (points, counts) = visible.of_points(&inputs, arguments.least)?;
     ply::write_points_with(&arguments.output, &points, &[Column { name: "views", values: &counts }], &bars)?;
-    let all: usize = scene.points().iter().map(|points| points.positions.len()).sum();
+    let all: usize = inputs.iter().map(|points| points.positions.len()).sum();
     if visible.points.iter().all(|count| *count == 0) {
         note("warning: no view sees any of the points: the cameras may have other coordinates, or look elsewhere");
     }

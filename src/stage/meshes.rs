@@ -139,7 +139,7 @@ impl Meshes {
             }
             _ => {}
         }
-        let first = request.files().paths().len().max(request.scene.given.len()) as u32;
+        let first = request.scene.count() as u32;
         self.numbers.extend((first..).take(named.len()));
         self.meshes.append(&mut named);
         self.paths.append(&mut paths);

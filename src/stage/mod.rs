@@ -10,6 +10,7 @@ mod ahead;
 mod coloring;
 mod encode;
 mod files;
+mod given;
 mod heights;
 mod in_part;
 mod lens;
@@ -29,11 +30,13 @@ mod view;
 mod visible;
 mod whole;
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use self::files::Files;
+pub use self::given::Given;
 pub use self::in_part::ReadReport;
 #[cfg(feature = "parts")]
 pub use self::machines::{Merged, Part, merge};
@@ -63,7 +66,7 @@ pub struct Scene(Arc<Inputs>);
 struct Inputs {
     files: Files,
     /// Points that are in memory, in place of files.
-    given: Vec<Points>,
+    given: Option<Box<dyn Given>>,
     options: SceneOptions,
     /// The surfels and triangles that were made last, and the choices that they depend on.
     made: Mutex<Option<(Making, Arc<Whole>)>>,
@@ -124,7 +127,21 @@ impl Scene {
     /// Makes a scene of points in memory. The points stay in memory in addition to the surfels made
     /// of them.
     pub fn from_points(points: Vec<Points>, options: &SceneOptions) -> Self {
-        Self(Arc::new(Inputs { given: points, options: options.clone(), ..Inputs::default() }))
+        Self::from_given(points, options)
+    }
+
+    /// Makes a scene of points that are taken from `given` whenever surfels are made of them.
+    pub fn from_given(given: impl Given + 'static, options: &SceneOptions) -> Self {
+        Self(Arc::new(Inputs { given: Some(Box::new(given)), options: options.clone(), ..Inputs::default() }))
+    }
+
+    /// Returns the points in memory, one entry for each input; empty for a scene of files.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`Given::points`].
+    pub fn points(&self, progress: &dyn Progress) -> Result<Cow<'_, [Points]>> {
+        self.0.given.as_ref().map_or(Ok(Cow::Borrowed(&[])), |given| given.points(progress))
     }
 
     /// The files of the scene, including those found in folders.
@@ -143,6 +160,13 @@ struct Request<'a> {
     views: bool,
     /// Gets the points of the inputs once they are read.
     read: Option<&'a ahead::Read<'a>>,
+}
+
+impl Inputs {
+    /// The number of files, or of inputs in memory.
+    fn count(&self) -> usize {
+        self.given.as_ref().map_or(self.files.paths().len(), |given| given.inputs())
+    }
 }
 
 impl Request<'_> {
@@ -176,8 +200,8 @@ impl Request<'_> {
     }
 
     fn uncolored(&self, progress: &dyn Progress) -> Result<Vec<Points>> {
-        if self.files().paths().is_empty() {
-            return Ok(self.scene.given.clone());
+        if let Some(given) = &self.scene.given {
+            return given.points(progress).map(Cow::into_owned);
         }
         let pipe = self.files().paths().iter().any(|path| path.as_os_str() == "-");
         if pipe && self.scene.pipe_read.swap(true, Ordering::Relaxed) {

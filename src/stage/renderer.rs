@@ -141,7 +141,7 @@ impl Renderer {
         options.research.sources = sources;
         let request = Request { scene: &inputs, options: &options, device: &device, views, read: None };
         let settings = request.settings()?;
-        if options.surface.separate && inputs.files.paths().len().max(inputs.given.len()) < 2 {
+        if options.surface.separate && inputs.count() < 2 {
             progress.note(
                 "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
             );

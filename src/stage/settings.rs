@@ -98,7 +98,7 @@ impl Request<'_> {
     }
 
     fn settled(&self, gaussians: bool) -> Result<Settings> {
-        let one_input = self.files().paths().len() < 2 && self.scene.given.len() < 2;
+        let one_input = self.scene.count() < 2;
         // Unlit, the colours of an attribute are those of its legend.
         let shading = self.scene.options.colors.is_given().then_some(Shading::Unlit);
         let suggested = Suggested { gaussians, shading, views: self.views, one_input };

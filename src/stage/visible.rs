@@ -24,11 +24,6 @@ pub struct Visible {
 }
 
 impl Scene {
-    /// Returns the points in memory, one entry for each input; empty for a scene of files.
-    pub fn points(&self) -> &[Points] {
-        &self.0.given
-    }
-
     /// Counts the views that see each point of a scene in memory ([`Scene::from_points`]).
     ///
     /// A view sees a point that lies in its image if no surface lies in front of it by more than
@@ -47,7 +42,8 @@ impl Scene {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Visible> {
-        if self.points().is_empty() {
+        let points = self.points(progress)?;
+        if points.is_empty() {
             let what = "points that views see are found in memory: read the files and make a scene of their points";
             return Err(Error::Usage(what.into()));
         }
@@ -55,8 +51,8 @@ impl Scene {
         options.maps.aov = vec![Map::Depth];
         options.look.samples = Some(Samples::ONE);
         let mut renderer = Renderer::of_views(self, &options, device, progress)?;
-        let own = own_surfels(self.points(), renderer.scene());
-        let empty = self.points().iter().map(|points| vec![0; points.positions.len()]).collect();
+        let own = own_surfels(&points, renderer.scene());
+        let empty = points.iter().map(|points| vec![0; points.positions.len()]).collect();
         let mut visible = Visible { views: empty, points: Vec::with_capacity(views.len()) };
         progress.begin("looking at points", views.len() as u64);
         for view in views {
@@ -65,7 +61,7 @@ impl Scene {
             let epsilon = renderer.settings().epsilon;
             let depths = picture.frame.map(Map::Depth).unwrap_or_default();
             let eye = Eye { camera: &picture.camera, depths, epsilon };
-            let inputs = self.points().iter().zip(&own).zip(&mut visible.views);
+            let inputs = points.iter().zip(&own).zip(&mut visible.views);
             let seen = inputs.map(|((points, own), counts)| eye.count(points, (scene, own), counts));
             visible.points.push(seen.sum());
             progress.advance(1);

@@ -33,7 +33,7 @@ impl Renderer {
         let Backend::Gpu { gpu, .. } = self.backend() else {
             return Err(Error::Usage("parts are drawn by an adapter, and there is none: `epsplat adapters`".into()));
         };
-        let adapter = format!("{} ({})", gpu.adapter.name, gpu.adapter.api);
+        let adapters = vec![format!("{} ({})", gpu.adapter.name, gpu.adapter.api)];
         let settings = self.settings().clone();
         let facts = Facts::of(&scene);
         check::files_of_parts(&facts, &settings)?;
@@ -42,7 +42,7 @@ impl Renderer {
         let own = own_digest(&scene, share, &subject, &settings);
         let holds = if within.is_some() { Holds::Sums } else { Holds::Depths };
         let (of, shares) = (share.of(), vec![share.number()]);
-        let header = Header { holds, of, shares, own, within: None, adapter, subject };
+        let header = Header { holds, of, shares, own, within: None, adapters, subject };
         let kept = Kept::default();
         let draw = |exchange: &dyn Exchange| {
             let source = ShareOfScene::new(scene.clone(), share);

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::plan::{Facts, Settings};
+use crate::scene::camera::check_size;
+use crate::scene::share::MOST_SHARES;
 use crate::scene::{Camera, Maps};
 
 /// What the values of a part are.
@@ -52,8 +54,8 @@ pub(super) struct Header {
     pub own: u64,
     /// The digest of the nearest depths within which sums were made.
     pub within: Option<u64>,
-    /// The adapter that drew the part.
-    pub adapter: String,
+    /// The adapters that drew the shares, in order, each once.
+    pub adapters: Vec<String>,
     pub subject: Subject,
 }
 
@@ -90,9 +92,11 @@ impl Header {
         let header: Self = ciborium::from_reader(bytes).map_err(|_| other("of another build"))?;
         let in_order = header.shares.is_sorted_by(|one, next| one < next);
         let known = header.shares.iter().all(|share| (1..=header.of).contains(share));
-        match in_order && known && !header.shares.is_empty() {
+        let Camera { width, height, .. } = header.subject.camera;
+        let some = !header.shares.is_empty() && header.of <= MOST_SHARES && check_size(width, height).is_ok();
+        match in_order && known && some {
             true => Ok(header),
-            false => Err("its header names shares that no scene has: draw the part again".into()),
+            false => Err("its header names shares or a size that no picture has: draw the part again".into()),
         }
     }
 

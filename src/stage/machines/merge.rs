@@ -1,6 +1,6 @@
 //! Joins the parts of several processes, and makes the picture of all.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::Path;
 
@@ -35,6 +35,24 @@ pub struct Merged {
 /// Joins parts of one picture that hold the same kind of values; the order does not matter. Some
 /// parts may still be missing: parts that were merged can be merged again.
 ///
+/// ```no_run
+/// use epsplat::low_level::scene::Share;
+/// use epsplat::{DeviceOptions, Part, RenderOptions, Renderer, Scene, SceneOptions, View, merge};
+///
+/// let (options, device) = (RenderOptions::default(), DeviceOptions::default());
+/// let scene = Scene::open(["scan.laz"], &SceneOptions::default())?;
+/// let renderer = Renderer::new(&scene, &options, &device, &())?;
+/// let pass = |within: Option<&Part>| {
+///     // Each part could be drawn by another process, and sent as part.bytes().
+///     let draw = |number| renderer.part(&View::default(), Share::new(number, 3)?, within, &());
+///     merge(&(1..=3).map(draw).collect::<Result<Vec<_>, _>>()?)
+/// };
+/// let depths = pass(None)?;
+/// let sums = pass(Some(&depths))?;
+/// let frame = sums.picture(&device, &())?.frame;
+/// # Ok::<(), epsplat::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Usage`] without parts. [`Error::Malformed`], which names the part, for a part of
 /// another scene, camera, options or number of shares, with a share that is there already, or with
@@ -57,7 +75,9 @@ pub fn merge(parts: &[Part]) -> Result<Part> {
         }
     }
     let own = parts.iter().fold(0u64, |own, part| own.wrapping_add(part.header.own));
-    let header = Header { shares: owners.into_keys().collect(), own, ..first.header.clone() };
+    let adapters: BTreeSet<&String> = parts.iter().flat_map(|part| &part.header.adapters).collect();
+    let adapters = adapters.into_iter().cloned().collect();
+    let header = Header { shares: owners.into_keys().collect(), own, adapters, ..first.header.clone() };
     let whole = header.shares.len() == header.of as usize;
     if whole && own != header.subject.digest {
         let what = "it and the other parts do not cover the scene once: draw them again from the same inputs";
@@ -154,6 +174,11 @@ impl Part {
             ));
         }
         self.check_whole()
+    }
+
+    /// The names of the adapters that drew the shares, in order, each once.
+    pub fn adapters(&self) -> &[String] {
+        &self.header.adapters
     }
 
     /// The maps of the picture, as the user asked for them.

@@ -59,13 +59,13 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let covariance = sums.covariance(lattice, scales);
     let shape = match bounds {
         NodeBounds::Rims => Shape::of(covariance, normal),
-        NodeBounds::Squares => Shape::of(sums.covariance_of_centers(lattice), normal),
+        NodeBounds::Squares | NodeBounds::Cones => Shape::of(sums.covariance_of_centers(lattice), normal),
     };
     // The normal of the half-axes as they are stored, rounded.
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
     let mean = lattice.position(sums.moments.mean());
-    let curves = *bounds == NodeBounds::Rims && sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
+    let curves = !bounds.of_squares() && sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
     let heights = if curves { curvature::heights(of, below, mean, plane) } else { curvature::FLAT };
     // A paraboloid with its apex at the mean would lie off the surface by its mean height, so the
     // apex is shifted by as much to the other side.
@@ -82,12 +82,15 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
     let lengths = [shape.s, shape.t].map(|axis| axis.length() * factor);
-    let cap = curvature::cap(heights, lengths);
+    let cap = match bounds {
+        NodeBounds::Cones if sided => curvature::cone(all.cosine, lengths),
+        _ => curvature::cap(heights, lengths),
+    };
     let ball = all.radius.max(factor + cap.highest());
     let off = OFF_CAP * curvature::off_cap(heights, [covariance, centers], plane);
     let size = match bounds {
         NodeBounds::Rims => ball.hypot(off).min(MOST_LARGER * ball),
-        NodeBounds::Squares => ball,
+        NodeBounds::Squares | NodeBounds::Cones => ball,
     };
     let node = Node {
         surfel: Surfel { center: rounded.to_array(), s, t },

@@ -113,12 +113,19 @@ pub(super) fn cap([xx, xy, yy]: Heights, [s, t]: [f64; 2]) -> Cap {
     Cap([xx * s * s, xy * s * t, yy * t * t].map(|height| height as f32)).usable(s.max(t))
 }
 
+/// The cap whose normals lean outward at the rim by a cone with this cosine, at most 60 degrees, on
+/// a disk whose half-axes have these lengths.
+pub(super) fn cone(cosine: f64, [s, t]: [f64; 2]) -> Cap {
+    let slope = (cosine.max(0.5).powi(-2) - 1.0).max(0.0).sqrt();
+    Cap([-slope * s, 0.0, -slope * t].map(|height| height as f32)).usable(s.max(t))
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use glam::Vec3;
 
-    use super::super::build;
+    use super::super::{NodeBounds, build, build_with};
     use super::*;
     use crate::scene::hierarchy::Node;
     use crate::scene::{Scene, Surfel};
@@ -170,6 +177,23 @@ mod tests {
                 assert!(looked_at > 50, "{looked_at}");
             }
         }
+    }
+
+    /// With `cones`, normals at the ends of a node's half-axes lean outward by the node's cone.
+    #[test]
+    fn normals_lean_by_the_cone() {
+        let bowl = field(|x, y| (-0.1 * (x * x + y * y), -0.2 * DVec2::new(x, y)), true);
+        let (_, tree) = build_with(bowl, NodeBounds::Cones, &()).unwrap();
+        let mut looked_at = 0;
+        for node in tree.nodes.iter().filter(|node| node.count > 1) {
+            let lengths = [node.surfel.s, node.surfel.t].map(|axis| f64::from(Vec3::from_array(axis).length()));
+            let ends = [node.cap.slope(1.0, 0.0), node.cap.slope(0.0, 1.0)];
+            let leans = [-ends[0].x / lengths[0], -ends[1].y / lengths[1]].map(f64::atan);
+            let cone = f64::from(node.cone).acos();
+            assert!(leans.iter().all(|lean| (lean - cone).abs() < 2e-3), "{leans:?} {cone}");
+            looked_at += 1;
+        }
+        assert!(looked_at > 50, "{looked_at}");
     }
 
     /// A node's radius exceeds its bounding sphere if points lie off its cap, and not if they lie

@@ -54,6 +54,17 @@ pub enum NodeBounds {
     /// spheres are as small as possible. Its shape is that of the covariance of the disks' centres.
     /// This is Pajarola 2003, section 3.4, to the letter.
     Squares,
+    /// As [`Squares`](Self::Squares), with normals that lean outward by the node's cone at the rim,
+    /// up to 60 degrees (Pajarola 2003, section 5.2). The disk bends as its normals say; the paper's
+    /// stays flat.
+    Cones,
+}
+
+impl NodeBounds {
+    /// Whether nodes bound squares on their planes.
+    fn of_squares(self) -> bool {
+        self != Self::Rims
+    }
 }
 
 impl FromStr for NodeBounds {
@@ -63,7 +74,8 @@ impl FromStr for NodeBounds {
         match text {
             "rims" => Ok(Self::Rims),
             "squares" => Ok(Self::Squares),
-            _ => Err(Error::Usage(format!("nodes bound rims or squares, not {text:?}"))),
+            "cones" => Ok(Self::Cones),
+            _ => Err(Error::Usage(format!("nodes bound rims, squares or cones, not {text:?}"))),
         }
     }
 }

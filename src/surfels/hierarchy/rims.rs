@@ -192,7 +192,7 @@ impl Bounding {
         if most.rim > known.rim {
             bound.rim = match self.bounds {
                 NodeBounds::Rims => self.rim(disk, own, known.rim),
-                NodeBounds::Squares => self.corner(disk),
+                NodeBounds::Squares | NodeBounds::Cones => self.corner(disk),
             };
         }
         if most.radius > known.radius {
@@ -270,7 +270,7 @@ impl Bounding {
     pub fn of_node(&self, node: &Node, low: [f32; 3]) -> Bound {
         let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
         let offset = center + low - self.center;
-        let wider = if self.bounds == NodeBounds::Squares { SQRT_2 } else { 1.0 };
+        let wider = if self.bounds.of_squares() { SQRT_2 } else { 1.0 };
         let radius = f64::from(node.radius) * wider * ROUNDED_UP;
         // Cosine and sine of three angles: `angle` between the two normals, `angles` with the cone
         // added, and `turned` with the rounding margin added too.

@@ -244,8 +244,12 @@ mod tests {
                 (1 + below(random, 9) as u32, below(random, 7) as u32, 1 + below(random, 4) as u16);
             let most = 1 + below(random, 64) as u32;
             let mut of = vec![0; (width * rows) as usize * usize::from(each)];
-            for sample in of.chunks_mut(each.into()).filter(|_| below(random, 3) == 0) {
-                sample.iter_mut().for_each(|value| *value = bits(random) >> (64 - most));
+            for sample in of.chunks_mut(each.into()) {
+                if below(random, 3) == 0 {
+                    for value in sample {
+                        *value = bits(random) >> (64 - most);
+                    }
+                }
             }
             let taken =
                 |range: Range<usize>| of[range.start * usize::from(each)..range.end * usize::from(each)].to_vec();

@@ -241,6 +241,47 @@ fn by_parts(renderer: &epsplat::Renderer, view: &View, of: u32) -> epsplat::Merg
     pass(Some(&pass(None))).picture(&DeviceOptions::default(), &()).unwrap()
 }
 
+/// Bytes whose checksum is right, but which are those of no part, are refused and never end the
+/// program; nor does a merge of parts that were read.
+#[test]
+fn changed_bytes_with_a_right_checksum_are_read_or_refused() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let scene =
+        epsplat::Scene::open([format!("{}/data/bunny.obj", env!("CARGO_MANIFEST_DIR"))], &SceneOptions::default());
+    let (options, device) = (RenderOptions::default(), DeviceOptions::default());
+    let renderer = epsplat::Renderer::new(&scene.unwrap(), &options, &device, &()).unwrap();
+    let camera = renderer.camera(&View::default()).unwrap();
+    let view = View::from(Camera { width: 20, height: 20, ..camera });
+    let part = |number| renderer.part(&view, Share::new(number, 2).unwrap(), None, &()).unwrap();
+    let (bytes, other) = (part(1).bytes(), part(2));
+    let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let (random, mut read, mut refused) = (&mut Random(3), 0, 0);
+    for turn in 0..3000 {
+        let mut changed = bytes.clone();
+        for _ in 0..1 + random.below(3) {
+            // Half of the changes lie in the header, half behind it.
+            let place = if turn % 2 == 0 { 24 + random.below(header) } else { random.below(bytes.len() - 4) };
+            changed[place] = random.below(256) as u8;
+        }
+        let body = changed.len() - 4;
+        let sum = crc32fast::hash(&changed[..body]);
+        changed[body..].copy_from_slice(&sum.to_le_bytes());
+        match Part::of_bytes("changed", &changed) {
+            Ok(part) => {
+                read += 1;
+                let _ = merge(&[other.clone(), part]);
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().starts_with("changed: "), "{error}");
+            }
+        }
+    }
+    assert!(read > 100 && refused > 100, "{read} {refused}");
+}
+
 /// Options of a test picture: its files, the change of the defaults, and the numbers of parts.
 type Case = (&'static [&'static str], fn(&mut RenderOptions), &'static [u32]);
 

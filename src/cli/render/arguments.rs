@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use epsplat::Files;
 use epsplat::io::images::ImageFormat;
-use epsplat::low_level::scene::Share;
+use epsplat::{Files, Share};
+
 use epsplat::options::parse::{scale, turns};
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 

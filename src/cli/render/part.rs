@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use epsplat::io::images::ImageFormat;
-use epsplat::low_level::scene::Share;
-use epsplat::{Error, Files, Part, Renderer, Result, Scene, View, merge};
+
+use epsplat::{Error, Files, Part, Renderer, Result, Scene, Share, View, merge};
 
 use super::super::outputs::Source;
 use super::super::progress::Bars;

@@ -37,7 +37,7 @@ const OPTIONS: [Clash; 9] = [
         sentence: "parts are shares of all surfels, not of a level of detail: leave --lod and --splats out",
     },
     Clash {
-        applies: |options, _| options.maps.has(Map::Index),
+        applies: |options, _| options.maps.iter().any(|map| map.row().numbers),
         sentence: "the map index names one surfel of all parts, which no sum tells: leave it out",
     },
     Clash {

@@ -30,6 +30,10 @@ pub mod levels {}
 #[cfg_attr(doc, doc = include_str!("guide/files.md"))]
 pub mod files {}
 
+/// Pictures that several processes draw together.
+#[cfg_attr(doc, doc = include_str!("guide/machines.md"))]
+pub mod machines {}
+
 /// Adapters and accumulators.
 #[cfg_attr(doc, doc = include_str!("guide/adapters.md"))]
 pub mod adapters {}

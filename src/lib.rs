@@ -65,10 +65,12 @@ pub use io::{Mesh, Points, Texture};
 pub use low_level::frame::Frame;
 pub use low_level::gpu::Gpu;
 pub use low_level::render::{FrameLayout, Plane, Receipt, Report, Target, Ticket};
-pub use low_level::scene::{Bounds, Camera, Grid, Lens, Map, Maps, Side, Up};
+pub use low_level::scene::{Bounds, Camera, Grid, Lens, Map, Maps, Share, Side, Up};
 pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
 pub use stage::{Files, Given, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport, Visible};
+#[cfg(feature = "parts")]
+pub use stage::{Merged, Part, merge};
 
 // Modules inside the library import these as `crate::...`, without `low_level`.
 use low_level::{annotate, frame, gpu, passes, plan, render, scene, surfels, truth};

@@ -12,6 +12,7 @@ mod hybrid;
 mod info;
 mod inputs;
 mod lod;
+mod merge;
 mod outputs;
 mod progress;
 mod render;
@@ -49,6 +50,7 @@ Exit codes: 0 done, 1 the run failed, 2 the arguments cannot be used.";
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
+    Merge(merge::Arguments),
     Info(info::Arguments),
     Surfels(surfels::Arguments),
     Visible(visible::Arguments),
@@ -74,6 +76,7 @@ pub fn run() -> ExitCode {
     signals::watch();
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),

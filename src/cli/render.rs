@@ -1,9 +1,10 @@
 //! `epsplat render`: renders files to an image with its maps, or to one image for each camera.
 
-mod arguments;
+pub(super) mod arguments;
 mod map;
 mod output;
-mod target;
+mod part;
+pub(super) mod target;
 mod views;
 
 use std::collections::BTreeMap;
@@ -18,6 +19,9 @@ use super::progress::Bars;
 use super::{note, outputs, write_json};
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(share) = arguments.part.part {
+        return part::run(arguments, share);
+    }
     if arguments.views.cameras.is_some() || arguments.views.turntable.is_some() {
         let target = Target::of_many(arguments)?;
         return target.closed_is_done(views::run(arguments, &target));

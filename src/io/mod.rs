@@ -30,6 +30,8 @@ pub mod mesh;
 pub mod obj;
 pub mod off;
 pub mod paint;
+#[cfg(feature = "parts")]
+pub mod part;
 #[cfg(feature = "pcd")]
 pub mod pcd;
 pub mod place;

@@ -23,6 +23,7 @@
 //! | [`resolve`], [`join`] | sums, shaded triangles | [`Frame`] |
 //! | [`layers`], [`sorted`] | fragment lists | [`Frame`] |
 //!
+//! [`share`] is the source of a frame that several processes draw together.
 //! [`eye_dome`] filters the finished frame.
 //! [`index`] makes a map in a pass of its own. [`unseen`] explains why a picture is empty.
 //!
@@ -54,6 +55,7 @@ pub mod conic;
 pub mod covered;
 pub mod cull;
 pub mod curved;
+pub mod digest;
 pub mod eye_dome;
 pub mod facing;
 pub mod footprint;
@@ -74,6 +76,7 @@ pub mod project;
 pub mod raster;
 pub mod resolve;
 pub mod select;
+pub mod share;
 pub mod shared;
 pub mod sorted;
 pub mod source;

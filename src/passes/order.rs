@@ -65,7 +65,7 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
 }
 
 /// The bits of a surfel's geometry, colour and fade, as a sort key.
-fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], [Option<u32>; 2]) {
+pub(super) fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], [Option<u32>; 2]) {
     let Surfel { center, s, t } = scene.surfels[index];
     let low = scene.low.get(index).copied().unwrap_or_default();
     let normal = scene.normals.get(index).copied().unwrap_or_default();

@@ -14,7 +14,7 @@ use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Hierarchy, Node};
-use crate::scene::{Cap, Clip, Colors, Fade, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
+use crate::scene::{Cap, Clip, Colors, Fade, Mipmap, Provenance, Scene, Share, Surfel, Triangles, copies};
 
 /// A source of surfels, page by page.
 pub trait Source: Send + Sync {
@@ -121,27 +121,7 @@ impl Source for Scene {
     }
 
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
-        let given = || (0..self.surfels.len() as u32).collect();
-        let mut order = ordered.map_or_else(given, |facts| order(self, &facts.core));
-        let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(self).into());
-        if let Some(copies) = &copies {
-            order.retain(|&index| copies[index as usize] > 0);
-        }
-        let page = |indices: &[u32]| ScenePage {
-            scene: self,
-            nodes: None,
-            needs: *needs,
-            layout: SurfelLayout::of(needs),
-            indices: indices.into(),
-            copies: copies.clone(),
-        };
-        let of = |indices: &[u32]| Box::new(page(indices)) as Box<dyn Page>;
-        if !needs.surface.separate() {
-            return order.chunks(most).map(of).collect();
-        }
-        let own = self.provenance.ranges(self.surfels.len() as u64);
-        let individual = own.map(|own| order.iter().copied().filter(|&index| own.contains(&index.into())).collect());
-        individual.flat_map(|indices: Vec<u32>| indices.chunks(most).map(of).collect::<Vec<_>>()).collect()
+        pages_of(self, needs, most, (ordered, None))
     }
 
     fn textures(&self) -> &[Mipmap] {
@@ -187,6 +167,40 @@ impl Source for Scene {
     fn whole(&self) -> Option<&Scene> {
         Some(self)
     }
+}
+
+/// Pages of at most `most` surfels of `scene`, or of a `share` of it, as [`Source::pages`] returns
+/// them.
+pub(super) fn pages_of<'a>(
+    scene: &'a Scene,
+    needs: &SceneNeeds,
+    most: usize,
+    (ordered, share): (Option<&Facts>, Option<Share>),
+) -> Vec<Box<dyn Page + 'a>> {
+    let given = || (0..scene.surfels.len() as u32).collect();
+    let mut order = ordered.map_or_else(given, |facts| order(scene, &facts.core));
+    if let Some(share) = share {
+        order = order[share.range(order.len())].to_vec();
+    }
+    let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(scene).into());
+    if let Some(copies) = &copies {
+        order.retain(|&index| copies[index as usize] > 0);
+    }
+    let page = |indices: &[u32]| ScenePage {
+        scene,
+        nodes: None,
+        needs: *needs,
+        layout: SurfelLayout::of(needs),
+        indices: indices.into(),
+        copies: copies.clone(),
+    };
+    let of = |indices: &[u32]| Box::new(page(indices)) as Box<dyn Page>;
+    if !needs.surface.separate() {
+        return order.chunks(most).map(of).collect();
+    }
+    let own = scene.provenance.ranges(scene.surfels.len() as u64);
+    let individual = own.map(|own| order.iter().copied().filter(|&index| own.contains(&index.into())).collect());
+    individual.flat_map(|indices: Vec<u32>| indices.chunks(most).map(of).collect::<Vec<_>>()).collect()
 }
 
 /// The surfels of a scene at `indices`; indices past the last surfel are nodes.

@@ -1,13 +1,14 @@
 //! Facts of all surfels together, computed once per scene. They do not depend on the view.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::{MeshFacts, Settings};
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Atlas, Bounds, Colors, LevelFacts, Scene, Surfel, has_copies};
 
 /// The source of a surfel's colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum ColorNeed {
     /// All surfels share one colour: none is stored or accumulated.
     Constant,
@@ -27,12 +28,15 @@ pub enum ColorNeed {
 const SAMPLED: usize = 1024;
 
 /// The ranges of a scene's values, and its counts.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Facts {
     /// [`Scene::origin`].
     pub origin: DVec3,
     /// Number of surfels of the whole scene, even if only a part is in memory.
     pub surfels: u64,
+    /// Number of surfels of the share of the scene that is drawn here
+    /// ([`share`](crate::passes::share)); `None` if all are.
+    pub share: Option<u64>,
     /// Number of surfels of each non-empty input ([`Scene::provenance`]), in the order of the
     /// inputs.
     pub individuals: Vec<u64>,
@@ -77,10 +81,16 @@ pub struct Facts {
     /// Facts of the octree's nodes, if there are levels of detail.
     pub levels: Option<LevelFacts>,
     /// Every n-th surfel of the scene, with its centre in f64.
+    #[serde(skip)]
     pub sample: Vec<(Surfel, DVec3)>,
 }
 
 impl Facts {
+    /// Number of surfels that are drawn here: those of a share of the scene, or all.
+    pub fn here(&self) -> u64 {
+        self.share.unwrap_or(self.surfels)
+    }
+
     /// The longest half-axis of all surfels and nodes that may be drawn, world units.
     pub fn drawn_radius(&self, options: &Settings) -> f32 {
         self.nodes_of(options).map_or(self.largest_radius, |nodes| nodes.largest_radius.max(self.largest_radius))
@@ -103,6 +113,7 @@ impl Facts {
         Self {
             origin: scene.origin,
             surfels: scene.part_of.as_ref().map_or(scene.surfels.len() as u64, |whole| whole.surfels.into()),
+            share: None,
             individuals: scene.provenance.ranges(scene.surfels.len() as u64).map(|own| own.end - own.start).collect(),
             mesh: MeshFacts::of(&scene.triangles),
             bounds: scene.bounds(),

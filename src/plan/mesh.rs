@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::scene::{Bounds, Camera, Join, Mipmap, Projection, Triangles};
 
 /// Counts, attributes and bounding box of a scene's triangles.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeshFacts {
     /// Number of distinct corner positions.
     pub vertices: u64,

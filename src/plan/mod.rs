@@ -156,7 +156,7 @@ impl Plan {
         let page = page_surfels(adapter, &needs);
         let cut = known.cut.clone().filter(|_| needs.levels);
         // Each branch has its own pages.
-        let apart = if needs.levels { cut.clone().unwrap_or_default() } else { vec![facts.surfels] };
+        let apart = if needs.levels { cut.clone().unwrap_or_default() } else { vec![facts.here()] };
         let (drawn, pages) = (apart.iter().sum(), pages_of(&apart, page).last().map_or(0, |last| last.end));
         let in_one =
             (pages == 1 || needs.surface.separate()) && (1..=page).contains(&most_together((facts, drawn), &needs));

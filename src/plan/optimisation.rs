@@ -3,10 +3,12 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// An optimisation on which no image depends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Optimisation {
     /// Batches of surfels that are out of view or hidden are not projected (`passes/cull.rs`).
     Culling,

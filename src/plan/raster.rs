@@ -2,10 +2,12 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// Sums are made by the rasteriser's blender instead of in storage buffers; see `passes::raster`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Raster {
     /// The format of the sums.
     pub format: BlendFormat,
@@ -14,7 +16,7 @@ pub struct Raster {
 }
 
 /// The format of the blended targets, four channels each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum BlendFormat {
     /// 8 bits; sums saturate at [`BlendFormat::MOST_WEIGHTS_8`] full weights.
     Rgba8Unorm,
@@ -49,7 +51,7 @@ impl BlendFormat {
 }
 
 /// How the rasteriser's path decides which fragments belong to the visible surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum RasterDepth {
     /// Each fragment writes its own depth and compares it with the nearest in the shader, as the
     /// compute kernels do.

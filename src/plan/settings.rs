@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Accumulator, Fetch, Optimisation, Raster};
 use crate::error::Error;
 use crate::gpu::Replacement;
@@ -42,7 +44,7 @@ impl FromStr for BackendName {
 }
 
 /// How the compute kernels draw splats. The image is the same to the bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Organisation {
     /// Small splats one by one, large ones by tiles of the image. A software adapter sums all
     /// splats by tiles, unless they are tiny.
@@ -69,7 +71,10 @@ impl FromStr for Organisation {
 }
 
 /// Everything a caller may choose, except scene and camera.
-#[derive(Clone, Debug, PartialEq)]
+///
+/// Parts of a picture store the settings without the accumulator, which is `fixed` there, and without
+/// kernels of the user.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Depth tolerance.
     pub epsilon: Epsilon,
@@ -108,6 +113,7 @@ pub struct Settings {
     /// Low-pass filter.
     pub low_pass: LowPass,
     /// How the device keeps sums.
+    #[serde(skip)]
     pub accumulator: Accumulator,
     /// How the device draws splats; with other accumulators than `fixed` they are scattered.
     pub organisation: Organisation,
@@ -140,9 +146,11 @@ pub struct Settings {
     /// Optimisations that are left out; none changes a bit of the image.
     pub without: Vec<Optimisation>,
     /// User-written WGSL files that replace built-in ones.
+    #[serde(skip)]
     pub sources: Vec<Replacement>,
     /// The f64 twin of a blending kernel among `sources`. If it is None, the WGSL text is evaluated
     /// in f64.
+    #[serde(skip)]
     pub own_kernel: Option<OwnKernel>,
 }
 

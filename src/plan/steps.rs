@@ -220,6 +220,18 @@ pub enum Look {
     Fragments(usize),
 }
 
+/// Values of pixels that processes exchange if they draw a frame together
+/// ([`exchange`](crate::render::exchange)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Exchanged {
+    /// The triangles of each pixel, shaded. Every process draws all of them.
+    Triangles,
+    /// The nearest depths, of which the nearest of all processes counts.
+    Nearest,
+    /// The sums, which are added up.
+    Sums,
+}
+
 /// One step of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
@@ -229,6 +241,9 @@ pub enum Step {
     Stage(Stage),
     /// Reads a count and resizes buffers by it.
     Look(Look),
+    /// Exchanges values of a band's pixels, if several processes draw the frame. Otherwise nothing
+    /// is done.
+    Exchange(Exchanged, usize),
     /// Draws the large splats after their lists were measured: by tiles if there are any large
     /// splats and the lists hold them, else by one workgroup each.
     Large {

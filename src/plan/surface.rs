@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Accumulator, Facts, Lists, Oit, Organisation, Raster, Settings};
 use crate::error::Error;
 use crate::scene::{Blend, Composite};
@@ -68,7 +70,7 @@ pub enum Splats {
 }
 
 /// The invocations of a tile, and how they get the splats that they draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Fetch {
     /// Eight invocations, each with a column of pixels, fetch eight splats and exchange them by
     /// subgroup operations (`wgsl/tiles/tile.wgsl`, `splat_shared.wgsl`).

@@ -207,7 +207,7 @@ impl Kept {
         }
         let mut plan = self.plan(gpu, camera)?;
         if self.recorded.lacks || self.is_unmeasured(&plan) {
-            self.frame((gpu, sources), source, image, &())?;
+            self.frame((gpu, sources), source, (image, None), &())?;
             (self.recorded.lacks, self.recorded.measured) = (false, self.recorded.measured + 1);
             self.recorded.fragments = self.store.as_ref().map_or(0, Store::fragments);
             let again = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::encode::Recorded;
+use super::exchange::Among;
 use super::kernels::Kernels;
 use super::report::{DeviceBytes, Report};
 use super::run::{Run, Tally};
@@ -49,12 +50,13 @@ impl Kept {
         DeviceBytes { splats, pixels }
     }
 
-    /// Renders a frame, with retries until all buffers are large enough.
+    /// Renders a frame, with retries until all buffers are large enough. If an exchange ends its
+    /// bands, it has no rows.
     pub(super) fn frame(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
         source: &dyn Source,
-        camera: &Camera,
+        (camera, among): (&Camera, Option<Among<'_>>),
         bar: &dyn Progress,
     ) -> Result<(Frame, Report)> {
         let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
@@ -75,6 +77,7 @@ impl Kept {
             let (start, before) = (Instant::now(), Traffic::so_far());
             store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
+            run.among = among;
             let mut frame = Frame::empty(image, self.options.maps);
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();

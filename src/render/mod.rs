@@ -4,6 +4,7 @@ mod count;
 mod cut;
 mod encode;
 mod encoded;
+pub mod exchange;
 mod frame_layout;
 pub mod inspect;
 mod kept;
@@ -38,6 +39,7 @@ use crate::plan::{Optimisation, Settings, check, culls_back};
 use crate::progress::Progress;
 use crate::scene::{Camera, Detail, EyeDome, KernelFaults, Map};
 pub use encode::Target;
+use exchange::{Among, Exchange};
 pub use frame_layout::{FrameLayout, Plane};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
@@ -93,6 +95,8 @@ pub struct Renderer<S, B> {
     sources: Sources,
     /// Faults of a kernel that the user wrote.
     faults: Option<KernelFaults>,
+    /// The settings of the whole frame.
+    settings: Settings,
     /// The part that renders the colour.
     kept: Kept,
     /// The parts that render maps with other options than the colour's ([`parts::parts`]).
@@ -121,6 +125,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::scene(&facts, options, reference)?;
         let (sources, options) = own::settled(backend.borrow(), options)?;
         let faults = own::faults(&options);
+        let settings = options.clone();
         let eye_dome = options.edl;
         let needs_depth = eye_dome.is_some() || index::needs_depth(options.maps, facts.mesh.triangles);
         let drops_depth = needs_depth && !options.maps.has(Map::Depth);
@@ -131,7 +136,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
         let (kept, recorded) = (Kept::new(facts, colors), encode::Shared::default());
-        Ok(Self { source, backend, sources, faults, kept, of_maps, detail, eye_dome, drops_depth, recorded })
+        Ok(Self { source, backend, sources, faults, settings, kept, of_maps, detail, eye_dome, drops_depth, recorded })
     }
 
     /// Renders one frame.
@@ -139,21 +144,71 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// # Errors
     /// [`Error::Limit`] if a limit of the adapter is too small, and any error of the device.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
+        let (frame, report) = self.rendered(camera, None, progress)?;
+        Ok((self.filtered(frame, camera), report))
+    }
+
+    /// Prepares to draw frames together with other processes, by [`Renderer::frame_among`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a picture that processes cannot draw together.
+    pub fn among(mut self) -> Result<Self> {
+        let reference = matches!(self.backend.borrow(), Backend::Reference);
+        check::parts(&self.kept.facts, &self.settings, reference)?;
+        for part in self.of_maps.iter_mut().chain([&mut self.kept]) {
+            // Tiles that gather keep sums in registers, where nothing can be exchanged.
+            part.options.without.push(Optimisation::Gathering);
+        }
+        Ok(self)
+    }
+
+    /// Renders one frame together with other processes, each of which has a share of the scene
+    /// ([`share`](crate::passes::share)) and calls this with the same camera. Returns no frame if
+    /// the exchange ends its bands ([`Then::Stop`](exchange::Then::Stop)).
+    ///
+    /// # Errors
+    /// As [`Renderer::frame`], and errors of the exchange. [`Error::Usage`] without
+    /// [`Renderer::among`].
+    pub fn frame_among(
+        &mut self,
+        camera: &Camera,
+        exchange: &dyn Exchange,
+        progress: &dyn Progress,
+    ) -> Result<(Option<Frame>, Report)> {
+        if self.kept.options.has(Optimisation::Gathering) {
+            return Err(Error::Usage("a renderer draws together with others after Renderer::among".into()));
+        }
+        let (frame, report) = self.rendered(camera, Some(exchange), progress)?;
+        let whole = frame.height == camera.height;
+        Ok((whole.then(|| self.filtered(frame, camera)), report))
+    }
+
+    /// Renders one frame, before the filters of finished pictures. It has no rows if the exchange
+    /// ends its bands.
+    fn rendered(
+        &mut self,
+        camera: &Camera,
+        exchange: Option<&dyn Exchange>,
+        progress: &dyn Progress,
+    ) -> Result<(Frame, Report)> {
         let start = Instant::now();
         self.check_lens(camera, "")?;
         let detail = self.sized(camera);
         let spent = start.elapsed().as_secs_f64() * 1e3;
         let Self { source, backend, sources, faults, kept, of_maps, .. } = self;
         of_maps.iter_mut().chain([&mut *kept]).for_each(|part| part.options.detail = detail);
-        let one = |kept: &mut Kept| one(&*source, ((*backend).borrow(), &*sources), kept, camera, progress);
+        let one = |kept: &mut Kept, render: usize| {
+            let among = exchange.map(|exchange| Among { exchange, render });
+            one(&*source, ((*backend).borrow(), &*sources), kept, (camera, among), progress)
+        };
         let mut maps = Vec::new();
-        for part in of_maps {
+        for (number, part) in of_maps.iter_mut().enumerate() {
             // All parts share the uploaded surfels as far as their needs agree.
             part.store = kept.store.take();
-            maps.push(one(part)?);
+            maps.push(one(part, number + 1)?);
             kept.store = part.store.take();
         }
-        let (mut frame, mut report) = parts::joined(one(kept)?, maps);
+        let (mut frame, mut report) = parts::joined(one(kept, 0)?, maps);
         report.tail = Tail::of(&frame);
         report.kernel = faults.clone();
         if matches!(self.detail, Detail::Splats(_)) {
@@ -163,7 +218,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         if kept.facts.encoded {
             encoded::decode(&mut frame);
         }
-        Ok((self.filtered(frame, camera), report))
+        Ok((frame, report))
     }
 
     /// Rejects what a camera whose lens is no pinhole does not show. `other` is how to get a
@@ -247,13 +302,13 @@ fn one(
     source: &dyn Source,
     (backend, sources): (&Backend, &Sources),
     kept: &mut Kept,
-    camera: &Camera,
+    (camera, among): (&Camera, Option<Among<'_>>),
     progress: &dyn Progress,
 ) -> Result<(Frame, Report)> {
     match backend {
         Backend::Gpu { gpu, .. } => {
             let sources = without_optimisations(sources, &kept.options);
-            kept.frame((gpu, &sources), source, camera, progress)
+            kept.frame((gpu, &sources), source, (camera, among), progress)
         }
         Backend::Reference => {
             let scene = source.whole().ok_or_else(|| {

@@ -2,6 +2,7 @@
 //! device counted.
 
 use super::count::{Capacities, lacks};
+use super::exchange::{Among, Onward, is_of_triangles};
 use super::kernels::Kernels;
 use super::record::Recording;
 use super::store::Store;
@@ -50,6 +51,10 @@ pub struct Run<'a> {
     pub timing: Timing<'a>,
     /// Where the frame goes if it stays on the device.
     pub(super) recording: Option<Recording<'a>>,
+    /// The exchange with other processes that draw the frame.
+    pub(super) among: Option<Among<'a>>,
+    /// Whether an exchange ended the present band, so that it has no image.
+    ended: bool,
     /// Whether large splats are drawn by tiles.
     pub(super) by_tiles: bool,
     /// Counts read from the device so far.
@@ -73,6 +78,8 @@ impl<'a> Run<'a> {
             known,
             timing: Timing::new(gpu),
             recording: None,
+            among: None,
+            ended: false,
             by_tiles: plan.large_by_tiles,
             tally: Tally { drawn: 0, cut: None, complete: true },
             needed: [None; 2],
@@ -86,6 +93,18 @@ impl<'a> Run<'a> {
     pub fn steps(&mut self, steps: &[Step], frame: &mut Frame, progress: &dyn Progress) -> Result<bool> {
         for step in steps {
             match step {
+                Step::ReadBack(band) if self.ended => {
+                    self.ended = false;
+                    self.end_band(*band)?;
+                    progress.advance(self.plan.bands[*band].rows.into());
+                }
+                _ if self.ended => {}
+                Step::Exchange(what, band) => match self.exchange(*what, *band)? {
+                    Onward::Next => {}
+                    Onward::EndBand => self.ended = true,
+                    Onward::Retry => return Ok(false),
+                },
+                Step::Stage(stage) if self.is_given(stage) => {}
                 Step::Stage(stage) => self.stage(stage)?,
                 Step::Large { by_tiles, .. } if self.by_tiles => {
                     by_tiles.iter().try_for_each(|stage| self.stage(stage))?;
@@ -126,6 +145,11 @@ impl<'a> Run<'a> {
         self.tally
     }
 
+    /// Whether another process gives what `stage` would draw.
+    fn is_given(&self, stage: &Stage) -> bool {
+        self.among.is_some_and(|among| !among.exchange.draws_triangles()) && is_of_triangles(stage.pass)
+    }
+
     /// Whether the counts of `band` must be read: the next band resets them, or there is none.
     fn counts_in(&self, band: usize) -> bool {
         self.plan.projects_each_band || band + 1 == self.plan.bands.len()
@@ -144,7 +168,7 @@ impl<'a> Run<'a> {
 
     /// Records the list entries of the band that needs most, so that the next try allocates them.
     /// After an overflow nothing is recorded, and the next try measures all bands again.
-    fn learn(&mut self) {
+    pub(super) fn learn(&mut self) {
         for of in [Listed::Large, Listed::Small] {
             let entries = &mut self.known.entries[of as usize];
             *entries = match self.needed[of as usize] {
@@ -157,7 +181,7 @@ impl<'a> Run<'a> {
     }
 
     /// Adds what the counters held at the end of `band` to the tally.
-    fn count(&mut self, band: usize, counted: &[[u32; 2]]) {
+    pub(super) fn count(&mut self, band: usize, counted: &[[u32; 2]]) {
         let counted = Capacities::of(self.plan, self.store, self.by_tiles).compared(counted);
         self.tally.drawn += counted.drawn;
         let mut fits = true;

@@ -7,7 +7,7 @@ use crate::passes::{
     triangles, veils, visibility,
 };
 use crate::plan::known::Listed;
-use crate::plan::steps::{Look, Part, Stage, Step, Twin};
+use crate::plan::steps::{Exchanged, Look, Part, Stage, Step, Twin};
 use crate::plan::{Oit, Plan, Rasterised, Surface, Winner};
 
 /// Returns the steps of a frame by `plan`.
@@ -32,6 +32,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     for band in 0..plan.bands.len() {
         if plan.needs.mesh.is_some() {
             steps.extend(triangles::steps(plan, band).into_iter().map(Step::Stage));
+            exchange(plan, Exchanged::Triangles, band, &mut steps);
         }
         match plan.needs.surface {
             Surface::Raster { .. } => {}
@@ -81,7 +82,16 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
     }
     let by_workgroups = on(plan, pages, visibility::large(band)).collect();
     large(plan, (tiles::visibility(plan, band, pages.clone()), by_workgroups), steps);
+    exchange(plan, Exchanged::Nearest, band, steps);
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
+}
+
+/// Appends the step at which processes that draw a frame together exchange values of a band. Only
+/// sums in storage can be exchanged, and those of one surface per pixel.
+fn exchange(plan: &Plan, what: Exchanged, band: usize, steps: &mut Vec<Step>) {
+    let stored =
+        matches!(plan.needs.surface, Surface::Blended { separate: false, .. }) && !plan.needs.surface.gathers();
+    steps.extend(stored.then_some(Step::Exchange(what, band)));
 }
 
 /// Returns the stage over all pages or, if inputs are separate, one copy of the stage per page of
@@ -143,6 +153,7 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
         steps.extend(on(plan, pages, accumulate::steps(plan, band, first)).map(Step::Stage));
         let by_workgroups = on(plan, pages, accumulate::large(band)).collect();
         large(plan, (tiles::accumulate(plan, band, pages.clone()), by_workgroups), steps);
+        exchange(plan, Exchanged::Sums, band, steps);
         if plan.needs.surface.separate() {
             steps.push(Step::Stage(individuals::keep(plan, band, first)));
         }

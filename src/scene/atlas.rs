@@ -1,5 +1,7 @@
 //! A common plane for several textures, so that surfels of all of them are blended alike.
 
+use serde::{Deserialize, Serialize};
+
 /// The margin around the coordinates of each texture in the plane. Surfels that reach past an edge
 /// still show their own texture, and the mean of coordinates in two textures is far enough from
 /// both to be recognised as invalid.
@@ -16,7 +18,7 @@ const BESIDE: f32 = 1.0;
 /// The smallest reach is a fraction of that width, so seams within a texture are detected less
 /// precisely the more textures there are: between places 0.016 apart for one texture, 0.06 for
 /// four, 0.16 for sixteen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Atlas {
     /// Whole numbers below every u and every v.
     pub corner: [f32; 2],

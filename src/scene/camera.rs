@@ -3,13 +3,14 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::optics::{Form, Optics, Sight};
 use super::{Samples, Scene, Up};
 use crate::error::{Error, Result};
 
 /// The mapping from camera space to pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Projection {
     /// `x = fx X/Z + cx`: focal lengths in pixels.
     Pinhole,
@@ -22,7 +23,7 @@ pub enum Projection {
 /// Camera space is x right, y down, z forward. Pixel (i, j) has its centre at (i + 0.5, j + 0.5),
 /// origin top left. Depth is camera-space z; for fisheyes and whole spheres it is the distance from
 /// the eye ([`Camera::depth_is_distance`]).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Pinhole or orthographic.
     pub projection: Projection,

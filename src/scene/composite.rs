@@ -30,10 +30,12 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// The fragments or surfaces that are composited at a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Composite {
     /// The nearest surface alone; the background shows through its alpha.
     #[default]
@@ -89,7 +91,7 @@ impl FromStr for Composite {
 }
 
 /// The treatment of the surfaces behind the last of [`Composite::Layers`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tail {
     /// They are blended by weight into one more surface.
     #[default]

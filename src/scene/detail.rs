@@ -4,13 +4,14 @@ use std::f64::consts::PI;
 use std::str::FromStr;
 
 use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::hierarchy::Node;
 use super::{Camera, Projection};
 use crate::error::Error;
 
 /// The size of a node in the image below which it is drawn instead of its descendants.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Detail {
     /// An area in square pixels.
     Pixels(f64),
@@ -87,7 +88,7 @@ impl FromStr for NodeShape {
 }
 
 /// The size of a node that [`Detail`] is compared with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum DetailMeasure {
     /// The area of the ellipse's image, as in Pajarola 2003. An ellipse seen edge-on has no area,
     /// so silhouettes get the coarsest nodes.

@@ -2,11 +2,13 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// The strength of eye-dome lighting ([`eye_dome`](crate::passes::eye_dome)): a positive factor on
 /// the slopes that darken a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EyeDome(pub f64);
 
 /// The largest strength, at which the slightest slope is black.

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::{Camera, Projection, Samples};
 use crate::error::{Error, Result};
 
@@ -9,7 +11,7 @@ use crate::error::{Error, Result};
 ///
 /// Each point is a shape around its position, in a plane parallel to the image. The radius is the
 /// longer half-axis of the point's surfel, limited in pixels; the surfel's own plane is ignored.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Facing {
     /// The shape of each splat.
     pub shape: PointShape,
@@ -23,7 +25,7 @@ pub struct Facing {
 /// A shape with a height is nearer to the camera by its height times the radius. Where points
 /// overlap, each pixel then shows approximately the point whose axis is nearest to the pixel
 /// (section III).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PointShape {
     /// Flat, `-1 <= u, v < 1`.
     Square,

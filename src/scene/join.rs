@@ -2,11 +2,13 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// The rule for pixels where splats and triangles meet. Both are resolved separately first: a
 /// triangle hides no fragment of a splat before the splats are blended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Join {
     /// The nearer of the two, with the blended depth of the splats (Tien 2008, section 5.3). A
     /// splat that sticks out of its surface shifts this depth only by its share of the weight, so

@@ -12,10 +12,12 @@
 use std::f64::consts::LN_2;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// The weight of a fragment over the unit disk of its surfel, rho in [0, 1].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Kernel {
     /// `exp(-rho^2 / (2 sigma^2))` (paper 000, Eq. 11), cut off at the rim.
     Gaussian {

@@ -3,11 +3,12 @@
 use std::str::FromStr;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
 /// A white light.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Light {
     /// Shines from the eye along each pixel's ray and lights both sides of a surface:
     /// `intensity * |n . toward|`.

@@ -5,6 +5,8 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// A map beside the colour. Every one is normalised by the weight sum.
@@ -195,7 +197,7 @@ impl FromStr for Map {
 }
 
 /// A set of maps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Maps(u32);
 
 impl Maps {

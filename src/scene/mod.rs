@@ -37,6 +37,7 @@ mod provenance;
 mod reordered;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
+pub mod share;
 pub mod side;
 mod srgb;
 pub mod surfel;
@@ -74,6 +75,7 @@ pub use outline::Outline;
 pub use own_kernel::{KernelFaults, OwnKernel};
 pub use provenance::Provenance;
 pub use scene::{Bounds, Scene, Up};
+pub use share::Share;
 pub use side::Side;
 pub use surfel::Surfel;
 pub(crate) use texture::CUT;

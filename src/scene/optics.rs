@@ -22,11 +22,12 @@ use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
 use glam::{DMat2, DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
 /// The first step of a lens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Form {
     /// `(X/Z, Y/Z)`, in front of the eye alone.
     Perspective,
@@ -62,7 +63,7 @@ impl Form {
 }
 
 /// A lens that is no pinhole.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Optics {
     /// The first step.
     pub form: Form,

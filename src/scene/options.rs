@@ -2,11 +2,13 @@
 
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// The depth tolerance: a fragment belongs to the visible surface if `z <= nearest + epsilon`
 /// (paper 000, section 5.3).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Epsilon {
     /// A fraction of the nearest depth at the pixel.
     Relative(f64),
@@ -98,7 +100,7 @@ impl FromStr for Epsilon {
 }
 
 /// The blending of a pixel's fragments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Blend {
     /// The weighted mean of the fragments within epsilon of the nearest depth (paper 000, Eq. 7).
     #[default]
@@ -121,7 +123,7 @@ impl FromStr for Blend {
 }
 
 /// Which surfels are left out because of the side that they show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Cull {
     /// Leaves out surfels that face away if none of them can be visible: the scene is closed
     /// ([`Scene::closed`](super::Scene::closed)) and the eye is outside its box.
@@ -150,7 +152,7 @@ impl FromStr for Cull {
 }
 
 /// Samples per pixel for coverage, depth and blending: a grid of 1x1, 2x2, 2x4 or 4x4.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Samples {
     /// Columns of samples in a pixel.
     pub across: u32,
@@ -193,7 +195,7 @@ impl FromStr for Samples {
 }
 
 /// The low-pass filter for splats near or below the size of a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LowPass {
     /// No filter: a disk covers a pixel if it contains the pixel's centre.
@@ -225,7 +227,7 @@ impl FromStr for LowPass {
 }
 
 /// The shading of a resolved pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shading {
     /// The blended colour, without lights.
@@ -265,7 +267,7 @@ impl FromStr for ShadingAt {
 }
 
 /// The place where shading is evaluated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ShadingAt {
     /// At each pixel, with its blended normal.

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 ///
 /// Splats are drawn with this outline; kernel and size are the disk's. (Paper 001, section 3,
 /// figure 2, where a splat is "a simple polygon".)
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u32")]
 pub struct Outline(u32);
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{Cap, Clip, Colors, Fade, Hierarchy, Listed, Provenance, Surfel, Triangles, Whole};
 
@@ -101,7 +102,7 @@ const CORE_SAMPLE: usize = 4096;
 const CORE_CUT: usize = 64;
 
 /// An axis-aligned box in world units; a scene's is relative to [`Scene::origin`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Smallest coordinates, +inf for the empty box.
     pub min: DVec3,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb};
 use super::{Atlas, Camera, Mipmap, Projection};
@@ -190,7 +191,7 @@ pub struct Textured {
 }
 
 /// The range of a scene's texture coordinates, which maps them to [0, 1] for the device's sums.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlaceRange {
     /// The middles of the intervals of u and of v.
     pub middle: [f32; 2],

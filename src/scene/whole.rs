@@ -1,6 +1,7 @@
 //! Facts about a whole scene with levels of detail, for a scene that holds only a part of it.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::hierarchy::{Hierarchy, Node};
 use super::{Bounds, Listed, Scene, core_and_box, framed_within};
@@ -40,7 +41,7 @@ pub struct Whole {
 }
 
 /// Facts about the octree nodes of the levels of detail.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LevelFacts {
     /// The largest sum of a node's longer half-axis and the height of its cap, world units.
     pub largest_radius: f32,

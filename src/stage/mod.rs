@@ -15,6 +15,8 @@ mod heights;
 mod in_part;
 mod lens;
 mod levels;
+#[cfg(feature = "parts")]
+mod machines;
 mod map;
 mod memory;
 mod meshes;
@@ -37,6 +39,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub use self::files::Files;
 pub use self::given::Given;
 pub use self::in_part::ReadReport;
+#[cfg(feature = "parts")]
+pub use self::machines::{Merged, Part, merge};
 pub use self::map::Survey;
 pub use self::renderer::{Picture, Renderer};
 pub use self::view::{View, ViewReport};

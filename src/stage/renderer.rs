@@ -324,7 +324,7 @@ impl Picture {
 /// # Errors
 ///
 /// [`Error::NoAdapter`] if no adapter fits the options.
-fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result<Backend> {
+pub(super) fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result<Backend> {
     if device.backend.0 == Some(BackendName::Reference) {
         if device.adapter.is_some() {
             return Err(Error::Usage("--backend reference uses no adapter: leave --adapter out".into()));

@@ -11,6 +11,7 @@ mod common;
 mod examples;
 #[cfg(feature = "gltf")]
 mod gltf;
+mod machines;
 mod own_kernel;
 mod prose;
 mod readme;

@@ -33,6 +33,9 @@ fn line(command: &str) -> Option<String> {
         return None;
     }
     let binary = env!("CARGO_BIN_EXE_epsplat");
+    if command.starts_with("for ") && command.contains("; do epsplat ") {
+        return Some(command.replace("; do epsplat ", &format!("; do {binary} ")));
+    }
     let arguments = command.strip_prefix("cargo run --release -- ").or_else(|| command.strip_prefix("epsplat "));
     let arguments = arguments.unwrap_or_else(|| panic!("a page has a command that no test runs: {command}"));
     Some(format!("{binary} {arguments}"))

@@ -15,7 +15,7 @@ use epsplat::low_level::plan::{
     page_surfels, tuning,
 };
 use epsplat::low_level::render::sequence::steps;
-use epsplat::low_level::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
+use epsplat::low_level::scene::{Blend, Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
 
 /// A software adapter with all optional features, such as Mesa's.
 fn software() -> AdapterDescription {
@@ -52,8 +52,14 @@ fn line(stage: &Stage) -> String {
     format!("{}: {}{place}{band}", stage.pass, runs.join(", "))
 }
 
+/// The steps of a frame of one process, which exchanges nothing.
 fn lines(plan: &Plan) -> Vec<String> {
+    lines_with_exchanges(plan).into_iter().filter(|line| !line.starts_with("exchange")).collect()
+}
+
+fn lines_with_exchanges(plan: &Plan) -> Vec<String> {
     let step = |step: &Step| match step {
+        Step::Exchange(what, band) => format!("exchange {what:?} of {band}"),
         Step::Stage(stage) => line(stage),
         Step::Select => "select".to_owned(),
         Step::Look(Look::Cut) => "look for a cut".to_owned(),
@@ -121,6 +127,34 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
     let listed: Vec<_> = second.iter().filter(|line| line.contains("tile_") || line.starts_with("bin")).collect();
     assert_eq!((listed.len(), second.len()), (3, 8), "{second:?}");
     assert!(!second.iter().any(|line| line.contains("look") || line.contains("_large/Large")), "{second:?}");
+}
+
+/// Nearest depths are exchanged before anything depends on them, and sums when all are there.
+#[test]
+fn processes_exchange_depths_and_sums_of_one_surface() {
+    let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
+    let scatter = Settings { organisation: Organisation::Scatter, ..Settings::default() };
+    let [project, large, occlude, accumulate, accumulate_large, resolve, end] = scattered();
+    let (nearest, sums) = ("exchange Nearest of 0", "exchange Sums of 0");
+    assert_eq!(
+        lines_with_exchanges(&planned(&scene, 256, &core, &scatter, &Known::default())),
+        [project, large, nearest, occlude, accumulate, accumulate_large, sums, resolve, end]
+    );
+    // Sums in registers, of several surfaces or of separate inputs are not exchanged.
+    let mut inputs = scene.clone();
+    [0, 500].into_iter().for_each(|first| inputs.provenance.push(first, Vec::new(), None));
+    let gathering = Known { touched_tiles: 3.0, ..Known::default() };
+    let others = [
+        (Settings::default(), gathering),
+        (Settings { separate: true, ..Settings::default() }, Known::default()),
+        (Settings { blend: Blend::Nearest, shading: Shading::Unlit, ..Settings::default() }, Known::default()),
+        (Settings { composite: "layers".parse().unwrap(), opacity: 0.5, ..Settings::default() }, Known::default()),
+        (Settings { composite: "moments".parse().unwrap(), ..Settings::default() }, Known::default()),
+    ];
+    for (options, known) in others {
+        let plan = planned(&inputs, 256, &software(), &options, &known);
+        assert_eq!(lines_with_exchanges(&plan), lines(&plan), "{options:?}");
+    }
 }
 
 #[test]

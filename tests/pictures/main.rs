@@ -20,6 +20,7 @@ mod images;
 mod invariance;
 mod layers;
 mod lenses;
+mod machines;
 mod materials;
 mod matrix;
 mod nearest;

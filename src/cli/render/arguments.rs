@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use epsplat::Files;
 use epsplat::io::images::ImageFormat;
+use epsplat::{Files, Share};
+
 use epsplat::options::parse::{scale, turns};
 use epsplat::options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 
@@ -42,6 +43,7 @@ use super::super::outputs::Source;
     epsplat render scan.laz -o height.tif --pixel-size 0.5 --aov height\n  \
     epsplat render scan.laz -o views --cameras transforms.json\n  \
     epsplat render scan.laz -o depth.png --aov depth --depth-scale 100\n  \
+    epsplat render scan.laz -o depth-1.part --part 1/4\n  \
     epsplat render scan.laz -o - --turntable 90 --format raw --size 640x480 |\n    \
     ffmpeg -f rawvideo -pix_fmt rgba -s 640x480 -r 30 -i - turntable.mp4"
 )]
@@ -70,29 +72,49 @@ pub struct Arguments {
     pub(super) device: DeviceOptions,
     #[command(flatten)]
     pub(super) file: FileArguments,
+    #[command(flatten)]
+    pub(super) part: PartArguments,
+}
+
+/// A picture that several processes draw.
+#[derive(Args)]
+#[command(next_help_heading = "Many machines")]
+pub(super) struct PartArguments {
+    /// Draw part I of N of the picture, for `epsplat merge`: its nearest depths, or with --within
+    /// its sums
+    ///
+    /// The output is a file of parts, such as depth-1.part. Draw the depths of all parts, then the
+    /// sums of all parts with --within, and merge the sums to the picture, which has the bits of a
+    /// picture without --part. Parts are runs of the surfels; every process reads all inputs, and
+    /// all need the same inputs and options
+    #[arg(long, value_name = "I/N", hide_short_help = true)]
+    pub(super) part: Option<Share>,
+    /// The depths of all parts: their files, or the file that `epsplat merge` made of them
+    #[arg(long, value_name = "PART", requires = "part", num_args = 1.., hide_short_help = true)]
+    pub(super) within: Vec<PathBuf>,
 }
 
 /// The files that are written.
 #[derive(Args)]
 #[command(next_help_heading = "Output")]
-pub(super) struct FileArguments {
+pub(in super::super) struct FileArguments {
     /// Format of images in a folder or on standard output [default: png; exr in a folder with
     /// --aov]
     ///
     /// The format of a single file follows from its extension. raw: four bytes a pixel (red, green,
     /// blue, alpha as in a PNG) without a header, for pipes to video encoders
     #[arg(long, value_parser = formats(), hide_short_help = true)]
-    pub(super) format: Option<ImageFormat>,
+    pub(in super::super) format: Option<ImageFormat>,
     /// Write --aov depth as 16-bit PNG: each value is depth times SCALE, and 0 is nothing
     ///
     /// Depths are rounded to the nearest integer. With coordinates in metres, 1000 makes the
     /// millimetres of ScanNet and others, and 5000 the unit of TUM's files. A depth above
     /// 65535/SCALE is an error
     #[arg(long, value_name = "SCALE", value_parser = scale, hide_short_help = true)]
-    pub(super) depth_scale: Option<f64>,
+    pub(in super::super) depth_scale: Option<f64>,
     /// Write times, counts and adapter as JSON, to a file or - for standard output
     #[arg(long, value_name = "FILE|-")]
-    pub(super) json: Option<PathBuf>,
+    pub(in super::super) json: Option<PathBuf>,
 }
 
 /// Parses the names of the image formats that this build writes.

@@ -8,12 +8,13 @@ use epsplat::io::place::Place;
 use epsplat::{Error, Frame, Maps, Result};
 
 use super::Arguments;
+use super::arguments::FileArguments;
 
 /// The path that stands for standard output.
-pub(super) const STANDARD: &str = "-";
+pub(in super::super) const STANDARD: &str = "-";
 
 /// The format and content of images, and whether they go to standard output.
-pub(super) struct Target {
+pub(in super::super) struct Target {
     pub format: ImageFormat,
     content: Content,
     pub is_standard: bool,
@@ -26,8 +27,16 @@ impl Target {
     ///
     /// [`Error::Usage`] if name, format and maps do not go together.
     pub fn of_one(arguments: &Arguments) -> Result<Self> {
-        let path = &arguments.output;
-        let format = match (arguments.file.format, path == Path::new(STANDARD)) {
+        Self::of_picture(&arguments.output, &arguments.file, Maps::of(&arguments.options.maps.aov))
+    }
+
+    /// Returns the target of the image at `path` with `maps`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Target::of_one`].
+    pub fn of_picture(path: &Path, file: &FileArguments, maps: Maps) -> Result<Self> {
+        let format = match (file.format, path == Path::new(STANDARD)) {
             (given, true) => given.unwrap_or(ImageFormat::PNG),
             (None, false) => ImageFormat::of_path(path)?,
             (Some(given), false) => match ImageFormat::of_path(path) {
@@ -41,7 +50,7 @@ impl Target {
                 _ => given,
             },
         };
-        Self::of_format(arguments, format)
+        Self::of_format((path, file), format, maps)
     }
 
     /// Returns the target of many images.
@@ -61,19 +70,19 @@ impl Target {
                 format.name()
             )));
         }
-        Self::of_format(arguments, format)
+        Self::of_format((&arguments.output, file), format, Maps::of(&arguments.options.maps.aov))
     }
 
-    fn of_format(arguments: &Arguments, format: ImageFormat) -> Result<Self> {
-        let content = format.content(Maps::of(&arguments.options.maps.aov), arguments.file.depth_scale)?;
-        let is_standard = arguments.output == Path::new(STANDARD);
+    fn of_format((path, file): (&Path, &FileArguments), format: ImageFormat, maps: Maps) -> Result<Self> {
+        let content = format.content(maps, file.depth_scale)?;
+        let is_standard = path == Path::new(STANDARD);
         if is_standard && std::io::stdout().is_terminal() {
             return Err(Error::Usage(
                 "standard output is a terminal, which shows no image: give a file, or a pipe as in '-o - | program'"
                     .into(),
             ));
         }
-        if is_standard && arguments.file.json.as_deref() == Some(Path::new(STANDARD)) {
+        if is_standard && file.json.as_deref() == Some(Path::new(STANDARD)) {
             return Err(Error::Usage(
                 "the image and the JSON would both go to standard output: give a file for one of them".into(),
             ));

@@ -1,0 +1,321 @@
+//! The places at which processes that draw a frame together exchange values of its pixels.
+//!
+//! Two stages of a frame reduce: visibility takes a minimum of depths, and accumulate adds
+//! integers. Both are associative and commutative, so each process may draw a share of the surfels
+//! ([`share`](crate::passes::share)) and the processes reduce their results in any order: the frame
+//! has the bits of one process. An [`Exchange`] does that over files, threads or a network. It is
+//! called three times for each band of a render:
+//!
+//! ```text
+//! triangles   every process draws all of them; one that has none gets those of another
+//! nearest     nearest(x, y) = min over processes, before accumulate compares depths with it
+//! sums        sums(x, y)    = sum over processes, before resolve divides
+//! ```
+//!
+//! A frame without an exchange is the same steps without these calls. An exchange only ever gets
+//! values of complete bands: a try whose buffers were too small is repeated before it is called.
+
+use std::collections::HashMap;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use super::count::Capacities;
+use super::run::Run;
+use crate::error::{Error, Result};
+use crate::passes::accumulate;
+use crate::plan::Plan;
+use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
+use crate::plan::steps::Exchanged;
+
+/// Rows of samples of one of the renders that make a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rows {
+    /// Number of the render: 0 is that of the colour, others make maps.
+    pub render: usize,
+    /// The first row, in samples from the top.
+    pub first: u32,
+    /// Number of rows, samples.
+    pub rows: u32,
+    /// Columns of the render, samples.
+    pub width: u32,
+}
+
+impl Rows {
+    /// The range of these samples among those of the whole render, row by row.
+    pub fn samples(&self) -> std::ops::Range<usize> {
+        let [first, rows, width] = [self.first, self.rows, self.width].map(|n| n as usize);
+        first * width..(first + rows) * width
+    }
+}
+
+/// What a process does with a band after an exchange.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Then {
+    /// Goes on with the exchanged values.
+    Go,
+    /// Leaves the rest of the band out, and the band has no image.
+    Stop,
+}
+
+/// Reduces values of pixels over all processes that draw a frame together.
+///
+/// Bands follow from the adapter's limits, so processes that exchange at once need the same limits.
+/// An exchange through files may have other rows in each process. A frame that is retried repeats
+/// its calls with the same values.
+pub trait Exchange: Sync {
+    /// Whether the process draws the triangles itself. If not, [`Exchange::triangles`] gives them.
+    fn draws_triangles(&self) -> bool {
+        true
+    }
+
+    /// Keeps or gives the shaded triangles of `rows`, 8 words for each sample; all are 0 where no
+    /// triangle shows. The function reads those that this process drew. The result takes their
+    /// place, unless it is `None`.
+    ///
+    /// # Errors
+    /// Any error of the device or of the exchange.
+    fn triangles(&self, _rows: &Rows, _drawn: &dyn Fn() -> Result<Vec<u32>>) -> Result<Option<Vec<u32>>> {
+        Ok(None)
+    }
+
+    /// Replaces the nearest depths of `rows`, one word for each sample, by those of all processes.
+    /// A depth is stored as bits(+inf) - bits(depth), so the nearest is the greatest word, and 0 is
+    /// nothing.
+    ///
+    /// # Errors
+    /// Any error of the exchange.
+    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then>;
+
+    /// Replaces the sums of `rows`, [`PixelLayout::channels`](crate::plan::PixelLayout::channels)
+    /// for each sample, by those of all processes, added.
+    ///
+    /// # Errors
+    /// Any error of the exchange.
+    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then>;
+}
+
+/// An exchange, and the render of the frame that it is called for.
+#[derive(Clone, Copy)]
+pub(super) struct Among<'a> {
+    pub exchange: &'a dyn Exchange,
+    pub render: usize,
+}
+
+/// How a try goes on after an exchange.
+pub(super) enum Onward {
+    /// With the next step.
+    Next,
+    /// With the next band.
+    EndBand,
+    /// With another try, because buffers were too small.
+    Retry,
+}
+
+impl Run<'_> {
+    /// Exchanges values of `band`, if several processes draw the frame.
+    pub(super) fn exchange(&mut self, what: Exchanged, band: usize) -> Result<Onward> {
+        let Some(Among { exchange, render }) = self.among else { return Ok(Onward::Next) };
+        let of = &self.plan.bands[band];
+        let rows = Rows { render, first: of.first, rows: of.rows, width: self.plan.width };
+        self.timing.flush(self.gpu)?;
+        let then = match what {
+            Exchanged::Triangles => {
+                let drawn = || self.drawn_triangles(band);
+                if let Some(given) = exchange.triangles(&rows, &drawn)? {
+                    self.put_triangles(band, &given)?;
+                }
+                Then::Go
+            }
+            Exchanged::Nearest => {
+                if !self.is_complete(band)? {
+                    return Ok(Onward::Retry);
+                }
+                let mut words = self.words("nearest", of.pixels)?;
+                let then = exchange.nearest(&rows, &mut words)?;
+                if then == Then::Go {
+                    self.put("nearest", &words, of.pixels)?;
+                }
+                then
+            }
+            Exchanged::Sums => {
+                if !self.is_complete(band)? {
+                    return Ok(Onward::Retry);
+                }
+                let stored = self.words("sums", of.pixels * u64::from(self.plan.sum_words))?;
+                let mut sums = accumulate::canonical(&self.plan.needs, &stored);
+                let then = exchange.sums(&rows, &mut sums)?;
+                if then == Then::Go {
+                    let stored = accumulate::kept(&self.plan.needs, &sums);
+                    self.put("sums", &stored, of.pixels * u64::from(self.plan.sum_words))?;
+                }
+                then
+            }
+        };
+        Ok(if then == Then::Go { Onward::Next } else { Onward::EndBand })
+    }
+
+    /// Whether the buffers held everything so far. If not, the sizes for the next try are recorded.
+    fn is_complete(&mut self, band: usize) -> Result<bool> {
+        let capacities = Capacities::of(self.plan, self.store, self.by_tiles);
+        let counted = self.timing.counts(self.gpu, &capacities.counters(self.store))?;
+        let compared = capacities.compared(&counted);
+        let complete = compared.lacking == 0;
+        if !complete {
+            self.count(band, &counted);
+            self.learn();
+        }
+        Ok(complete)
+    }
+
+    /// The first words of a buffer; none if the frame does not have it.
+    fn words(&self, name: &str, len: u64) -> Result<Vec<u32>> {
+        self.store.buffer(name).map_or_else(|| Ok(Vec::new()), |buffer| buffer.read(self.gpu, len))
+    }
+
+    /// Overwrites the first `len` words of a buffer.
+    fn put(&self, name: &str, words: &[u32], len: u64) -> Result<()> {
+        let Some(buffer) = self.store.buffer(name) else { return Ok(()) };
+        if words.len() as u64 != len {
+            return Err(self.gpu.error("values of pixels were exchanged that belong to another frame"));
+        }
+        buffer.write(self.gpu, words.len(), |range| words[range].into(), &())
+    }
+
+    /// The shaded triangles of each pixel of `band`, with 0 in tiles where none shows.
+    fn drawn_triangles(&self, band: usize) -> Result<Vec<u32>> {
+        let of = &self.plan.bands[band];
+        let pixels = of.pixels as usize * TRIANGLE_PIXEL_WORDS as usize;
+        let mut words = self.words("triangle_pixels", triangle_words(self.plan, band))?;
+        let tiles = words.split_off(pixels.min(words.len()));
+        let width = self.plan.width as usize;
+        for (pixel, record) in words.chunks_exact_mut(TRIANGLE_PIXEL_WORDS as usize).enumerate() {
+            let tile = tile_of(pixel, width);
+            // Pixels of tiles without triangles hold values of earlier bands.
+            if tiles.get(4 * tile).is_none_or(|shows| *shows == 0) {
+                record.fill(0);
+            }
+        }
+        Ok(words)
+    }
+
+    /// Writes the shaded triangles of `band`, and which tiles have any.
+    fn put_triangles(&self, band: usize, given: &[u32]) -> Result<()> {
+        let of = &self.plan.bands[band];
+        let mut words = given.to_vec();
+        words.resize(triangle_words(self.plan, band) as usize, 0);
+        let pixels = of.pixels as usize * TRIANGLE_PIXEL_WORDS as usize;
+        if given.len() != pixels {
+            return Err(self.gpu.error("triangles of pixels were exchanged that belong to another frame"));
+        }
+        for (pixel, record) in given.chunks_exact(TRIANGLE_PIXEL_WORDS as usize).enumerate() {
+            if record.iter().any(|word| *word != 0) {
+                let tile = pixels + 4 * tile_of(pixel, self.plan.width as usize);
+                words[tile..tile + 4].fill(1f32.to_bits());
+            }
+        }
+        self.put("triangle_pixels", &words, words.len() as u64)
+    }
+}
+
+/// The side of the tiles that know whether triangles show in them, pixels
+/// (`wgsl/triangles/triangles_tiles.wgsl`).
+const TILE: usize = crate::gpu::layout::OCCLUSION_TILE as usize;
+
+/// The tile of a band's pixel.
+fn tile_of(pixel: usize, width: usize) -> usize {
+    pixel / width / TILE * width.div_ceil(TILE) + pixel % width / TILE
+}
+
+/// Words of a band's shaded triangles, its tiles included.
+fn triangle_words(plan: &Plan, band: usize) -> u64 {
+    crate::passes::triangles::pixel_words(&plan.bands[band])
+}
+
+/// The triangle stages of a process that is given the triangles are left out.
+pub(super) fn is_of_triangles(pass: &str) -> bool {
+    pass == crate::passes::triangles::PASS.name
+}
+
+/// A meeting of threads that draw a frame together: each waits until all have given their values.
+/// It serves tests, and is the model of exchanges over a network.
+pub struct Meeting {
+    parts: usize,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// One thread of a [`Meeting`]. Dropping it before the frame is done ends the frame of all others
+/// with an error.
+pub struct Member<'a> {
+    meeting: &'a Meeting,
+    /// Results that this member has had, for a frame that is tried again.
+    had: Mutex<HashMap<(Exchanged, Rows), Vec<u64>>>,
+}
+
+#[derive(Default)]
+struct State {
+    /// The reduced values so far, and how many members gave theirs.
+    met: HashMap<(Exchanged, Rows), (Vec<u64>, usize)>,
+    left: bool,
+}
+
+impl Meeting {
+    /// A meeting of `parts` members, for one frame.
+    pub fn new(parts: usize) -> Self {
+        Self { parts, state: Mutex::default(), changed: Condvar::new() }
+    }
+
+    /// A member of the meeting.
+    pub fn member(&self) -> Member<'_> {
+        Member { meeting: self, had: Mutex::default() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Member<'_> {
+    /// Waits for the values of all members, reduced by `reduce`.
+    fn meet(&self, key: (Exchanged, Rows), own: Vec<u64>, reduce: fn(u64, u64) -> u64) -> Result<Vec<u64>> {
+        let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(values) = had.get(&key) {
+            return Ok(values.clone());
+        }
+        let mut state = self.meeting.state();
+        let (values, given) = state.met.entry(key).or_insert_with(|| (vec![0; own.len()], 0));
+        values.iter_mut().zip(own).for_each(|(value, own)| *value = reduce(*value, own));
+        *given += 1;
+        self.meeting.changed.notify_all();
+        loop {
+            match state.met.get(&key) {
+                Some((values, given)) if *given == self.meeting.parts => {
+                    had.insert(key, values.clone());
+                    return Ok(values.clone());
+                }
+                _ if state.left => return Err(Error::Usage("another part of the frame failed".into())),
+                _ => state = self.meeting.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+            }
+        }
+    }
+}
+
+impl Exchange for Member<'_> {
+    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
+        let own = words.iter().map(|word| u64::from(*word)).collect();
+        let all = self.meet((Exchanged::Nearest, *rows), own, u64::max)?;
+        *words = all.into_iter().map(|word| word as u32).collect();
+        Ok(Then::Go)
+    }
+
+    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+        *sums = self.meet((Exchanged::Sums, *rows), std::mem::take(sums), u64::wrapping_add)?;
+        Ok(Then::Go)
+    }
+}
+
+impl Drop for Member<'_> {
+    fn drop(&mut self) {
+        self.meeting.state().left = true;
+        self.meeting.changed.notify_all();
+    }
+}

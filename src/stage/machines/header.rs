@@ -1,0 +1,140 @@
+//! The header of a part: the picture that it belongs to, and its shares.
+
+use serde::{Deserialize, Serialize};
+
+use crate::plan::{Facts, Settings};
+use crate::scene::camera::check_size;
+use crate::scene::share::MOST_SHARES;
+use crate::scene::{Camera, Maps};
+
+/// What the values of a part are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Holds {
+    /// Nearest depths.
+    Depths,
+    /// Sums.
+    Sums,
+}
+
+impl Holds {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Depths => "nearest depths",
+            Self::Sums => "sums",
+        }
+    }
+}
+
+/// Everything that a picture depends on, apart from the surfels.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Subject {
+    /// The version of epsplat.
+    pub version: String,
+    /// Facts of the whole scene.
+    pub facts: Facts,
+    /// The digest of the whole scene ([`digest`](crate::passes::digest)).
+    pub digest: u64,
+    pub camera: Camera,
+    pub settings: Settings,
+    /// The maps that the user asked for.
+    pub maps: Maps,
+    /// The scene's axis of heights, of length 1.
+    pub up: [f64; 3],
+}
+
+/// The header of a part.
+#[derive(Clone, Serialize, Deserialize)]
+pub(super) struct Header {
+    pub holds: Holds,
+    /// Number of shares of the scene.
+    pub of: u32,
+    /// The shares that the part has, in order, from 1.
+    pub shares: Vec<u32>,
+    /// The digest of the surfels of these shares.
+    pub own: u64,
+    /// The digest of the nearest depths within which sums were made.
+    pub within: Option<u64>,
+    /// The adapters that drew the shares, in order, each once.
+    pub adapters: Vec<String>,
+    pub subject: Subject,
+}
+
+/// The version of epsplat, which a header names.
+pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+impl Header {
+    pub fn encoded(&self) -> Vec<u8> {
+        encoded(self)
+    }
+
+    /// Reads a header.
+    ///
+    /// # Errors
+    /// A sentence if another version of epsplat wrote it.
+    pub fn decoded(bytes: &[u8]) -> Result<Self, String> {
+        /// The only fields that all versions have.
+        #[derive(Deserialize)]
+        struct Known {
+            subject: Version,
+        }
+        #[derive(Deserialize)]
+        struct Version {
+            version: String,
+        }
+        let other = |version: &str| {
+            format!("epsplat {version} drew it, and this is {VERSION}: draw and merge all parts by one version")
+        };
+        if let Ok(Known { subject: Version { version } }) = ciborium::from_reader::<Known, _>(bytes)
+            && version != VERSION
+        {
+            return Err(other(&version));
+        }
+        let header: Self = ciborium::from_reader(bytes).map_err(|_| other("of another build"))?;
+        let in_order = header.shares.is_sorted_by(|one, next| one < next);
+        let known = header.shares.iter().all(|share| (1..=header.of).contains(share));
+        let Camera { width, height, .. } = header.subject.camera;
+        let some = !header.shares.is_empty() && header.of <= MOST_SHARES && check_size(width, height).is_ok();
+        match in_order && known && some {
+            true => Ok(header),
+            false => Err("its header names shares or a size that no picture has: draw the part again".into()),
+        }
+    }
+
+    /// Returns how the picture of this part differs from that of `other`: a subject and a verb.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let (one, two) = (&self.subject, &other.subject);
+        let same = |one: &dyn Fn(&Subject) -> Vec<u8>| one(&self.subject) == one(&other.subject);
+        if self.of != other.of {
+            return Some(format!("is one of {} parts, and there it is one of {}", self.of, other.of));
+        }
+        if one.digest != two.digest || !same(&|subject| encoded(&subject.facts)) || one.up != two.up {
+            return Some("is of another scene".into());
+        }
+        if one.camera != two.camera {
+            return Some("is of another camera".into());
+        }
+        let name = different_setting(&one.settings, &two.settings);
+        let name = name.or((one.maps != two.maps).then(|| "maps".to_owned()))?;
+        Some(format!("is of other options ({name})"))
+    }
+}
+
+/// The name of the first setting that differs.
+fn different_setting(one: &Settings, two: &Settings) -> Option<String> {
+    let fields = |settings: &Settings| match ciborium::Value::serialized(settings) {
+        Ok(ciborium::Value::Map(fields)) => fields,
+        _ => Vec::new(),
+    };
+    let different = fields(one).into_iter().zip(fields(two)).find(|(one, two)| one != two);
+    let name = |key: ciborium::Value| key.into_text().unwrap_or_default().replace('_', " ");
+    different.map(|((key, _), _)| name(key))
+}
+
+/// The bytes of a value as CBOR.
+fn encoded(value: &impl Serialize) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to memory does not fail, and all types of a header have a form in CBOR.
+    let written = ciborium::into_writer(value, &mut bytes);
+    debug_assert!(written.is_ok());
+    bytes
+}

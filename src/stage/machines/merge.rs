@@ -1,0 +1,217 @@
+//! Joins the parts of several processes, and makes the picture of all.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::Part;
+use super::files::All;
+use super::header::{Header, Holds};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::io::part::{Content, Section, Values};
+use crate::options::DeviceOptions;
+use crate::passes::share::NoneOfScene;
+use crate::passes::unseen::is_empty;
+use crate::progress::Progress;
+use crate::render::{Renderer, Report};
+use crate::scene::{Camera, Maps};
+use crate::stage::heights;
+use crate::stage::renderer::backend;
+
+/// The picture of all parts.
+#[derive(Debug)]
+pub struct Merged {
+    /// The colour and the maps.
+    pub frame: Frame,
+    /// Times and counts of the process that merged.
+    pub report: Report,
+    /// The camera.
+    pub camera: Camera,
+}
+
+/// Joins parts of one picture that hold the same kind of values; the order does not matter. Some
+/// parts may still be missing: parts that were merged can be merged again.
+///
+/// ```no_run
+/// use epsplat::{DeviceOptions, Part, RenderOptions, Renderer, Scene, SceneOptions, Share, View, merge};
+///
+/// let (options, device) = (RenderOptions::default(), DeviceOptions::default());
+/// let scene = Scene::open(["scan.laz"], &SceneOptions::default())?;
+/// let renderer = Renderer::new(&scene, &options, &device, &())?;
+/// let pass = |within: Option<&Part>| {
+///     // Each part could be drawn by another process, and sent as part.bytes().
+///     let draw = |number| renderer.part(&View::default(), Share::new(number, 3)?, within, &());
+///     merge(&(1..=3).map(draw).collect::<Result<Vec<_>, _>>()?)
+/// };
+/// let depths = pass(None)?;
+/// let sums = pass(Some(&depths))?;
+/// let frame = sums.picture(&device, &())?.frame;
+/// # Ok::<(), epsplat::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Usage`] without parts. [`Error::Malformed`], which names the part, for a part of
+/// another scene, camera, options or number of shares, with a share that is there already, or with
+/// damaged values.
+pub fn merge(parts: &[Part]) -> Result<Part> {
+    let [first, others @ ..] = parts else {
+        return Err(Error::Usage("there is nothing to merge: name the parts".into()));
+    };
+    others.iter().try_for_each(|other| check(first, other))?;
+    let mut owners: BTreeMap<u32, &Path> = BTreeMap::new();
+    for part in parts {
+        for share in &part.header.shares {
+            if let Some(other) = owners.insert(*share, &part.name) {
+                let of = part.header.of;
+                return Err(part.refused(format!(
+                    "it has part {share}/{of}, and so has {}: leave one of them out",
+                    other.display()
+                )));
+            }
+        }
+    }
+    let own = parts.iter().fold(0u64, |own, part| own.wrapping_add(part.header.own));
+    let adapters: BTreeSet<&String> = parts.iter().flat_map(|part| &part.header.adapters).collect();
+    let adapters = adapters.into_iter().cloned().collect();
+    let header = Header { shares: owners.into_keys().collect(), own, adapters, ..first.header.clone() };
+    let whole = header.shares.len() == header.of as usize;
+    if whole && own != header.subject.digest {
+        let what = "it and the other parts do not cover the scene once: draw them again from the same inputs";
+        return Err(first.refused(what));
+    }
+    Ok(Part { name: first.name.clone(), header, sections: sections(parts)? })
+}
+
+/// Fails unless `other` can be merged with `first`.
+fn check(first: &Part, other: &Part) -> Result<()> {
+    let name = first.name.display();
+    if let Some(difference) = other.header.difference(&first.header) {
+        return Err(other.refused(format!("it {difference} than {name}: merge the parts of one picture")));
+    }
+    let [own, there] = [other, first].map(|part| part.header.holds);
+    if own != there {
+        let (own, there) = (own.name(), there.name());
+        return Err(other.refused(format!("it holds {own}, and {name} holds {there}: merge one kind at a time")));
+    }
+    if other.header.within != first.header.within {
+        return Err(other.refused(format!(
+            "its sums lie within other depths than those of {name}: draw all of them --within the same depths"
+        )));
+    }
+    Ok(())
+}
+
+/// The sections of all parts, one for each kind of values of each render.
+fn sections(parts: &[Part]) -> Result<Vec<Section>> {
+    let mut kinds: BTreeMap<(Values, u32), (u32, u16, u32)> = BTreeMap::new();
+    for part in parts {
+        let mut ends: BTreeMap<(Values, u32), u32> = BTreeMap::new();
+        for section in &part.sections {
+            section.reduce(0..0, &mut []).map_err(|what| part.refused(what))?;
+            let end = ends.entry((section.values, section.render)).or_default();
+            let kind = (section.width, section.each);
+            let known =
+                kinds.get(&(section.values, section.render)).is_none_or(|(width, each, _)| kind == (*width, *each));
+            if section.first != *end || !known {
+                return Err(part.refused("its rows do not make an image: draw the part again"));
+            }
+            *end += section.rows;
+            let rows = kinds.get(&(section.values, section.render)).map_or(0, |(_, _, rows)| *rows);
+            kinds.insert((section.values, section.render), (section.width, section.each, rows.max(*end)));
+        }
+        let short = ends.iter().any(|(kind, end)| kinds.get(kind).is_some_and(|(.., rows)| end != rows));
+        if short {
+            return Err(part.refused("it lacks rows of the image: draw the part again"));
+        }
+    }
+    let of = |((values, render), (width, each, rows)): ((Values, u32), (u32, u16, u32))| {
+        let all = |samples: Range<usize>| {
+            let mut all = vec![0; samples.len() * usize::from(each)];
+            let sections = parts.iter().flat_map(|part| &part.sections);
+            for section in sections.filter(|own| (own.values, own.render) == (values, render)) {
+                // All sections have been read once, so they are not damaged.
+                let _ = section.reduce(samples.clone(), &mut all);
+            }
+            all
+        };
+        Section::new(values, render, (width, 0, rows), each, all)
+    };
+    Ok(kinds.into_iter().map(of).collect())
+}
+
+impl Part {
+    /// Fails if shares are missing, and names them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_whole(&self) -> Result<()> {
+        let Header { of, shares, holds, .. } = &self.header;
+        let missing: Vec<String> =
+            (1..=*of).filter(|share| !shares.contains(share)).map(|share| format!("{share}/{of}")).collect();
+        let holds = holds.name();
+        match &missing[..] {
+            [] => Ok(()),
+            [one] => Err(Error::Usage(format!("the {holds} of part {one} are missing: name its file too"))),
+            [first, .., last] => Err(Error::Usage(format!(
+                "the {holds} of {} parts are missing, {first} to {last}: name their files too",
+                missing.len()
+            ))),
+        }
+    }
+
+    /// Fails unless the part has the sums of all shares.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check_picture(&self) -> Result<()> {
+        if self.header.holds == Holds::Depths {
+            return Err(Error::Usage(
+                "the parts hold nearest depths, which make no picture: draw sums with --within and merge those".into(),
+            ));
+        }
+        self.check_whole()
+    }
+
+    /// The names of the adapters that drew the shares, in order, each once.
+    pub fn adapters(&self) -> &[String] {
+        &self.header.adapters
+    }
+
+    /// The maps of the picture, as the user asked for them.
+    pub fn maps(&self) -> Maps {
+        self.header.subject.maps
+    }
+
+    /// A hash of the values of a part that was merged.
+    pub(super) fn digest(&self) -> u64 {
+        let bytes = Content { header: Vec::new(), sections: self.sections.clone() }.encoded();
+        // FNV-1a of 64 bits.
+        bytes
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
+    }
+
+    /// Makes the picture of all parts on a device, without the scene. Its bits are those of a
+    /// picture that one process draws, on an adapter like that of the parts.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if parts are missing or hold depths, [`Error::Malformed`] for damaged values,
+    /// and errors of the device.
+    pub fn picture(&self, device: &DeviceOptions, progress: &dyn Progress) -> Result<Merged> {
+        self.check_picture()?;
+        let subject = &self.header.subject;
+        let backend = backend(device, progress)?;
+        let source = NoneOfScene::new(subject.facts.clone());
+        let mut renderer = Renderer::new(source, &subject.settings, &backend)?.among()?;
+        let (frame, report) = renderer.frame_among(&subject.camera, &All(self), progress)?;
+        let frame = frame.ok_or_else(|| self.refused("it makes no picture: draw the parts again"))?;
+        if is_empty(&frame, &subject.settings) {
+            progress.note("warning: nothing shows in this picture: the camera sees no surfel of any part");
+        }
+        let frame = heights::made(frame, &subject.camera, DVec3::from_array(subject.up), subject.maps);
+        Ok(Merged { frame, report, camera: subject.camera.clone() })
+    }
+}

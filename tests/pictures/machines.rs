@@ -1,0 +1,322 @@
+//! Frames that several processes draw together, here threads: every one of them gets the bits of a
+//! frame that one process draws, however the surfels are shared.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use crate::common;
+
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::Mutex;
+
+use common::any_scene::taken;
+use common::scenes::{sphere, sphere_camera};
+use common::{Random, any_options, any_scene};
+use epsplat::low_level::frame::Frame;
+use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::passes::share::ShareOfScene;
+use epsplat::low_level::passes::source::{Page, Source};
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Settings, check};
+use epsplat::low_level::render::exchange::{Exchange, Meeting, Rows, Then};
+use epsplat::low_level::render::{Backend, Renderer, render};
+use epsplat::low_level::scene::{
+    Blend, Camera, Colors, Composite, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Share, Triangles,
+};
+use epsplat::options::{Cull, Epsilon};
+use epsplat::{DeviceOptions, Part, RenderOptions, Result, SceneOptions, View, merge};
+
+/// Some surfels of a scene, with the facts of the whole scene.
+struct Hand {
+    scene: Scene,
+    facts: Facts,
+}
+
+impl Source for Hand {
+    fn facts(&self) -> Facts {
+        Facts { share: Some(self.scene.surfels.len() as u64), ..self.facts.clone() }
+    }
+
+    fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
+        self.scene.pages(needs, most, ordered)
+    }
+
+    fn textures(&self) -> &[Mipmap] {
+        self.scene.textures()
+    }
+
+    fn triangles(&self) -> Option<&Triangles> {
+        Source::triangles(&self.scene)
+    }
+
+    fn provenance(&self) -> Cow<'_, Provenance> {
+        self.scene.provenance()
+    }
+
+    fn whole(&self) -> Option<&Scene> {
+        None
+    }
+}
+
+/// Shares that are runs of the stored order.
+fn shares(scene: &Scene, of: u32) -> Vec<Box<dyn Source>> {
+    let scene = Arc::new(scene.clone());
+    let share = |number| Box::new(ShareOfScene::new(scene.clone(), Share::new(number, of).unwrap()));
+    (1..=of).map(|number| share(number) as Box<dyn Source>).collect()
+}
+
+/// Shares of any surfels; some may be empty.
+fn hands(scene: &Scene, of: u32, random: &mut Random) -> Vec<Box<dyn Source>> {
+    let mut dealt = vec![Vec::new(); of as usize];
+    (0..scene.surfels.len()).for_each(|surfel| dealt[random.below(of as usize)].push(surfel));
+    let facts = Facts::of(scene);
+    let hand = |indices: Vec<usize>| Box::new(Hand { scene: taken(scene, &indices), facts: facts.clone() });
+    dealt.into_iter().map(|indices| hand(indices) as Box<dyn Source>).collect()
+}
+
+/// Draws a frame with a thread for each source, and returns the frames of all of them.
+fn together(sources: &[Box<dyn Source>], camera: &Camera, options: &Settings, gpu: &Gpu) -> Vec<Frame> {
+    let meeting = Meeting::new(sources.len());
+    let backend = Backend::gpu(gpu.clone());
+    // The members outlive all threads: one that left early would end the frames of the others.
+    let members: Vec<_> = sources.iter().map(|_| meeting.member()).collect();
+    std::thread::scope(|scope| {
+        let mut threads = Vec::new();
+        for (source, member) in sources.iter().zip(&members) {
+            let backend = &backend;
+            threads.push(scope.spawn(move || {
+                let mut renderer = Renderer::new(Box::as_ref(source), options, backend).unwrap().among().unwrap();
+                renderer.frame_among(camera, member, &()).unwrap().0.unwrap()
+            }));
+        }
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    })
+}
+
+fn alone(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Frame {
+    render(scene, camera, options, &Backend::gpu(gpu.clone()), &()).unwrap().0
+}
+
+/// Random pictures in which parts can be summed: what cannot be is left out of the options.
+fn opaque(scene: &Scene, random: &mut Random) -> Settings {
+    let options = any_options::sampled(scene, random);
+    Settings {
+        composite: Composite::Opaque,
+        blend: Blend::Weighted,
+        separate: false,
+        accumulator: Accumulator::Fixed,
+        maps: options.maps.beside(Maps::of(&[Map::Index, Map::Surfaces, Map::Tail, Map::Decision])),
+        organisation: any_options::pick(random, &[Organisation::Auto, Organisation::Auto, Organisation::Scatter]),
+        without: any_options::without(random),
+        ..options
+    }
+}
+
+#[test]
+fn any_shares_of_any_scene_make_the_bits_of_one_process() {
+    let Some(gpu) = common::gpu() else { return };
+    let (mut drawn, mut features) = (0, std::collections::BTreeSet::new());
+    for seed in 0..if common::takes(1, 2) { 400 } else { 30 } {
+        let random = &mut Random(7000 + seed);
+        let any_scene::Sampled { scene, camera, about } = any_scene::sampled(random);
+        let options = opaque(&scene, random);
+        let facts = Facts::of(&scene);
+        let refused = check::options(&options, false).and_then(|()| check::scene(&facts, &options, false));
+        if refused.and_then(|()| check::parts(&facts, &options, false)).is_err() {
+            continue;
+        }
+        // Small buffers cut the frame into bands and the surfels into pages.
+        let gpu = if random.one_in(3) { gpu.clone().with_buffer_limit(90_000) } else { gpu.clone() };
+        let Ok((whole, _)) = render(&scene, &camera, &options, &Backend::gpu(gpu.clone()), &()) else { continue };
+        let of = [1, 2, 3, 7][random.below(4)];
+        // Places in an image are stored relative to the range of all, which a hand does not know.
+        let runs = random.one_in(2) || matches!(scene.colors, Colors::Textured(_));
+        let sources = if runs { shares(&scene, of) } else { hands(&scene, of, random) };
+        for frame in together(&sources, &camera, &options, &gpu) {
+            assert!(frame.hashes() == whole.hashes(), "seed {seed}: {about:?} of {of}, {options:?}");
+        }
+        drawn += 1;
+        features.extend(about);
+    }
+    println!("{drawn} pictures of {features:?}");
+    assert!(drawn > 10 && features.contains("triangles") && features.contains("inputs"), "{drawn} {features:?}");
+}
+
+/// Sums in f32, in the order of the parts.
+struct Floats<'a> {
+    of_depths: &'a dyn Exchange,
+    parts: &'a Mutex<Vec<Vec<f32>>>,
+}
+
+impl Exchange for Floats<'_> {
+    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
+        self.of_depths.nearest(rows, words)
+    }
+
+    fn sums(&self, _: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+        self.parts.lock().unwrap().push(sums.iter().map(|sum| *sum as f32).collect());
+        Ok(Then::Stop)
+    }
+}
+
+/// The control: partial sums that are rounded to f32 before they are added depend on the shares.
+#[test]
+fn floats_would_depend_on_the_shares() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = (sphere(3000, 2.5), sphere_camera(64, Projection::Pinhole));
+    let options = Settings::default();
+    let added = |of: u32| {
+        let sources = shares(&scene, of);
+        let (meeting, parts) = (Meeting::new(sources.len()), Mutex::default());
+        let members: Vec<_> = sources.iter().map(|_| meeting.member()).collect();
+        std::thread::scope(|scope| {
+            for (source, member) in sources.iter().zip(&members) {
+                let (gpu, camera, options, parts) = (&gpu, &camera, &options, &parts);
+                scope.spawn(move || {
+                    let backend = Backend::gpu(gpu.clone());
+                    let mut renderer = Renderer::new(&**source, options, &backend).unwrap().among().unwrap();
+                    let exchange = Floats { of_depths: member, parts };
+                    assert!(renderer.frame_among(camera, &exchange, &()).unwrap().0.is_none());
+                });
+            }
+        });
+        let parts = parts.into_inner().unwrap();
+        let mut sum = vec![0f32; parts[0].len()];
+        parts.iter().for_each(|part| sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part));
+        sum
+    };
+    let [one, three] = [1, 3].map(added);
+    assert!(one.iter().zip(&three).any(|(one, three)| one != three), "floats gave the same sums");
+    let whole = alone(&scene, &camera, &options, &gpu);
+    let parts = together(&shares(&scene, 3), &camera, &options, &gpu);
+    assert!(parts.iter().all(|frame| frame.hashes() == whole.hashes()));
+}
+
+#[test]
+fn a_part_that_fails_ends_the_others() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = (sphere(500, 1.5), sphere_camera(32, Projection::Pinhole));
+    let sources = shares(&scene, 2);
+    let meeting = Meeting::new(2);
+    let member = meeting.member();
+    drop(meeting.member());
+    let backend = Backend::gpu(gpu);
+    let mut renderer = Renderer::new(&*sources[0], &Settings::default(), &backend).unwrap().among().unwrap();
+    let error = renderer.frame_among(&camera, &member, &()).unwrap_err().to_string();
+    assert!(error.contains("another part"), "{error}");
+}
+
+#[test]
+fn pictures_that_parts_cannot_sum_are_refused() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = sphere(100, 1.5);
+    let backend = Backend::gpu(gpu);
+    let refusals: [(Settings, &str); 5] = [
+        (Settings { composite: Composite::Layers(2), ..Settings::default() }, "--composite"),
+        (Settings { composite: Composite::Sorted, ..Settings::default() }, "--composite"),
+        (Settings { accumulator: Accumulator::Fixed64, ..Settings::default() }, "--accumulator"),
+        (Settings { maps: Maps::of(&[Map::Index]), ..Settings::default() }, "index"),
+        (Settings { separate: true, ..Settings::default() }, "--separate"),
+    ];
+    for (options, name) in refusals {
+        let renderer = Renderer::new(&scene, &options, &backend).unwrap();
+        let error = renderer.among().err().unwrap().to_string();
+        assert!(error.contains(name), "{error}");
+    }
+    let samples = Settings { samples: Samples::FOUR, ..Settings::default() };
+    assert!(Renderer::new(&scene, &samples, &backend).unwrap().among().is_ok());
+    let reference = Renderer::new(&scene, &samples, &Backend::Reference).unwrap();
+    assert!(reference.among().err().unwrap().to_string().contains("reference"));
+}
+
+/// Draws both passes of a picture in `of` parts that travel as bytes, and merges them.
+fn by_parts(renderer: &epsplat::Renderer, view: &View, of: u32) -> epsplat::Merged {
+    let pass = |within: Option<&Part>| {
+        let draw = |number| {
+            let part = renderer.part(view, Share::new(number, of).unwrap(), within, &()).unwrap();
+            Part::of_bytes(format!("part {number}"), &part.bytes()).unwrap()
+        };
+        // The last part first: no order is needed.
+        merge(&(1..=of).rev().map(draw).collect::<Vec<_>>()).unwrap()
+    };
+    pass(Some(&pass(None))).picture(&DeviceOptions::default(), &()).unwrap()
+}
+
+/// Bytes whose checksum is right, but which are those of no part, are refused and never end the
+/// program; nor does a merge of parts that were read.
+#[test]
+fn changed_bytes_with_a_right_checksum_are_read_or_refused() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let scene =
+        epsplat::Scene::open([format!("{}/data/bunny.obj", env!("CARGO_MANIFEST_DIR"))], &SceneOptions::default());
+    let (options, device) = (RenderOptions::default(), DeviceOptions::default());
+    let renderer = epsplat::Renderer::new(&scene.unwrap(), &options, &device, &()).unwrap();
+    let camera = renderer.camera(&View::default()).unwrap();
+    let view = View::from(Camera { width: 20, height: 20, ..camera });
+    let part = |number| renderer.part(&view, Share::new(number, 2).unwrap(), None, &()).unwrap();
+    let (bytes, other) = (part(1).bytes(), part(2));
+    let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let (random, mut read, mut refused) = (&mut Random(3), 0, 0);
+    for turn in 0..3000 {
+        let mut changed = bytes.clone();
+        for _ in 0..1 + random.below(3) {
+            // Half of the changes lie in the header, half behind it.
+            let place = if turn % 2 == 0 { 24 + random.below(header) } else { random.below(bytes.len() - 4) };
+            changed[place] = random.below(256) as u8;
+        }
+        let body = changed.len() - 4;
+        let sum = crc32fast::hash(&changed[..body]);
+        changed[body..].copy_from_slice(&sum.to_le_bytes());
+        match Part::of_bytes("changed", &changed) {
+            Ok(part) => {
+                read += 1;
+                let _ = merge(&[other.clone(), part]);
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().starts_with("changed: "), "{error}");
+            }
+        }
+    }
+    assert!(read > 100 && refused > 100, "{read} {refused}");
+}
+
+/// Options of a test picture: its files, the change of the defaults, and the numbers of parts.
+type Case = (&'static [&'static str], fn(&mut RenderOptions), &'static [u32]);
+
+#[test]
+fn parts_of_files_make_the_bits_of_one_process() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let cases: [Case; 6] = [
+        (
+            &["bunny.obj"],
+            |options| options.maps.aov = vec![Map::Depth, Map::Normal, Map::Count, Map::Weight],
+            &[1, 2, 3, 7],
+        ),
+        (&["autzen.laz"], |options| options.maps.aov = vec![Map::Depth, Map::Height], &[1, 2, 3, 7]),
+        (&["bunny.obj", "autzen.laz", "simple.copc.laz"], |_| {}, &[3]),
+        (&["autzen.laz"], |options| options.look.edl = "1".parse().ok(), &[2]),
+        (&["autzen.laz"], |options| options.surface.epsilon = Some(Epsilon::Absolute(3.0)), &[7]),
+        (&["bunny.obj"], |options| options.surface.cull = Some(Cull::None), &[3]),
+    ];
+    for (number, (files, change, all)) in cases.into_iter().enumerate() {
+        let paths = files.iter().map(|file| format!("{}/data/{file}", env!("CARGO_MANIFEST_DIR")));
+        let scene = epsplat::Scene::open(paths, &SceneOptions::default()).unwrap();
+        let mut options = RenderOptions::default();
+        change(&mut options);
+        let mut renderer = epsplat::Renderer::new(&scene, &options, &DeviceOptions::default(), &()).unwrap();
+        let camera = renderer.camera(&View::default()).unwrap();
+        let scale = 100.0 / 1024.0;
+        let [fx, fy, cx, cy] = [camera.fx, camera.fy, camera.cx, camera.cy].map(|length| length * scale);
+        let view = View::from(Camera { width: 100, height: 100, fx, fy, cx, cy, ..camera });
+        let whole = renderer.frame(&view, &()).unwrap().frame;
+        for of in all {
+            let merged = by_parts(&renderer, &view, *of).frame;
+            assert!(merged.hashes() == whole.hashes(), "case {number} in {of} parts");
+        }
+        assert!(whole.color.iter().any(|pixel| pixel[3] > 0.0), "case {number} shows nothing");
+    }
+}

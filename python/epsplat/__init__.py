@@ -29,7 +29,7 @@ from ._errors import (
 )
 from ._frames import Frames
 from ._research import compare, error_map, study
-from ._renderer import Renderer
+from ._renderer import Renderer, merge, picture
 from ._scene import Scene, read
 from ._view import View, cameras, look_at, views
 
@@ -54,6 +54,8 @@ __all__ = [
     "error_map",
     "lod",
     "look_at",
+    "merge",
+    "picture",
     "read",
     "sample",
     "simplify",

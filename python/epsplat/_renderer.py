@@ -132,6 +132,38 @@ class Renderer:
         with stages(progress) as shown, opening():
             return Frames(self._renderer.map(options, shown))
 
+    def part(
+        self,
+        number: int,
+        of: int,
+        view: Optional[View] = None,
+        *,
+        within: Union[bytes, Sequence[bytes], None] = None,
+        progress: Progress = None,
+    ) -> bytes:
+        """Draws a part of a picture that several processes draw together.
+
+        Each process has a renderer of the same scene, options and size, and draws another number. The
+        first pass finds the nearest depths, the second one sums within those of all parts:
+
+            depths = [renderer.part(number, 3) for number in (1, 2, 3)]
+            sums = [renderer.part(number, 3, within=depths) for number in (1, 2, 3)]
+            frames = epsplat.picture(sums)  # the bits of renderer.render()
+
+        Parameters
+        ----------
+        number, of : part ``number`` of ``of``, counted from 1
+        within : the depths of all parts, one by one or merged; without it, depths are drawn
+
+        Returns
+        -------
+        bytes, as ``epsplat render --part`` writes them
+        """
+        number, of = _arrays.whole("number", number, 1, 2**32 - 1), _arrays.whole("of", of, 1, 2**32 - 1)
+        parts = None if within is None else _parts(within)
+        with stages(progress) as shown, opening():
+            return self._renderer.part(None if view is None else view._view, (number, of), parts, shown)
+
     @property
     def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
         """The least and the greatest corner of the box of the scene's centres, world units."""
@@ -140,6 +172,28 @@ class Renderer:
 
     def __repr__(self) -> str:
         return f"<epsplat.Renderer of {self._scene!r}>"
+
+
+def _parts(parts: Union[bytes, Sequence[bytes]]) -> List[bytes]:
+    """Returns parts as a list."""
+    return [parts] if isinstance(parts, (bytes, bytearray)) else list(parts)
+
+
+def merge(parts: Sequence[bytes]) -> bytes:
+    """Joins parts of one picture, in any order and some of them first. Returns a part."""
+    return _epsplat.merge_parts(_parts(parts))
+
+
+def picture(parts: Union[bytes, Sequence[bytes]], *, progress: Progress = None, **options: Any) -> Frames:
+    """Makes the picture of all parts that :meth:`Renderer.part` drew within the depths of all.
+
+    Parameters
+    ----------
+    parts : sums of all parts, one by one or merged
+    options : adapter
+    """
+    with stages(progress) as shown, opening():
+        return Frames(_epsplat.picture(_parts(parts), options, shown))
 
 
 def _views(viewmats: Any, Ks: Any, convention: str) -> List[_epsplat.View]:

@@ -5,6 +5,7 @@ mod arrays;
 mod clouds;
 mod error;
 mod images;
+mod machines;
 mod options;
 mod renderer;
 mod research;
@@ -23,6 +24,8 @@ mod _epsplat {
     use crate::clouds::{arrays, coverage, lod, sample, simplify, surfels, visible, write};
     #[pymodule_export]
     use crate::images::{encode, save};
+    #[pymodule_export]
+    use crate::machines::{merge_parts, picture};
     #[pymodule_export]
     use crate::renderer::{OfMap, Renderer};
     #[pymodule_export]

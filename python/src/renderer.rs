@@ -6,11 +6,15 @@ use std::thread;
 use std::time::Duration;
 
 use epsplat::io::place::Place;
-use epsplat::{Camera, CameraOptions, DeviceOptions, Error, Map, Progress, RenderOptions, Renderer as Kept, Result};
+use epsplat::{
+    Camera, CameraOptions, DeviceOptions, Error, Map, Progress, RenderOptions, Renderer as Kept, Result, Share,
+};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::error::exception;
+use crate::machines::one;
 use crate::options::{Scope, arguments, parsed, replace};
 use crate::scene::Scene;
 use crate::stack::Stack;
@@ -129,6 +133,26 @@ impl Renderer {
         result.set_item("pixel", place.pixel)?;
         result.set_item("place", OfMap(place))?;
         Ok(result)
+    }
+
+    /// Draws the share (number, of how many) of a view, within the nearest depths of all shares if they
+    /// are given. Returns the bytes of a part.
+    fn part<'py>(
+        &self,
+        py: Python<'py>,
+        view: Option<PyRef<'py, View>>,
+        share: (u32, u32),
+        within: Option<Vec<PyBackedBytes>>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let view = view.map_or_else(|| epsplat::View::new(&self.camera), |view| view.with(&self.camera));
+        let view = view.map_err(|error| exception(py, &error))?;
+        let (bytes, _) = run(py, progress, |progress| {
+            let share = Share::new(share.0, share.1)?;
+            let within = within.map(|parts| one("within", &parts)).transpose()?;
+            self.with(progress, |kept| Ok(kept.part(&view, share, within.as_ref(), progress)?.bytes()))
+        })?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// The box of the scene's centres, world coordinates: its least and its greatest corner.

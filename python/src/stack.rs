@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use epsplat::{Camera, Frame, Map, Picture, Result, Survey};
+use epsplat::{Camera, Frame, Map, Picture, Report, Result, Survey};
 use numpy::{Element, PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -51,6 +51,14 @@ impl Stack {
         self.cameras.push(camera);
         self.reports.push(serde_json::to_string(&report).unwrap_or_default());
         self.unseen.push(unseen.map(|unseen| unseen.sentence()));
+    }
+
+    /// Adds a picture that parts make.
+    pub fn merged(&mut self, frame: Frame, report: &Report, camera: Camera) {
+        self.append(frame);
+        self.cameras.push(camera);
+        self.reports.push(serde_json::to_string(report).unwrap_or_default());
+        self.unseen.push(None);
     }
 
     /// Adds the rows of a frame.

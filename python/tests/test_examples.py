@@ -17,6 +17,7 @@ ARGUMENTS = {
     "swapped_kernel.py": [DATA / "autzen.laz"],
     "turntable.py": [DATA / "bunny.obj", 3, "around"],
     "from_arrays.py": [],
+    "several_processes.py": [DATA / "autzen.laz", 3],
 }
 
 
@@ -34,6 +35,8 @@ def test_an_example_runs(name, tmp_path):
         with np.load(tmp_path / "views.npz") as arrays:
             assert arrays["depth"].shape == (12, 400, 400) and arrays["normal"].shape == (12, 400, 400, 3)
             assert np.isfinite(arrays["depth"]).mean() > 0.05
+    if name == "several_processes.py":
+        assert "the bits of one process: True" in done.stdout
     if name == "turntable.py":
         assert len(list((tmp_path / "around").glob("*.png"))) == 3
 

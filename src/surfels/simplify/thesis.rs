@@ -242,8 +242,8 @@ fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] for more than 2^32 - 1 surfels, for a tolerance that is not finite or below 0, for
-/// a ratio that is not above 0 and at most 1, and if growing would take hours.
+/// [`Error::Usage`] for more than 2^32 - 1 surfels, for a tolerance that is not finite or below 0,
+/// for a ratio that is not above 0 and at most 1, and if growing would take hours.
 pub fn as_in_the_thesis(
     (scene, coordinates): (&Scene, &Coordinates),
     tolerance: f64,

@@ -135,8 +135,8 @@ impl Renderer {
         Ok(result)
     }
 
-    /// Draws the share (number, of how many) of a view, within the nearest depths of all shares if they
-    /// are given. Returns the bytes of a part.
+    /// Draws the share (number, of how many) of a view, within the nearest depths of all shares if
+    /// they are given. Returns the bytes of a part.
     fn part<'py>(
         &self,
         py: Python<'py>,

@@ -72,8 +72,8 @@ impl FromStr for Organisation {
 
 /// Everything a caller may choose, except scene and camera.
 ///
-/// Parts of a picture store the settings without the accumulator, which is `fixed` there, and without
-/// kernels of the user.
+/// Parts of a picture store the settings without the accumulator, which is `fixed` there, and
+/// without kernels of the user.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Depth tolerance.

@@ -99,8 +99,8 @@ pub enum DetailMeasure {
     /// surfels lie off the node's cap ([`Node::radius`]).
     #[default]
     Extent,
-    /// The area of the square whose side is the longer of the images of the ellipse's two axes. This
-    /// reading of Pajarola 2003 comes nearest to the numbers in its Table 2.
+    /// The area of the square whose side is the longer of the images of the ellipse's two axes.
+    /// This reading of Pajarola 2003 comes nearest to the numbers in its Table 2.
     Square,
 }
 

@@ -198,8 +198,8 @@ impl Part {
     /// picture that one process draws, on an adapter like that of the parts.
     ///
     /// # Errors
-    /// [`Error::Usage`] if parts are missing or hold depths, [`Error::Malformed`] for damaged values,
-    /// and errors of the device.
+    /// [`Error::Usage`] if parts are missing or hold depths, [`Error::Malformed`] for damaged
+    /// values, and errors of the device.
     pub fn picture(&self, device: &DeviceOptions, progress: &dyn Progress) -> Result<Merged> {
         self.check_picture()?;
         let subject = &self.header.subject;

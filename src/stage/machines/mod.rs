@@ -5,7 +5,7 @@
 //! ```text
 //! depths  = merge(renderer.part(view, share, None) for all shares)
 //! sums    = merge(renderer.part(view, share, Some(&depths)) for all shares)
-//! picture = sums.picture(device)                                   the bits of renderer.frame(view)
+//! picture = sums.picture(device)                                  the bits of renderer.frame(view)
 //! ```
 
 mod draw;
@@ -37,8 +37,8 @@ impl Part {
     /// Reads a part from a file.
     ///
     /// # Errors
-    /// [`Error::Read`], or [`Error::Malformed`] for a file that is damaged, of another version or no
-    /// part.
+    /// [`Error::Read`], or [`Error::Malformed`] for a file that is damaged, of another version or
+    /// no part.
     pub fn read(path: &Path) -> Result<Self> {
         Self::of_bytes(path, &std::fs::read(path).map_err(|error| Error::read(path, error))?)
     }

@@ -55,8 +55,8 @@ pub enum NodeBounds {
     /// This is Pajarola 2003, section 3.4, to the letter.
     Squares,
     /// As [`Squares`](Self::Squares), with normals that lean outward by the node's cone at the rim,
-    /// up to 60 degrees (Pajarola 2003, section 5.2). The disk bends as its normals say; the paper's
-    /// stays flat.
+    /// up to 60 degrees (Pajarola 2003, section 5.2). The disk bends as its normals say; in the
+    /// paper it stays flat.
     Cones,
 }
 

@@ -38,8 +38,8 @@ struct Cell {
 /// The largest number of halvings: a voxel has at least 2^-60 of the box's volume.
 const DEEPEST: u32 = 60;
 
-/// The most parts of triangles in all voxels, for each triangle and each voxel that is allowed. Where
-/// many large triangles lie close together, each voxel has parts of all of them.
+/// The most parts of triangles in all voxels, for each triangle and each voxel that is allowed.
+/// Where many large triangles lie close together, each voxel has parts of all of them.
 const MOST_PATCHES: usize = 16;
 
 /// Divides a surface into voxels (Tien 2008, section 3.1); returns them and the number of halvings.

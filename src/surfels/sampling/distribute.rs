@@ -58,8 +58,8 @@ fn distributed(priorities: &[f64], mut samples: Vec<usize>, count: usize) -> Vec
 }
 
 /// As [`distribute`], but each voxel with a positive priority gets a sample first. Fewer samples
-/// than such voxels go to those of the highest priorities, one each (Tien 2008, section 3.2). The thesis
-/// advises against it, as the other voxels get none.
+/// than such voxels go to those of the highest priorities, one each (Tien 2008, section 3.2). The
+/// thesis advises against it, as the other voxels get none.
 ///
 /// Among voxels of equal priority, those with a sample are evenly spread.
 pub(super) fn distribute_by_rank(priorities: &[f64], count: usize) -> Vec<usize> {

@@ -171,8 +171,8 @@ pub fn likely(facts: &Facts, camera: &Camera, (needs, options): (&SceneNeeds, &S
 /// The longest list that tiles draw on software adapters. Mesa's llvmpipe ends the loops of an
 /// invocation after 65,535 rounds in total, and the last test of a loop's condition counts as a
 /// round. An entry that is fetched alone takes four rounds: one to fetch it, one to draw it, and a
-/// last test for each half of the tile. When entries are fetched in eights, eight entries take 19 rounds if both halves
-/// draw them. A tile has two lists.
+/// last test for each half of the tile. When entries are fetched in eights, eight entries take 19
+/// rounds if both halves draw them. A tile has two lists.
 pub const LONGEST: u64 = 8_000;
 
 /// Words of the lists of a kind before their entries: the sizes that the frame needs, and the end

@@ -47,7 +47,7 @@ impl Rows {
     }
 }
 
-/// What a process does with a band after an exchange.
+/// The work of a process on a band after an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Then {
     /// Goes on with the exchanged values.

@@ -12,7 +12,7 @@ use common::modules;
 use epsplat::low_level::gpu::interface::reflect;
 use naga::{AddressSpace, Arena, Block, Expression, Function, Handle, LocalVariable, Module, Statement};
 
-/// What a value depends on; the greatest of its parts decides.
+/// The sources that a value depends on; the greatest of its parts decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     /// Literals, constants and overrides.
@@ -26,9 +26,9 @@ enum Kind {
 struct Analysis<'a> {
     module: &'a Module,
     function: &'a Function,
-    /// What the local variables hold.
+    /// The kinds of the local variables.
     locals: HashMap<Handle<LocalVariable>, Kind>,
-    /// What the functions return.
+    /// The kinds of returned values.
     returned: &'a HashMap<Handle<Function>, Kind>,
 }
 
@@ -37,7 +37,7 @@ impl Analysis<'_> {
         &self.function.expressions
     }
 
-    /// What is in the memory that a pointer leads to.
+    /// The kind of the memory that a pointer leads to.
     fn loaded(&self, pointer: Handle<Expression>) -> Kind {
         match self.expressions()[pointer] {
             Expression::GlobalVariable(variable) => {

@@ -39,7 +39,7 @@ const START: usize = 24;
 const SECTION: usize = 28;
 const CHECKSUM: usize = 4;
 
-/// What the values of a section are.
+/// The kind of values in a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Values {
     /// Shaded triangles: 8 words of 32 bits, all 0 where no triangle shows.
@@ -65,7 +65,7 @@ impl Values {
 /// Values of some rows of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// What the values are.
+    /// The kind of values.
     pub values: Values,
     /// Number of the render that they belong to.
     pub render: u32,

@@ -7,7 +7,7 @@ use crate::scene::camera::check_size;
 use crate::scene::share::MOST_SHARES;
 use crate::scene::{Camera, Maps};
 
-/// What the values of a part are.
+/// The kind of values in a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Holds {
     /// Nearest depths.

@@ -36,7 +36,8 @@ pub struct Merged {
 /// parts may still be missing: parts that were merged can be merged again.
 ///
 /// ```no_run
-/// use epsplat::{DeviceOptions, Part, RenderOptions, Renderer, Scene, SceneOptions, Share, View, merge};
+/// use epsplat::{DeviceOptions, Part, RenderOptions, Renderer};
+/// use epsplat::{Scene, SceneOptions, Share, View, merge};
 ///
 /// let (options, device) = (RenderOptions::default(), DeviceOptions::default());
 /// let scene = Scene::open(["scan.laz"], &SceneOptions::default())?;

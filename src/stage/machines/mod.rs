@@ -23,7 +23,7 @@ use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::io::part::{Content, Section};
 
-/// What one or more processes drew of a picture: the nearest depths of their shares of the scene,
+/// The work of one or more processes on a picture: the nearest depths of their shares of the scene,
 /// or the sums of their shares within the nearest depths of all.
 #[derive(Clone)]
 pub struct Part {

@@ -321,7 +321,7 @@ impl Program {
             Colors::Srgb8(codes) => codes[index],
             _ => [u8::MAX; 4],
         };
-        let stored = order(scene, &scene.core()).into_iter().map(|index| index as usize);
+        let stored = order(scene, &scene.core(), None).into_iter().map(|index| index as usize);
         let strips = (camera.height as usize).div_ceil(ROWS);
         Self {
             surfels: stored.map(|index| (scene.surfels[index], color(index))).collect(),

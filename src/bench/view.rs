@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use super::definition::SceneEntry;
 use crate::error::Result;
-use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::lens::DEFAULT_FOV;
 use crate::scene::{Camera, Lens, Projection, Scene};
 
 /// Returns the cameras of `entry`: the first, and copies turned around the scene's centre.

@@ -19,7 +19,7 @@ use serde::Deserialize;
 use crate::error::{Error, Result};
 use crate::io::input::text;
 use crate::io::values::one_line;
-use crate::scene::camera::{DEFAULT_FISHEYE, DEFAULT_FOV};
+use crate::scene::lens::{DEFAULT_FISHEYE, DEFAULT_FOV};
 use crate::scene::{Form, Lens, Optics};
 
 /// The content of a camera file.

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::values::Ortho;
 use crate::error::Result;
-use crate::scene::camera::{DEFAULT_FISHEYE, DEFAULT_FOV};
+use crate::scene::lens::{DEFAULT_FISHEYE, DEFAULT_FOV};
 use crate::scene::side::ELEVATION;
 use crate::scene::{Form, Lens, Optics, Side};
 

@@ -48,9 +48,14 @@ pub fn of_triangles(triangles: &Triangles) -> u64 {
         }
         hash(words.into_iter())
     };
-    let images = triangles.textures().iter().flat_map(|mipmap| mipmap.levels());
-    let texels = images.map(|level| hash(level.texels().iter().map(|code| u32::from_le_bytes(*code))));
-    let of_texels = texels.fold(0, u64::wrapping_add);
+    // The halvings of an image follow from it.
+    let images = triangles.textures().iter().map(|mipmap| &mipmap.levels()[0]).enumerate();
+    let of_image = images.map(|(number, image)| {
+        let [width, height] = image.size();
+        let head = [number as u32, width, height, image.clamps().into()];
+        hash(head.into_iter().chain(image.texels().iter().map(|code| u32::from_le_bytes(*code))))
+    });
+    let of_texels = of_image.fold(0, u64::wrapping_add);
     (0..triangles.len()).into_par_iter().map(of).reduce(|| of_texels, u64::wrapping_add)
 }
 

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::gpu::layout::{BATCH, Page};
 use crate::morton;
-use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Surfel};
+use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Share, Surfel};
 
 /// Surfels per run, as [`layout::RUN`](crate::gpu::layout::RUN).
 const RUN: usize = crate::gpu::layout::RUN as usize;
@@ -37,7 +37,9 @@ const LAST: u32 = (1 << BITS) - 1;
 ///
 /// Within a cell the surfels' values decide, so the device sees the same scene for any input order.
 /// Only surfels that are equal in every value are ordered by index.
-pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
+///
+/// A `share` is a part of the curve, so it lies together in space.
+pub fn order(scene: &Scene, core: &Bounds, share: Option<Share>) -> Vec<u32> {
     let surfels = &scene.surfels;
     let low = core.min.as_vec3();
     let extent = core.extent().max_element() as f32;
@@ -58,7 +60,8 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
         (a >> 32).cmp(&(b >> 32)).then_with(by_content).then_with(|| a.cmp(b))
     });
     // The incomplete last run stays last, so that every other run is stored as whole batches.
-    let (runs, rest) = along.as_chunks::<RUN>();
+    let own = share.map_or(0..along.len(), |share| share.range(along.len()));
+    let (runs, rest) = along[own].as_chunks::<RUN>();
     let stride = dealing(runs.len());
     let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
     dealt.chain(rest).map(|place| *place as u32).collect()
@@ -110,6 +113,7 @@ fn dealing(runs: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::scene::{Colors, Up};
     use crate::surfels::analytic::{Shape, generate};
@@ -131,7 +135,7 @@ mod tests {
     fn every_surfel_is_stored_once() {
         for count in [1, 2, 511, 512, 513, 5000, 100_000] {
             let (scene, bounds) = sphere(count);
-            let mut indices = order(&scene, &bounds);
+            let mut indices = order(&scene, &bounds, None);
             indices.sort_unstable();
             assert!(indices.iter().copied().eq(0..count as u32), "{count}");
         }
@@ -141,9 +145,25 @@ mod tests {
             turns.sort_unstable();
             assert!(turns.into_iter().eq(0..runs) && u64::from(surfels) == runs * RUN as u64 + 5, "{runs}");
         }
-        assert!(order(&scene(vec![]), &Bounds::EMPTY).is_empty());
+        assert!(order(&scene(vec![]), &Bounds::EMPTY, None).is_empty());
         let one = vec![Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0); 3];
-        assert_eq!(order(&scene(one), &Bounds { min: DVec3::ZERO, max: DVec3::ZERO }), [0, 1, 2]);
+        assert_eq!(order(&scene(one), &Bounds { min: DVec3::ZERO, max: DVec3::ZERO }, None), [0, 1, 2]);
+    }
+
+    /// Shares are the scene together, and each lies together in space.
+    #[test]
+    fn shares_are_regions() {
+        let (scene, bounds) = sphere(100_000);
+        let mut all = Vec::new();
+        for number in 1..=8 {
+            let own = order(&scene, &bounds, Some(Share::new(number, 8).unwrap()));
+            let places = own.par_iter().map(|index| scene.center(*index as usize));
+            let extent = Bounds::of(places).extent();
+            assert!(extent.element_product() < 0.3 * 8.0, "{number}: {extent}");
+            all.extend(own);
+        }
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..100_000));
     }
 
     #[test]
@@ -153,7 +173,7 @@ mod tests {
         let beside = first.surfels.iter().map(|s| Surfel { center: s.center.map(|c| c + 1e-7), ..*s });
         let first = scene(first.surfels.iter().copied().chain(beside).collect());
         let stored = |scene: &Scene| -> Vec<Surfel> {
-            order(scene, &core).into_iter().map(|index| scene.surfels[index as usize]).collect()
+            order(scene, &core, None).into_iter().map(|index| scene.surfels[index as usize]).collect()
         };
         let turned = scene(first.surfels.iter().rev().copied().collect());
         assert!(stored(&first) == stored(&turned));
@@ -169,7 +189,7 @@ mod tests {
     #[test]
     fn neighbours_in_memory_are_neighbours_in_space_and_runs_are_not() {
         let (scene, bounds) = sphere(100_000);
-        let stored = order(&scene, &bounds);
+        let stored = order(&scene, &bounds, None);
         let given: Vec<u32> = (0..scene.surfels.len() as u32).collect();
         assert!(mean(&scene, 1, &stored) < 0.03, "{}", mean(&scene, 1, &stored));
         assert!(mean(&scene, 1, &given) > 0.5, "the generator's order is already local");
@@ -182,11 +202,11 @@ mod tests {
         // A surfel past the last cell must be stored at the end of the curve, and not wrap around
         // to the first cells.
         scene.surfels.push(Surfel::disk(Vec3::splat(1.5), Vec3::Z, 0.1));
-        assert_eq!(order(&scene, &core).last(), Some(&100_000));
+        assert_eq!(order(&scene, &core, None).last(), Some(&100_000));
         let stray = DVec3::splat(500.0);
         scene.surfels[100_000].center = stray.as_vec3().to_array();
         let near = |bounds: &Bounds| {
-            let stored: Vec<u32> = order(&scene, bounds).into_iter().filter(|index| *index < 100_000).collect();
+            let stored: Vec<u32> = order(&scene, bounds, None).into_iter().filter(|index| *index < 100_000).collect();
             mean(&scene, 1, &stored)
         };
         assert!(near(&core) < 0.03, "{}", near(&core));

@@ -71,13 +71,8 @@ pub(super) fn projected(
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let p = camera.rotation * relative;
     let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
-    let [mut s, mut t] =
-        point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
-    // A lens draws no 3D Gaussians.
-    if let Some(Body::Solid(third)) = body {
-        let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
-        [s, t] = conic::half_axes(p, [s, t, w], camera, design.dilation);
-    }
+    let own = || [s_world, t_world].map(|axis| camera.rotation * axis);
+    let [s, t] = of_body(body, point.map_or_else(own, |point| point.axes()), p, camera, design);
     let is_solid = matches!(body, Some(Body::Solid(_)));
     let own = match camera.optics {
         Some(_) => Some(homography::own(camera, p, s, t).ok_or(Missed::Behind)?),
@@ -112,21 +107,14 @@ pub(super) fn projected(
     if again {
         turn(&mut projected, camera.width);
     }
-    let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
-    let size = DVec2::new(camera.width.into(), camera.height.into());
-    let first = (projected.low - margin - 0.5).ceil().max(DVec2::ZERO);
-    let last = (projected.high + margin - 0.5).floor().min(size - 1.0);
-    if !(first.x <= last.x && first.y <= last.y) {
-        let in_image = projected.low.cmplt(size).all() && projected.high.cmpgt(DVec2::ZERO).all();
-        return Err(if in_image { Missed::Between } else { Missed::Outside });
-    }
+    let [first, last] = pixels(&projected, camera)?;
     let normal = s_world.cross(t_world);
     let normal = (normal / normal.abs().max_element()).normalize();
     Ok(Splat {
         surfel: index,
         anchor: projected.anchor,
-        first: [first.x as u32, first.y as u32],
-        last: [last.x as u32, last.y as u32],
+        first,
+        last,
         a: projected.a,
         b: projected.b,
         c: projected.c,
@@ -142,6 +130,31 @@ pub(super) fn projected(
         copies: 1,
         fade: Fade::WHOLE,
     })
+}
+
+/// The half-axes in camera space: those of a disk, or of the ellipse that a 3D Gaussian shows.
+fn of_body(body: Option<Body>, [s, t]: [DVec3; 2], p: DVec3, camera: &Camera, design: &Design) -> [DVec3; 2] {
+    match body {
+        // A lens draws no 3D Gaussians.
+        Some(Body::Solid(third)) => {
+            let w = s.normalize().cross(t.normalize()).normalize_or_zero() * f64::from(third);
+            conic::half_axes(p, [s, t, w], camera, design.dilation)
+        }
+        _ => [s, t],
+    }
+}
+
+/// The first and the last column and row of pixels that a splat may touch.
+fn pixels(projected: &Projected, camera: &Camera) -> Result<[[u32; 2]; 2], Missed> {
+    let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
+    let size = DVec2::new(camera.width.into(), camera.height.into());
+    let first = (projected.low - margin - 0.5).ceil().max(DVec2::ZERO);
+    let last = (projected.high + margin - 0.5).floor().min(size - 1.0);
+    if first.x <= last.x && first.y <= last.y {
+        return Ok([first, last].map(|corner| [corner.x as u32, corner.y as u32]));
+    }
+    let in_image = projected.low.cmplt(size).all() && projected.high.cmpgt(DVec2::ZERO).all();
+    Err(if in_image { Missed::Between } else { Missed::Outside })
 }
 
 /// Widens the bounds of a disk by those of its low-pass filter. With `ewa` the filter includes the

@@ -45,10 +45,6 @@ impl Source for ShareOfScene {
     fn provenance(&self) -> Cow<'_, Provenance> {
         Cow::Borrowed(&self.scene.provenance)
     }
-
-    fn whole(&self) -> Option<&Scene> {
-        None
-    }
 }
 
 /// No surfels and no triangles, with the facts of a scene.
@@ -68,17 +64,5 @@ impl Source for NoneOfScene {
 
     fn pages<'a>(&'a self, _: &SceneNeeds, _: usize, _: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
         Vec::new()
-    }
-
-    fn textures(&self) -> &[Mipmap] {
-        &[]
-    }
-
-    fn provenance(&self) -> Cow<'_, Provenance> {
-        Cow::Owned(Provenance::default())
-    }
-
-    fn whole(&self) -> Option<&Scene> {
-        None
     }
 }

@@ -28,7 +28,9 @@ pub trait Source: Send + Sync {
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
     /// The surfels' textures, by their numbers in an [`Atlas`](crate::scene::Atlas).
-    fn textures(&self) -> &[Mipmap];
+    fn textures(&self) -> &[Mipmap] {
+        &[]
+    }
 
     /// The triangles of the scene.
     fn triangles(&self) -> Option<&Triangles> {
@@ -49,10 +51,14 @@ pub trait Source: Send + Sync {
 
     /// The input and the point that each surfel comes from, by the surfel's number
     /// ([`Page::numbers`]).
-    fn provenance(&self) -> Cow<'_, Provenance>;
+    fn provenance(&self) -> Cow<'_, Provenance> {
+        Cow::Owned(Provenance::default())
+    }
 
     /// All surfels in memory, for the f64 reference.
-    fn whole(&self) -> Option<&Scene>;
+    fn whole(&self) -> Option<&Scene> {
+        None
+    }
 }
 
 /// Consecutive surfels of a [`Source`].
@@ -177,11 +183,9 @@ pub(super) fn pages_of<'a>(
     most: usize,
     (ordered, share): (Option<&Facts>, Option<Share>),
 ) -> Vec<Box<dyn Page + 'a>> {
-    let given = || (0..scene.surfels.len() as u32).collect();
-    let mut order = ordered.map_or_else(given, |facts| order(scene, &facts.core));
-    if let Some(share) = share {
-        order = order[share.range(order.len())].to_vec();
-    }
+    let count = scene.surfels.len();
+    let given = || share.map_or(0..count, |share| share.range(count)).map(|index| index as u32).collect();
+    let mut order = ordered.map_or_else(given, |facts| order(scene, &facts.core, share));
     let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(scene).into());
     if let Some(copies) = &copies {
         order.retain(|&index| copies[index as usize] > 0);

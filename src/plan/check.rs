@@ -13,7 +13,7 @@ use super::tuning::MOST_LARGE;
 use super::{Facts, Settings, composited};
 use crate::error::{Error, Result};
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Blend, Camera, Form, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Blend, Camera, Form, Map, Samples, Shading, options::SHININESS_RANGE};
 
 /// A combination of options that is rejected for every scene.
 struct Clash {
@@ -64,6 +64,9 @@ pub fn options(options: &Settings, reference: bool) -> Result<()> {
     maps(options, reference)
 }
 
+/// The most rows or columns of samples in a pixel.
+const MOST_SAMPLES: u32 = 16;
+
 /// Rejects numbers outside their ranges.
 fn in_range(options: &Settings) -> Result<()> {
     let (least, most) = SHININESS_RANGE;
@@ -75,6 +78,10 @@ fn in_range(options: &Settings) -> Result<()> {
     }
     if let Some(large) = options.large.filter(|large| *large > MOST_LARGE) {
         return usage(format!("a splat is large above 0 to {MOST_LARGE} pixels, not {large}"));
+    }
+    let Samples { across, down } = options.samples;
+    if ![across, down].iter().all(|samples| (1..=MOST_SAMPLES).contains(samples)) {
+        return usage(format!("a pixel has 1 to {MOST_SAMPLES} samples across and down, not {across} and {down}"));
     }
     if !(0.0..=1.0).contains(&options.opacity) {
         return usage(format!("the opacity is 0 to 1, not {}", options.opacity));

@@ -111,6 +111,8 @@ pub struct Renderer<S, B> {
     drops_depth: bool,
     /// State that recorded frames share.
     recorded: encode::Shared,
+    /// Whether frames are drawn together with other processes.
+    together: bool,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
@@ -136,7 +138,21 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
         let detail = colors.detail;
         let (kept, recorded) = (Kept::new(facts, colors), encode::Shared::default());
-        Ok(Self { source, backend, sources, faults, settings, kept, of_maps, detail, eye_dome, drops_depth, recorded })
+        let together = false;
+        Ok(Self {
+            source,
+            backend,
+            sources,
+            faults,
+            settings,
+            kept,
+            of_maps,
+            detail,
+            eye_dome,
+            drops_depth,
+            recorded,
+            together,
+        })
     }
 
     /// Renders one frame.
@@ -159,6 +175,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             // Tiles that gather keep sums in registers, where nothing can be exchanged.
             part.options.without.push(Optimisation::Gathering);
         }
+        self.together = true;
         Ok(self)
     }
 
@@ -175,7 +192,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         exchange: &dyn Exchange,
         progress: &dyn Progress,
     ) -> Result<(Option<Frame>, Report)> {
-        if self.kept.options.has(Optimisation::Gathering) {
+        if !self.together {
             return Err(Error::Usage("a renderer draws together with others after Renderer::among".into()));
         }
         let (frame, report) = self.rendered(camera, Some(exchange), progress)?;

@@ -158,7 +158,7 @@ fn ranks(scene: &Scene, facts: &Facts, options: &Settings) -> Vec<u32> {
         return (0..scene.surfels.len() as u32).collect();
     }
     let mut ranks = vec![0; scene.surfels.len()];
-    for (rank, index) in order(scene, &facts.core).into_iter().enumerate() {
+    for (rank, index) in order(scene, &facts.core, None).into_iter().enumerate() {
         ranks[index as usize] = rank as u32;
     }
     ranks

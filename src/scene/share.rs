@@ -10,9 +10,9 @@ use crate::error::{Error, Result};
 
 /// Share number `number` of `of` equal shares of a scene's surfels.
 ///
-/// A share is a run of surfels in the order in which devices store them
-/// ([`order`](crate::passes::order)), which deals them out, so it is spread over the scene. No bit
-/// of a picture depends on how surfels are shared.
+/// A share is a part of the curve along which devices store surfels
+/// ([`order`](crate::passes::order)), so it lies together in space. No bit of a picture depends on
+/// how surfels are shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Share {
     /// Number of shares.

@@ -11,8 +11,9 @@ use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
 use crate::options::parse::{up_argument, vector_argument};
 use crate::options::values::Ortho;
-use crate::scene::camera::{DEFAULT_FOV, check_near};
+use crate::scene::camera::check_near;
 use crate::scene::framing::fitted_height;
+use crate::scene::lens::DEFAULT_FOV;
 use crate::scene::{Camera, Lens, Scene, Side, Up};
 
 /// A view, complete except for values from the scene, such as the scene's centre.

@@ -205,13 +205,8 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let Points { colors, encoded, closed, clips, thirds, texture, texture_slopes, tree, .. } = points;
     let (centers, slopes) = (texture.unwrap_or_default(), texture_slopes.unwrap_or_default());
     let (colors, closed) = (colors::folded(colors), closed && oriented);
-    // Most scenes have no clipped disk, and then no list of clip lines.
-    let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
-    let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    // Where a radius was limited, the third half-axis stays the shortest.
-    let thirds =
-        thirds.unwrap_or_default().into_iter().zip(&surfels).map(|(third, surfel)| third.min(surfel.shorter()));
-    let of_disks = Scene { low, clips, caps, normals, thirds: thirds.collect(), ..Scene::default() };
+    let (clips, thirds) = (usable_clips(clips), usable_thirds(thirds, &surfels));
+    let of_disks = Scene { low, clips, caps, normals, thirds, ..Scene::default() };
     let mut hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin));
     hierarchy.iter_mut().for_each(|tree| tree.settle(&surfels, &of_disks.low));
     let hierarchy = hierarchy.map(Arc::new);
@@ -219,6 +214,18 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     // The points that the default view leaves out.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), Coordinates { centers, slopes, atlas: Atlas::ONE }))
+}
+
+/// The clip lines of surfels; empty if no disk is clipped, as in most scenes.
+fn usable_clips(clips: Option<Vec<Clip>>) -> Vec<Clip> {
+    let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
+    if clips.iter().all(Clip::is_none) { Vec::new() } else { clips }
+}
+
+/// The third half-axes of 3D Gaussians, which stay the shortest where a radius was limited.
+fn usable_thirds(thirds: Option<Vec<f32>>, surfels: &[Surfel]) -> Vec<f32> {
+    let thirds = thirds.unwrap_or_default().into_iter().zip(surfels);
+    thirds.map(|(third, surfel)| third.min(surfel.shorter())).collect()
 }
 
 /// The caps of these surfels, limited to usable heights; empty if all are flat, as in most scenes.

@@ -2,7 +2,7 @@
 //! name says.
 
 use epsplat::io::{Points, Texture};
-use epsplat::low_level::scene::camera::Lens;
+use epsplat::low_level::scene::Lens;
 use epsplat::low_level::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
 use epsplat::low_level::surfels::analytic::{Sample, Shape, generate};
 use epsplat::low_level::surfels::{build, build_textured};

@@ -48,18 +48,6 @@ impl Source for Made {
         let part = |first: usize| Part { first, len: most.min(COUNT - first), one: self.one };
         (0..COUNT).step_by(most).map(|first| Box::new(part(first)) as Box<dyn Page>).collect()
     }
-
-    fn textures(&self) -> &[Mipmap] {
-        &[]
-    }
-
-    fn provenance(&self) -> Cow<'_, Provenance> {
-        Cow::Owned(Provenance::default())
-    }
-
-    fn whole(&self) -> Option<&Scene> {
-        None
-    }
 }
 
 impl Page for Part {

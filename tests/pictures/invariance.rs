@@ -16,7 +16,7 @@ use epsplat::low_level::passes::join::Beside;
 use epsplat::low_level::passes::resolve;
 use epsplat::low_level::plan::{AccumulatorRow, COLOR_CHANNEL, Optimisation, Settings};
 use epsplat::low_level::render::{Backend, render};
-use epsplat::low_level::scene::camera::Lens;
+use epsplat::low_level::scene::Lens;
 use epsplat::low_level::scene::options::HIGHLIGHT;
 use epsplat::low_level::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};

@@ -12,6 +12,7 @@ use std::sync::Mutex;
 use common::any_scene::taken;
 use common::scenes::{sphere, sphere_camera};
 use common::{Random, any_options, any_scene};
+use epsplat::io::part::{Content, Section};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Gpu;
 use epsplat::low_level::passes::share::ShareOfScene;
@@ -256,10 +257,15 @@ fn changed_bytes_with_a_right_checksum_are_read_or_refused() {
     let view = View::from(Camera { width: 20, height: 20, ..camera });
     let part = |number| renderer.part(&view, Share::new(number, 2).unwrap(), None, &()).unwrap();
     let (bytes, other) = (part(1).bytes(), part(2));
+    let whole = Share::new(1, 1).unwrap();
+    let depths = renderer.part(&view, whole, None, &()).unwrap();
+    let sums = renderer.part(&view, whole, Some(&depths), &()).unwrap().bytes();
     let header = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     let (random, mut read, mut refused) = (&mut Random(3), 0, 0);
     for turn in 0..3000 {
-        let mut changed = bytes.clone();
+        // Some of them are whole pictures.
+        let is_picture = turn % 30 == 0;
+        let mut changed = if is_picture { sums.clone() } else { bytes.clone() };
         for _ in 0..1 + random.below(3) {
             // Half of the changes lie in the header, half behind it.
             let place = if turn % 2 == 0 { 24 + random.below(header) } else { random.below(bytes.len() - 4) };
@@ -271,7 +277,11 @@ fn changed_bytes_with_a_right_checksum_are_read_or_refused() {
         match Part::of_bytes("changed", &changed) {
             Ok(part) => {
                 read += 1;
-                let _ = merge(&[other.clone(), part]);
+                let _ = merge(std::slice::from_ref(&part));
+                let _ = merge(&[other.clone(), part.clone()]);
+                if is_picture {
+                    let _ = part.picture(&device, &());
+                }
             }
             Err(error) => {
                 refused += 1;
@@ -280,6 +290,58 @@ fn changed_bytes_with_a_right_checksum_are_read_or_refused() {
         }
     }
     assert!(read > 100 && refused > 100, "{read} {refused}");
+}
+
+/// Parts that lack rows or sections, or claim others, are refused wherever they stand.
+#[test]
+fn parts_that_lack_rows_are_refused() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let files = [format!("{}/data/bunny.obj", env!("CARGO_MANIFEST_DIR"))];
+    let scene = epsplat::Scene::open(files, &SceneOptions::default()).unwrap();
+    let (mut options, device) = (RenderOptions::default(), DeviceOptions::default());
+    // Two renders: the samples' and the map's.
+    (options.look.samples, options.maps.aov) = (Some(Samples::FOUR), vec![Map::Depth]);
+    let renderer = epsplat::Renderer::new(&scene, &options, &device, &()).unwrap();
+    let camera = renderer.camera(&View::default()).unwrap();
+    let view = View::from(Camera { width: 20, height: 20, ..camera });
+    let part = |number, within| renderer.part(&view, Share::new(number, 2).unwrap(), within, &()).unwrap();
+    let depths = [part(1, None), part(2, None)];
+    let within = merge(&depths).unwrap();
+    let sums = [part(1, Some(&within)), part(2, Some(&within))];
+    assert!(merge(&sums).unwrap().picture(&device, &()).is_ok());
+    let changed = |part: &Part, change: &dyn Fn(&mut Content)| {
+        let mut content = Content::decoded(&part.bytes()).unwrap();
+        change(&mut content);
+        Part::of_bytes("changed", &content.encoded()).unwrap()
+    };
+    let zeros = |section: &Section, (width, rows, each): (u32, u32, u16)| {
+        Section::new(section.values, section.render, (width, 0, rows), each, |samples| {
+            vec![0; samples.len() * usize::from(each)]
+        })
+    };
+    let last = |content: &mut Content, change: &dyn Fn(&Section) -> Section| {
+        let section = content.sections.pop().unwrap();
+        content.sections.push(change(&section));
+    };
+    let changes: [&dyn Fn(&mut Content); 6] = [
+        &|content| content.sections.clear(),
+        &|content| drop(content.sections.pop()),
+        &|content| last(content, &|own| zeros(own, (own.width, own.rows / 2, own.each))),
+        &|content| last(content, &|own| zeros(own, (own.width, own.rows * 2, own.each))),
+        &|content| last(content, &|own| zeros(own, (own.width / 2, own.rows, own.each))),
+        &|content| last(content, &|own| zeros(own, (own.width, own.rows, own.each + 1))),
+    ];
+    for pair in [&depths, &sums] {
+        for change in changes {
+            let short = changed(&pair[1], change);
+            for parts in [[pair[0].clone(), short.clone()], [short, pair[0].clone()]] {
+                let error = merge(&parts).unwrap_err().to_string();
+                assert!(error.contains("draw the part again"), "{error}");
+            }
+        }
+    }
 }
 
 /// Options of a test picture: its files, the change of the defaults, and the numbers of parts.

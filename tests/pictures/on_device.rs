@@ -11,7 +11,7 @@ use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::{Gpu, Traffic};
 use epsplat::low_level::plan::{Organisation, Settings};
 use epsplat::low_level::render::{Backend, Renderer};
-use epsplat::low_level::scene::camera::Lens;
+use epsplat::low_level::scene::Lens;
 use epsplat::low_level::scene::color::srgb8;
 use epsplat::low_level::scene::composite::ALL_LAYERS;
 use epsplat::low_level::scene::{Camera, Composite, Detail, Map, Maps, Samples, Scene, Up};

@@ -109,13 +109,30 @@ impl Section {
     /// A sentence if the runs are damaged.
     pub fn reduce(&self, samples: Range<usize>, all: &mut [u64]) -> Result<(), String> {
         let (each, own) = (usize::from(self.each), self.samples());
-        runs::filled(&self.runs, own.len(), each * usize::from(self.bytes), |at, bytes| {
+        if own.end <= samples.start || samples.end <= own.start {
+            return Ok(());
+        }
+        let size = each * usize::from(self.bytes);
+        runs::filled(&self.runs, own.len(), size, |at, bytes| {
             let at = own.start + at;
-            let values = bytes.chunks_exact(self.bytes.into()).map(runs::value);
-            let skipped = samples.start.saturating_sub(at) * each;
+            let skipped = samples.start.saturating_sub(at).saturating_mul(size);
+            let Some(bytes) = bytes.get(skipped..) else { return };
             let Some(into) = all.get_mut(at.saturating_sub(samples.start) * each..) else { return };
-            into.iter_mut().zip(values.skip(skipped)).for_each(|(all, own)| *all = self.values.reduced(*all, own));
+            let values = bytes.chunks_exact(self.bytes.into()).map(runs::value);
+            into.iter_mut().zip(values).for_each(|(all, own)| *all = self.values.reduced(*all, own));
         })
+    }
+
+    /// Checks that the runs cover the section's samples, and that each value fits its kind.
+    ///
+    /// # Errors
+    /// A sentence if they do not.
+    pub fn check(&self) -> Result<(), String> {
+        let size = usize::from(self.each) * usize::from(self.bytes);
+        if self.values != Values::Sums && self.bytes > 4 {
+            return Err("its values are larger than any: draw the part again".into());
+        }
+        runs::filled(&self.runs, self.samples().len(), size, |_, _| {})
     }
 
     fn write(&self, into: &mut Vec<u8>) {
@@ -150,8 +167,8 @@ impl Section {
     }
 }
 
-/// The most rows or columns of samples: 16 for each of the 32,768 pixels of the largest image.
-const MOST_SIDE: u32 = 1 << 19;
+/// The most rows or columns of samples.
+const MOST_SIDE: u32 = crate::scene::camera::MAX_SIDE;
 
 /// The content of a file.
 #[derive(Clone, Debug, PartialEq)]

@@ -63,6 +63,10 @@ impl Part {
 pub(super) struct Depths<'a>(pub &'a Kept);
 
 impl Exchange for Depths<'_> {
+    fn draws_triangles(&self) -> bool {
+        false
+    }
+
     fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
         self.0.keep(Values::Nearest, rows, words);
         Ok(Then::Stop)
@@ -83,6 +87,10 @@ pub(super) struct Sums<'a> {
 }
 
 impl Exchange for Sums<'_> {
+    fn draws_triangles(&self) -> bool {
+        self.common
+    }
+
     fn triangles(&self, rows: &Rows, drawn: &dyn Fn() -> Result<Vec<u32>>) -> Result<Option<Vec<u32>>> {
         if self.common {
             self.kept.keep(Values::Triangles, rows, &drawn()?);

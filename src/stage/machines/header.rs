@@ -2,10 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::plan::{Facts, Settings};
-use crate::scene::camera::check_size;
+use crate::error::Result as Outcome;
+use crate::io::part::{Section, Values};
+use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
+use crate::plan::{Facts, Settings, check};
+use crate::scene::camera::{check_near, check_size};
 use crate::scene::share::MOST_SHARES;
-use crate::scene::{Camera, Maps};
+use crate::scene::{Camera, Maps, Samples};
 
 /// The kind of values in a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,6 +62,27 @@ pub(super) struct Header {
     pub subject: Subject,
 }
 
+impl Subject {
+    /// Rejects numbers that no picture has. They come from a file.
+    fn check(&self) -> Outcome<()> {
+        let Self { camera, settings, up, .. } = self;
+        check_size(camera.width, camera.height)?;
+        check_near(camera.near)?;
+        check::options(settings, false)?;
+        camera.sampled(settings.samples)?;
+        let lens = [camera.fx, camera.fy, camera.cx, camera.cy];
+        let pose = camera.eye.is_finite() && camera.rotation.is_finite();
+        match pose && lens.iter().chain(up).all(|number| number.is_finite()) {
+            true => Ok(()),
+            false => Err(crate::Error::Usage("a number of the camera is not finite".into())),
+        }
+    }
+}
+
+/// More sums of a sample, and more renders of a picture, than any picture has.
+const MOST_CHANNELS: u16 = 64;
+const MOST_RENDERS: u32 = 8;
+
 /// The version of epsplat, which a header names.
 pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -92,12 +116,26 @@ impl Header {
         let header: Self = ciborium::from_reader(bytes).map_err(|_| other("of another build"))?;
         let in_order = header.shares.is_sorted_by(|one, next| one < next);
         let known = header.shares.iter().all(|share| (1..=header.of).contains(share));
-        let Camera { width, height, .. } = header.subject.camera;
-        let some = !header.shares.is_empty() && header.of <= MOST_SHARES && check_size(width, height).is_ok();
-        match in_order && known && some {
+        let some = !header.shares.is_empty() && header.of <= MOST_SHARES;
+        match in_order && known && some && header.subject.check().is_ok() {
             true => Ok(header),
-            false => Err("its header names shares or a size that no picture has: draw the part again".into()),
+            false => Err("its header describes what no picture has: draw the part again".into()),
         }
+    }
+
+    /// Whether a section has the size of a render of this picture.
+    pub fn fits(&self, section: &Section) -> bool {
+        let Subject { camera, settings, .. } = &self.subject;
+        let each = match section.values {
+            Values::Nearest => section.each == 1,
+            Values::Triangles => u32::from(section.each) == TRIANGLE_PIXEL_WORDS,
+            Values::Sums => section.each <= MOST_CHANNELS,
+        };
+        let of_render = |samples: Samples| {
+            let of = camera.sampled(samples);
+            of.is_ok_and(|of| section.width == of.width && section.samples().end <= of.pixels())
+        };
+        each && section.render < MOST_RENDERS && [Samples::ONE, settings.samples].into_iter().any(of_render)
     }
 
     /// Returns how the picture of this part differs from that of `other`: a subject and a verb.

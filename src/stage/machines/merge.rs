@@ -15,6 +15,7 @@ use crate::io::part::{Content, Section, Values};
 use crate::options::DeviceOptions;
 use crate::passes::share::NoneOfScene;
 use crate::passes::unseen::is_empty;
+use crate::plan::check;
 use crate::progress::Progress;
 use crate::render::{Renderer, Report};
 use crate::scene::{Camera, Maps};
@@ -78,12 +79,9 @@ pub fn merge(parts: &[Part]) -> Result<Part> {
     let adapters: BTreeSet<&String> = parts.iter().flat_map(|part| &part.header.adapters).collect();
     let adapters = adapters.into_iter().cloned().collect();
     let header = Header { shares: owners.into_keys().collect(), own, adapters, ..first.header.clone() };
-    let whole = header.shares.len() == header.of as usize;
-    if whole && own != header.subject.digest {
-        let what = "it and the other parts do not cover the scene once: draw them again from the same inputs";
-        return Err(first.refused(what));
-    }
-    Ok(Part { name: first.name.clone(), header, sections: sections(parts)? })
+    let merged = Part { name: first.name.clone(), header, sections: sections(parts)? };
+    merged.check_cover()?;
+    Ok(merged)
 }
 
 /// Fails unless `other` can be merged with `first`.
@@ -105,26 +103,28 @@ fn check(first: &Part, other: &Part) -> Result<()> {
     Ok(())
 }
 
+/// For each kind of values and each render: its columns, the values of each sample, and its rows.
+type Shape = BTreeMap<(Values, u32), (u32, u16, u32)>;
+
 /// The sections of all parts, one for each kind of values of each render.
 fn sections(parts: &[Part]) -> Result<Vec<Section>> {
-    let mut kinds: BTreeMap<(Values, u32), (u32, u16, u32)> = BTreeMap::new();
-    for part in parts {
-        let mut ends: BTreeMap<(Values, u32), u32> = BTreeMap::new();
-        for section in &part.sections {
-            section.reduce(0..0, &mut []).map_err(|what| part.refused(what))?;
-            let end = ends.entry((section.values, section.render)).or_default();
-            let kind = (section.width, section.each);
-            let known =
-                kinds.get(&(section.values, section.render)).is_none_or(|(width, each, _)| kind == (*width, *each));
-            if section.first != *end || !known {
-                return Err(part.refused("its rows do not make an image: draw the part again"));
-            }
-            *end += section.rows;
-            let rows = kinds.get(&(section.values, section.render)).map_or(0, |(_, _, rows)| *rows);
-            kinds.insert((section.values, section.render), (section.width, section.each, rows.max(*end)));
-        }
-        let short = ends.iter().any(|(kind, end)| kinds.get(kind).is_some_and(|(.., rows)| end != rows));
-        if short {
+    let shapes = parts.iter().map(Part::shape).collect::<Result<Vec<_>>>()?;
+    let mut kinds = Shape::new();
+    for (&kind, &(width, each, rows)) in shapes.iter().flatten() {
+        let all = kinds.entry(kind).or_insert((width, each, rows));
+        all.2 = all.2.max(rows);
+    }
+    for (part, shape) in parts.iter().zip(&shapes) {
+        // The values that every part has; others are common to all and in one part.
+        let own = match part.header.holds {
+            Holds::Depths => Values::Nearest,
+            Holds::Sums => Values::Sums,
+        };
+        let is_short = |(kind, all): (&(Values, u32), _)| match shape.get(kind) {
+            Some(rows) => rows != all,
+            None => kind.0 == own,
+        };
+        if kinds.iter().any(is_short) {
             return Err(part.refused("it lacks rows of the image: draw the part again"));
         }
     }
@@ -133,7 +133,7 @@ fn sections(parts: &[Part]) -> Result<Vec<Section>> {
             let mut all = vec![0; samples.len() * usize::from(each)];
             let sections = parts.iter().flat_map(|part| &part.sections);
             for section in sections.filter(|own| (own.values, own.render) == (values, render)) {
-                // All sections have been read once, so they are not damaged.
+                // All sections have been checked, so they are not damaged.
                 let _ = section.reduce(samples.clone(), &mut all);
             }
             all
@@ -144,17 +144,43 @@ fn sections(parts: &[Part]) -> Result<Vec<Section>> {
 }
 
 impl Part {
+    /// The shape of the part's values.
+    fn shape(&self) -> Result<Shape> {
+        let mut shape = Shape::new();
+        for section in &self.sections {
+            section.check().map_err(|what| self.refused(what))?;
+            let Section { values, render, width, each, first, rows, .. } = *section;
+            let so_far = shape.entry((values, render)).or_insert((width, each, 0));
+            if *so_far != (width, each, first) || !self.header.fits(section) {
+                return Err(self.refused("its rows do not make an image: draw the part again"));
+            }
+            so_far.2 += rows;
+        }
+        Ok(shape)
+    }
+
+    /// Fails if the part has all shares, and they are not the scene.
+    fn check_cover(&self) -> Result<()> {
+        let Header { of, shares, own, subject, .. } = &self.header;
+        match shares.len() == *of as usize && *own != subject.digest {
+            true => Err(self.refused("the parts do not cover the scene once: draw them again from the same inputs")),
+            false => Ok(()),
+        }
+    }
+
     /// Fails if shares are missing, and names them.
     ///
     /// # Errors
-    /// [`Error::Usage`].
+    /// [`Error::Usage`], or [`Error::Malformed`] if the shares are not those of the scene.
     pub fn check_whole(&self) -> Result<()> {
         let Header { of, shares, holds, .. } = &self.header;
-        let missing: Vec<String> =
-            (1..=*of).filter(|share| !shares.contains(share)).map(|share| format!("{share}/{of}")).collect();
+        let missing: Vec<String> = (1..=*of)
+            .filter(|share| shares.binary_search(share).is_err())
+            .map(|share| format!("{share}/{of}"))
+            .collect();
         let holds = holds.name();
         match &missing[..] {
-            [] => Ok(()),
+            [] => self.check_cover(),
             [one] => Err(Error::Usage(format!("the {holds} of part {one} are missing: name its file too"))),
             [first, .., last] => Err(Error::Usage(format!(
                 "the {holds} of {} parts are missing, {first} to {last}: name their files too",
@@ -203,7 +229,9 @@ impl Part {
     /// values, and errors of the device.
     pub fn picture(&self, device: &DeviceOptions, progress: &dyn Progress) -> Result<Merged> {
         self.check_picture()?;
+        self.shape()?;
         let subject = &self.header.subject;
+        check::files_of_parts(&subject.facts, &subject.settings)?;
         let backend = backend(device, progress)?;
         let source = NoneOfScene::new(subject.facts.clone());
         let mut renderer = Renderer::new(source, &subject.settings, &backend)?.among()?;

@@ -7,7 +7,7 @@
 //! called three times for each band of a render:
 //!
 //! ```text
-//! triangles   every process draws all of them; one that has none gets those of another
+//! triangles   a process draws all of them, gets those of another, or needs none
 //! nearest     nearest(x, y) = min over processes, before accumulate compares depths with it
 //! sums        sums(x, y)    = sum over processes, before resolve divides
 //! ```
@@ -62,7 +62,8 @@ pub enum Then {
 /// An exchange through files may have other rows in each process. A frame that is retried repeats
 /// its calls with the same values.
 pub trait Exchange: Sync {
-    /// Whether the process draws the triangles itself. If not, [`Exchange::triangles`] gives them.
+    /// Whether the process draws the triangles itself. If not, [`Exchange::triangles`] gives them,
+    /// unless the band ends before they are needed.
     fn draws_triangles(&self) -> bool {
         true
     }

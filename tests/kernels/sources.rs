@@ -14,7 +14,7 @@ use epsplat::low_level::passes::index::NOTHING;
 use epsplat::low_level::passes::source::{Page, Source};
 use epsplat::low_level::plan::{Facts, Optimisation, SceneNeeds, Settings};
 use epsplat::low_level::render::{Backend, Renderer, render};
-use epsplat::low_level::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
+use epsplat::low_level::scene::{Colors, Map, Maps, Projection, Scene, Surfel};
 
 /// Makes the surfels of `common::scenes::sphere` one by one.
 struct Made {

@@ -337,7 +337,7 @@ fn parts_that_lack_rows_are_refused() {
         for change in changes {
             let short = changed(&pair[1], change);
             for parts in [[pair[0].clone(), short.clone()], [short, pair[0].clone()]] {
-                let error = merge(&parts).unwrap_err().to_string();
+                let error = merge(&parts).err().unwrap().to_string();
                 assert!(error.contains("draw the part again"), "{error}");
             }
         }

@@ -17,7 +17,8 @@ pub struct Shown {
     pub color: [f64; 4],
     /// World space, unit length.
     pub normal: DVec3,
-    /// Its depth ([`Camera::depth`](crate::scene::Camera::depth)), world units; +inf where no triangle is.
+    /// Its depth ([`Camera::depth`](crate::scene::Camera::depth)), world units; +inf where no
+    /// triangle is.
     pub depth: f64,
     /// The smallest relative distance to a decision: to an edge, the near depth, or another
     /// triangle's depth.

@@ -79,6 +79,22 @@ pub enum Error {
         /// Why there is none.
         source: Box<Error>,
     },
+    /// A process of a job failed.
+    #[error("process {rank}: {source}")]
+    Process {
+        /// The number of the process, from 0.
+        rank: usize,
+        /// Why it failed.
+        source: Box<Error>,
+    },
+    /// Another process that draws the same picture failed, and printed why.
+    #[error("process {rank} of the job failed")]
+    OtherProcess {
+        /// The number of that process, from 0.
+        rank: usize,
+        /// Its exit code.
+        code: u8,
+    },
     /// A benchmark study ran to its end, but a configuration did not do what the study states.
     #[error("the study {name} failed: {what}")]
     Study {
@@ -130,7 +146,8 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::View { source, .. } => source.exit_code(),
+            Self::View { source, .. } | Self::Process { source, .. } => source.exit_code(),
+            Self::OtherProcess { code, .. } => *code,
             _ => 1,
         }
     }

@@ -9,6 +9,7 @@
 mod ahead;
 mod coloring;
 mod encode;
+mod extent;
 mod files;
 mod given;
 mod heights;
@@ -22,6 +23,7 @@ mod memory;
 mod meshes;
 mod octrees;
 mod overdraw;
+mod picture;
 mod refined;
 mod renderer;
 mod settings;
@@ -40,9 +42,10 @@ pub use self::files::Files;
 pub use self::given::Given;
 pub use self::in_part::ReadReport;
 #[cfg(feature = "parts")]
-pub use self::machines::{Merged, Part, merge};
+pub use self::machines::{Merged, Part, Ranked, merge};
 pub use self::map::Survey;
-pub use self::renderer::{Picture, Renderer};
+pub use self::picture::Picture;
+pub use self::renderer::Renderer;
 pub use self::view::{View, ViewReport};
 pub use self::visible::Visible;
 

@@ -4,20 +4,18 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+#[cfg(feature = "parts")]
+use super::ReadReport;
+use super::extent::Extent;
 use super::in_part::{Part, Parts};
-use super::{
-    Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory, overdraw,
-    refined,
-};
+use super::{Files, Inputs, Picture, Request, Scene, View, ViewReport, ahead, lens, levels, memory, overdraw, refined};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
 use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
-use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
-use crate::render::{self, Backend, Report, render};
+use crate::render::{self, Backend, render};
 use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
@@ -32,6 +30,8 @@ pub struct Renderer {
     pub(super) drawn: Drawn,
     /// Number of frames in memory at once, which counts against the limit of memory.
     frames: u64,
+    /// The extent of [`Renderer::scene`].
+    pub(super) extent: Extent,
 }
 
 /// The data that views are drawn from.
@@ -52,22 +52,15 @@ pub(super) enum Drawn {
     },
 }
 
-/// A rendered view.
-#[derive(Debug)]
-pub struct Picture {
-    /// The colour and the maps.
-    pub frame: Frame,
-    /// Times and counts.
-    pub report: Report,
-    /// The camera, with values from the scene filled in.
+/// The scene that a view shows, and how it is drawn.
+#[cfg(feature = "parts")]
+pub(super) struct SceneOfView {
+    pub scene: Arc<scene::Scene>,
     pub camera: Camera,
-    /// The camera as the options that reproduce it.
-    pub view: ViewReport,
+    pub settings: Settings,
+    pub report: ViewReport,
     /// Counts of what was read for this view; None if the inputs were read whole.
     pub read: Option<ReadReport>,
-    /// Why nothing is visible; None if something is.
-    pub unseen: Option<Unseen>,
-    /// The meaning of the colours, if they show an attribute.
     pub key: Option<ColorKey>,
 }
 
@@ -156,7 +149,7 @@ impl Renderer {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
             None => whole(&request, settings, (&backend, first), progress)?,
         };
-        Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
+        Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1, extent: Extent::default() })
     }
 
     /// Rejects options that cannot be combined, before any input is read.
@@ -221,7 +214,7 @@ impl Renderer {
     ///
     /// [`Error::Usage`] if the view and the scene give no camera.
     pub fn camera(&self, view: &View) -> Result<Camera> {
-        view.camera(self.scene()).map(|(camera, _)| camera)
+        view.camera(self.scene(), &self.extent).map(|(camera, _)| camera)
     }
 
     /// Renders a view.
@@ -242,6 +235,31 @@ impl Renderer {
         self.rendered(view, (is_told, up), progress)?.marked(marks)
     }
 
+    /// Returns the scene that a view shows, and how it is drawn.
+    #[cfg(feature = "parts")]
+    pub(super) fn scene_of(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
+        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
+        let Self { inputs, options, device, views, settings, drawn, frames, .. } = self;
+        let request = Request { scene: inputs, options, device, views: *views, read: None };
+        match drawn {
+            Drawn::Whole { scene, guessed_up, key, renderer } => {
+                renderer.check_lens(&camera, view.as_pinhole())?;
+                let report = ViewReport::new(&camera, &seen, scene, *guessed_up);
+                let refined = refined::refined(scene, &camera);
+                refined.iter().filter_map(|refined| refined.note()).for_each(|line| progress.note(&line));
+                let scene = refined.map_or_else(|| scene.clone(), |refined| Arc::new(refined.scene));
+                let (settings, key) = (settings.clone(), key.clone());
+                Ok(SceneOfView { scene, camera, settings, report, read: None, key })
+            }
+            Drawn::Parts { parts, .. } => {
+                let Part { made: (scene, preparation), settings, read, key } =
+                    parts.scene(&request, (&camera, *frames), settings, progress)?;
+                let report = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
+                Ok(SceneOfView { scene: Arc::new(scene), camera, settings, report, read: Some(read), key })
+            }
+        }
+    }
+
     /// Renders a view without marks, and describes it in a note if `is_told`. `up` is the axis of
     /// heights, of length 1.
     pub(super) fn rendered(
@@ -250,9 +268,9 @@ impl Renderer {
         (is_told, up): (bool, DVec3),
         progress: &dyn Progress,
     ) -> Result<Picture> {
-        let (camera, seen) = view.camera(self.scene())?;
+        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
         let other = view.as_pinhole();
-        let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
+        let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
         let request = Request { scene: inputs, options, device, views: *views, read: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
@@ -277,7 +295,7 @@ impl Renderer {
                     }
                     None => renderer.frame(&camera, progress)?,
                 };
-                Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
+                Ok(Picture::of(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
             }
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read, key } =
@@ -296,26 +314,9 @@ impl Renderer {
                 let rendered = renderer.frame(&camera, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))
+                Ok(Picture::of(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))
             }
         }
-    }
-}
-
-impl Picture {
-    /// Adds the maps of `wanted` that are made from others. `up` is the axis of heights.
-    fn with_heights(self, up: DVec3, wanted: Maps) -> Self {
-        let frame = heights::made(self.frame, &self.camera, up, wanted);
-        Self { frame, ..self }
-    }
-
-    /// Draws marks on the frame.
-    fn marked(self, marks: Marks) -> Result<Self> {
-        if marks == Marks::default() {
-            return Ok(self);
-        }
-        let frame = marks.draw(self.frame, &self.camera, self.key.as_ref())?;
-        Ok(Self { frame, ..self })
     }
 }
 
@@ -331,7 +332,7 @@ pub(super) fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result
         }
         return Ok(Backend::Reference);
     }
-    match Gpu::open(device.adapter.as_deref()) {
+    match Gpu::open_in_turn(device.adapter.as_deref(), device.turn) {
         Ok(gpu) => {
             progress.note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
             let gpu = if device.memory.is_some() { gpu.with_buffer_limit(memory::BUFFER) } else { gpu };
@@ -364,16 +365,4 @@ fn whole(
     let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
     let key = whole.key.clone();
     Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
-}
-
-/// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
-fn picture(
-    scene: &scene::Scene,
-    settings: &Settings,
-    (frame, report): (Frame, Report),
-    (camera, view): (Camera, ViewReport),
-    (read, key): (Option<ReadReport>, Option<ColorKey>),
-) -> Picture {
-    let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
-    Picture { frame, report, camera, view, read, unseen, key }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::extent::Extent;
 use crate::error::{Error, Result};
 use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
@@ -157,10 +158,10 @@ impl View {
     }
 
     /// Returns the camera of the view and the point that it looks at.
-    pub(super) fn camera(&self, scene: &Scene) -> Result<(Camera, Seen)> {
+    pub(super) fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
         match &self.0 {
-            Kind::Given(given) => given.camera(scene, Camera::default_near(scene)),
-            Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, scene))),
+            Kind::Given(given) => given.camera(scene, extent),
+            Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, extent.middle(scene)))),
         }
     }
 
@@ -214,10 +215,8 @@ impl Given {
     }
 
     /// Returns the camera of the view and the point that it looks at.
-    ///
-    /// `default_near` is [`Camera::default_near`] of the scene.
-    fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
-        let near = self.near.unwrap_or(default_near);
+    fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
+        let near = self.near.unwrap_or_else(|| extent.near(scene));
         let (pose, up, by) = match &self.place {
             Place::Framed { side, up, fits } => {
                 let lens = match fits {
@@ -232,10 +231,7 @@ impl Given {
                 };
                 return Ok((camera, Seen { target, up, by: By::Choice }));
             }
-            Place::Eye(eye, up) => {
-                let center = scene.origin + scene.framed().0.center();
-                (&Pose::LookAt(*eye, center, *up), *up, By::Choice)
-            }
+            Place::Eye(eye, up) => (&Pose::LookAt(*eye, extent.middle(scene), *up), *up, By::Choice),
             Place::Pose(pose @ Pose::LookAt(.., up)) => (pose, *up, By::Arguments),
             Place::Pose(pose @ Pose::Rigid(..)) => (pose, None, By::Pose),
         };
@@ -243,7 +239,7 @@ impl Given {
         Ok(match *pose {
             Pose::LookAt(_, target, _) => (camera, Seen { target, up, by }),
             Pose::Rigid(..) => {
-                let seen = Seen::of_pose(&camera, scene);
+                let seen = Seen::of_pose(&camera, extent.middle(scene));
                 (camera, seen)
             }
         })
@@ -262,8 +258,8 @@ pub(super) struct Seen {
 
 impl Seen {
     /// Returns the point that a camera with known rotation and eye looks at.
-    fn of_pose(camera: &Camera, scene: &Scene) -> Self {
-        let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(camera.near);
+    fn of_pose(camera: &Camera, middle: DVec3) -> Self {
+        let distance = camera.to_camera(middle).z.max(camera.near);
         let target = camera.eye + camera.rotation.row(2) * distance;
         Self { target, up: Some(-camera.rotation.row(1)), by: By::Pose }
     }

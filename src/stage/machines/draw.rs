@@ -105,7 +105,7 @@ fn check_marks(options: &RenderOptions) -> Result<()> {
 }
 
 /// The picture that a part belongs to.
-fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &Settings) -> Subject {
+pub(super) fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &Settings) -> Subject {
     let all: Vec<u32> = (0..scene.surfels.len() as u32).collect();
     let digest = digest::of_surfels(scene, &all).wrapping_add(digest::of_triangles(&scene.triangles));
     Subject {

@@ -56,7 +56,7 @@ use crate::io::Points;
 use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
 use crate::plan::BackendName;
 use crate::progress::Progress;
-use crate::scene::ColorKey;
+use crate::scene::{ColorKey, Share};
 
 /// Files, or points in memory, that [`Renderer`]s draw.
 ///
@@ -164,6 +164,8 @@ struct Request<'a> {
     views: bool,
     /// Gets the points of the inputs once they are read.
     read: Option<&'a ahead::Read<'a>>,
+    /// The share of the scene that the picture needs here; None for all of it.
+    share: Option<Share>,
 }
 
 impl Inputs {

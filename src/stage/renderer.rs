@@ -8,7 +8,10 @@ use glam::DVec3;
 use super::ReadReport;
 use super::extent::Extent;
 use super::in_part::{Part, Parts};
-use super::{Files, Inputs, Picture, Request, Scene, View, ViewReport, ahead, lens, levels, memory, overdraw, refined};
+use super::whole::Whole;
+use super::{
+    Files, Inputs, Picture, Request, Scene, View, ViewReport, ahead, lens, levels, memory, overdraw, refined, tree,
+};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Replacement};
@@ -16,7 +19,7 @@ use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, render};
-use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps};
+use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps, Share};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -32,6 +35,19 @@ pub struct Renderer {
     frames: u64,
     /// The extent of [`Renderer::scene`].
     pub(super) extent: Extent,
+    /// Whether only a share of the scene was read, for [`Renderer::frame_over`].
+    has_share: bool,
+}
+
+/// The use of a renderer.
+#[derive(Clone, Copy, Default)]
+struct How<'a> {
+    /// It draws many views, from one to the next of which levels of detail fade.
+    views: bool,
+    /// The first view, if its kernels are to be compiled early.
+    first: Option<&'a View>,
+    /// The share that it draws, together with other processes.
+    share: Option<Share>,
 }
 
 /// The data that views are drawn from.
@@ -62,6 +78,8 @@ pub(super) struct SceneOfView {
     /// Counts of what was read for this view; None if the inputs were read whole.
     pub read: Option<ReadReport>,
     pub key: Option<ColorKey>,
+    /// Whether the scene is only the share of this process.
+    pub is_share: bool,
 }
 
 impl Renderer {
@@ -78,7 +96,25 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (false, None), progress)
+        Self::with(scene, options, (device, None), How::default(), progress)
+    }
+
+    /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`. Of a file of
+    /// `epsplat lod` that is the only input it reads only the share; else it reads everything, as
+    /// the surfels of a share may depend on points around it.
+    ///
+    /// # Errors
+    ///
+    /// The same as those of [`Renderer::new`].
+    #[cfg(feature = "parts")]
+    pub fn of_share(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        share: Share,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::with(scene, options, (device, None), How { share: Some(share), ..How::default() }, progress)
     }
 
     /// Makes a renderer as [`Renderer::new`] does, and meanwhile compiles the kernels that `first`,
@@ -94,7 +130,7 @@ impl Renderer {
         first: &View,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (false, Some(first)), progress)
+        Self::with(scene, options, (device, None), How { first: Some(first), ..How::default() }, progress)
     }
 
     /// Makes a renderer on a device that is open already, such as that of the caller's own program
@@ -105,7 +141,7 @@ impl Renderer {
     /// The same as those of [`Renderer::new`].
     pub fn on_device(scene: &Scene, options: &RenderOptions, gpu: &Gpu, progress: &dyn Progress) -> Result<Self> {
         let device = DeviceOptions { backend: Chosen(Some(BackendName::Gpu)), ..DeviceOptions::default() };
-        Self::with(scene, options, (&device, Some(gpu)), (false, None), progress)
+        Self::with(scene, options, (&device, Some(gpu)), How::default(), progress)
     }
 
     /// Makes a renderer for a camera that moves: cuts of levels of detail fade from view to view
@@ -120,20 +156,20 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (true, None), progress)
+        Self::with(scene, options, (device, None), How { views: true, ..How::default() }, progress)
     }
 
     fn with(
         scene: &Scene,
         options: &RenderOptions,
         (device, open): (&DeviceOptions, Option<&Gpu>),
-        (views, first): (bool, Option<&View>),
+        How { views, first, share }: How<'_>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (inputs, mut options, device) = (scene.0.clone(), options.clone(), device.clone());
         let sources = options.research.sources.iter().map(Replacement::loaded).collect::<Result<_>>()?;
         options.research.sources = sources;
-        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None };
+        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None, share };
         let settings = request.settings()?;
         if options.surface.separate && inputs.count() < 2 {
             progress.note(
@@ -149,7 +185,20 @@ impl Renderer {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
             None => whole(&request, settings, (&backend, first), progress)?,
         };
-        Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1, extent: Extent::default() })
+        // A renderer of everything draws a scene that is part of nothing.
+        let has_share = matches!(&drawn, Drawn::Whole { scene, .. } if scene.part_of.is_some());
+        Ok(Self {
+            inputs,
+            options,
+            device,
+            views,
+            settings,
+            backend,
+            drawn,
+            frames: 1,
+            extent: Extent::default(),
+            has_share,
+        })
     }
 
     /// Rejects options that cannot be combined, before any input is read.
@@ -159,7 +208,7 @@ impl Renderer {
     /// [`Error::Usage`], as [`Renderer::new`].
     pub fn check(files: &Files, scene: &SceneOptions, options: &RenderOptions, device: &DeviceOptions) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        Request { scene: &inputs, options, device, views: false, read: None }.settings().map(drop)
+        Request { scene: &inputs, options, device, views: false, read: None, share: None }.settings().map(drop)
     }
 
     /// Sets how many frames the caller has in memory at once (1 by default). They count against the
@@ -190,6 +239,11 @@ impl Renderer {
         let scene = self.scene();
         let Bounds { min, max } = scene.bounds();
         Bounds { min: min + scene.origin, max: max + scene.origin }
+    }
+
+    /// The number of surfels in memory that all views share.
+    pub fn surfels_read(&self) -> u64 {
+        self.scene().surfels.len() as u64
     }
 
     /// The scene, or an overview of files that are read in part.
@@ -240,7 +294,7 @@ impl Renderer {
     pub(super) fn scene_of(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
         let (camera, seen) = view.camera(self.scene(), &self.extent)?;
         let Self { inputs, options, device, views, settings, drawn, frames, .. } = self;
-        let request = Request { scene: inputs, options, device, views: *views, read: None };
+        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
         match drawn {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
                 renderer.check_lens(&camera, view.as_pinhole())?;
@@ -249,13 +303,14 @@ impl Renderer {
                 refined.iter().filter_map(|refined| refined.note()).for_each(|line| progress.note(&line));
                 let scene = refined.map_or_else(|| scene.clone(), |refined| Arc::new(refined.scene));
                 let (settings, key) = (settings.clone(), key.clone());
-                Ok(SceneOfView { scene, camera, settings, report, read: None, key })
+                Ok(SceneOfView { scene, camera, settings, report, read: None, key, is_share: self.has_share })
             }
             Drawn::Parts { parts, .. } => {
                 let Part { made: (scene, preparation), settings, read, key } =
                     parts.scene(&request, (&camera, *frames), settings, progress)?;
                 let report = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
-                Ok(SceneOfView { scene: Arc::new(scene), camera, settings, report, read: Some(read), key })
+                let scene = Arc::new(scene);
+                Ok(SceneOfView { scene, camera, settings, report, read: Some(read), key, is_share: false })
             }
         }
     }
@@ -268,10 +323,13 @@ impl Renderer {
         (is_told, up): (bool, DVec3),
         progress: &dyn Progress,
     ) -> Result<Picture> {
+        if self.has_share {
+            return Err(Error::Usage("this renderer has a share of the scene: draw by Renderer::frame_over".into()));
+        }
         let (camera, seen) = view.camera(self.scene(), &self.extent)?;
         let other = view.as_pinhole();
         let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
-        let request = Request { scene: inputs, options, device, views: *views, read: None };
+        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
             if is_told {
@@ -353,8 +411,17 @@ fn whole(
     (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
-    let mut whole = ahead::compiling(request, &settings, first, backend, read)?;
+    let shared = request.share.filter(|_| settings.detail.is_finest());
+    let shared = shared.map_or(Ok(None), |share| tree::share_of(request, share, progress))?;
+    let mut whole = match shared {
+        Some((scene, preparation)) => {
+            Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })
+        }
+        None => {
+            let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
+            ahead::compiling(request, &settings, first, backend, read)?
+        }
+    };
     whole.preparation.notes().iter().for_each(|line| progress.note(line));
     let settings = request.for_scene(settings, &whole.scene, progress)?;
     if levels::lack(&whole.scene, &settings) {

@@ -79,6 +79,32 @@ fn any_number_of_processes_makes_the_bytes_of_one() {
     }
 }
 
+/// Of a file of `epsplat lod` each process reads only its share: less memory, the same bytes.
+#[test]
+fn processes_read_their_shares_of_a_file_with_levels() {
+    let folder = Folder::new();
+    let [surfels, tree, alone] = ["surfels.ply", "tree.ply", "alone.exr"].map(|name| folder.path(name));
+    succeeds(&["generate", "sphere", "--count", "300000", "-o", text(&surfels)]);
+    succeeds(&["lod", text(&surfels), "-o", text(&tree)]);
+    let arguments = ["render", text(&tree), "--size", "100x80", "--aov", "depth,normal,count"];
+    let [alone_json, json] = ["alone.json", "json"].map(|name| folder.path(name));
+    succeeds(&[&arguments[..], &["-o", text(&alone), "--json", text(&alone_json)]].concat());
+    let report = |path: &Path| serde_json::from_slice::<serde_json::Value>(&std::fs::read(path).unwrap()).unwrap();
+    for launcher in launchers() {
+        for of in [2, 3] {
+            let together = folder.path("together.exr");
+            let output = run(launcher, of, &[&arguments[..], &["-o", text(&together), "--json", text(&json)]].concat());
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            assert!(std::fs::read(&together).unwrap() == std::fs::read(&alone).unwrap(), "{launcher} {of}");
+            let report = report(&json);
+            assert_eq!(report["surfels"].as_u64(), Some(300_000));
+            let read = |rank: &serde_json::Value| rank["surfels_read"].as_u64().unwrap();
+            let read: Vec<u64> = report["ranks"].as_array().unwrap().iter().map(read).collect();
+            assert!(read.iter().sum::<u64>() == 300_000 && read.iter().all(|own| own.abs_diff(read[0]) < 2));
+        }
+    }
+}
+
 #[test]
 fn the_report_tells_of_each_process() {
     for launcher in launchers() {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use epsplat::low_level::network::mpi::{Job, Mpi};
 use epsplat::low_level::network::{Network, Wire, together};
 use epsplat::options::DeviceOptions;
-use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, View, ViewReport};
+use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, Share, View, ViewReport};
 use serde::Serialize;
 
 use super::super::progress::Bars;
@@ -44,6 +44,8 @@ struct OfRank {
     rank: usize,
     adapter: String,
     splats_drawn: u64,
+    /// Surfels in the memory of the process.
+    surfels_read: u64,
     /// Milliseconds of reading and preparing the scene.
     read_ms: f64,
     /// Milliseconds by pass.
@@ -80,6 +82,7 @@ fn one(arguments: &Arguments, mpi: &Mpi) -> Result<()> {
     let own = OfRank {
         rank: mpi.rank(),
         splats_drawn: report.splats_drawn,
+        surfels_read: renderer.surfels_read(),
         read_ms,
         passes: report.passes,
         total_ms: report.total_ms,
@@ -108,7 +111,8 @@ fn prepared(arguments: &Arguments, mpi: &Mpi, progress: &dyn Progress) -> Result
     }
     let view = View::new(&arguments.camera)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
-    let renderer = Renderer::ahead(&scene, &arguments.options, &device, &view, progress)?;
+    let share = Share::new(mpi.rank() as u32 + 1, mpi.size() as u32)?;
+    let renderer = Renderer::of_share(&scene, &arguments.options, &device, share, progress)?;
     Ok((target, view, renderer))
 }
 

@@ -6,7 +6,7 @@ use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::network::{Network, Wire, together};
-use crate::passes::share::ShareOfScene;
+use crate::passes::share::{ShareOfScene, facts_of_all};
 use crate::plan::{Facts, check};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report};
@@ -35,12 +35,18 @@ impl Renderer {
     /// [`Renderer::frame`].
     pub fn frame_over(&mut self, view: &View, network: &dyn Network, progress: &dyn Progress) -> Result<Ranked> {
         let of_view = together(network, self.shared(view, progress))?;
-        let SceneOfView { scene, camera, settings, .. } = &of_view;
-        let subject = subject(scene, Facts::of(scene), camera, settings);
+        let SceneOfView { scene, camera, settings, is_share, .. } = &of_view;
+        let subject = match is_share {
+            true => Subject { digest: 0, ..subject(scene, facts_of_all(scene), camera, settings) },
+            false => subject(scene, Facts::of(scene), camera, settings),
+        };
         together(network, check_same(network, &Subject { maps: self.maps(), ..subject }))?;
         let backend = together(network, common_backend(self.backend(), network))?;
         let made = Share::new(network.rank() as u32 + 1, network.size() as u32).and_then(|share| {
-            let source = ShareOfScene::new(scene.clone(), share);
+            let source = match is_share {
+                true => ShareOfScene::whole(scene.clone()),
+                false => ShareOfScene::new(scene.clone(), share),
+            };
             render::Renderer::new(source, settings, backend)?.among()
         });
         let (frame, report, wire) = together(network, made)?.frame_over(camera, network, progress)?;
@@ -66,7 +72,7 @@ impl Renderer {
 
     /// The picture of a frame that all processes drew.
     fn finished(&self, rendered: (Frame, Report), of_view: SceneOfView) -> Result<Picture> {
-        let SceneOfView { scene, camera, settings, report, read, key } = of_view;
+        let SceneOfView { scene, camera, settings, report, read, key, .. } = of_view;
         let picture = Picture::of(&scene, &settings, rendered, (camera, report), (read, key));
         picture.with_heights(scene.up.axis(), self.maps()).marked(self.options.marks.marks())
     }

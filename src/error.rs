@@ -79,15 +79,15 @@ pub enum Error {
         /// Why there is none.
         source: Box<Error>,
     },
-    /// A process of a job failed.
-    #[error("process {rank}: {source}")]
+    /// This process of a job failed. All others know that.
+    #[error("{}{source}", of_process(*rank))]
     Process {
         /// The number of the process, from 0.
         rank: usize,
         /// Why it failed.
         source: Box<Error>,
     },
-    /// Another process that draws the same picture failed, and printed why.
+    /// Another process of the job failed, and prints why.
     #[error("process {rank} of the job failed")]
     OtherProcess {
         /// The number of that process, from 0.
@@ -103,6 +103,11 @@ pub enum Error {
         /// The configuration and scene that failed, and how.
         what: String,
     },
+}
+
+/// Names a process for a message. The errors of the first one are mostly those of all.
+fn of_process(rank: usize) -> String {
+    if rank == 0 { String::new() } else { format!("process {rank}: ") }
 }
 
 /// Formats a path for a message, without control characters. Paths may come from a file's content,

@@ -93,8 +93,9 @@ fn best(name: Option<&str>, turn: usize) -> Result<(AdapterDescription, wgpu::Ad
         all.extend(enumerate(true));
     }
     let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
-    let ranks: Vec<Option<u32>> = all.iter().map(|(d, _)| wanted(d).then(|| d.rank())).collect();
-    let chosen = in_turn(&ranks, turn).map(|chosen| all.swap_remove(chosen));
+    let kinds: Vec<_> = all.iter().map(|(d, _)| wanted(d).then_some((d.rank(), &*d.name, &*d.api))).collect();
+    let chosen = in_turn(&kinds, turn);
+    let chosen = chosen.map(|chosen| all.swap_remove(chosen));
     chosen.ok_or_else(|| {
         Error::NoAdapter(match (name, known.is_empty()) {
             (_, true) => format!("no graphics adapter was found: {INSTALL_HINT}"),
@@ -106,11 +107,11 @@ fn best(name: Option<&str>, turn: usize) -> Result<(AdapterDescription, wgpu::Ad
     })
 }
 
-/// The index of the adapter for the process of number `turn` on a machine: the first one in order
-/// that has a rank, or one of the same rank. None stands for an adapter that is not wanted.
-fn in_turn(ranks: &[Option<u32>], turn: usize) -> Option<usize> {
-    let first = ranks.iter().flatten().next()?;
-    let equal: Vec<usize> = (0..ranks.len()).filter(|index| ranks[*index] == Some(*first)).collect();
+/// The index of the adapter for the process of number `turn` on a machine: the first one in order,
+/// or one of the same kind. None stands for an adapter that is not wanted.
+fn in_turn<T: PartialEq>(kinds: &[Option<T>], turn: usize) -> Option<usize> {
+    let first = kinds.iter().find(|kind| kind.is_some())?;
+    let equal: Vec<usize> = (0..kinds.len()).filter(|index| kinds[*index] == *first).collect();
     Some(equal[turn % equal.len()])
 }
 

@@ -27,8 +27,8 @@ pub struct Packed {
 const DAMAGED: &str = "a process sent values of pixels that are damaged";
 
 impl Packed {
-    /// Packs the values of `blocks` among `all`, `channels` for each sample. Samples with zeros only
-    /// are left out.
+    /// Packs the values of `blocks` among `all`, `channels` for each sample. Samples of zeros are
+    /// left out.
     pub fn of(layout: Blocks, blocks: &[u32], all: &[u64], channels: usize) -> Self {
         let of_sample = |sample: usize| &all[sample * channels..(sample + 1) * channels];
         let has = |sample: usize| of_sample(sample).iter().any(|number| *number != 0);

@@ -2,9 +2,9 @@
 //! pixel get to the process that owns it, which resolves it, and the picture gets to process 0.
 //!
 //! ```text
-//! nearest  to the owners; they answer for the pixels that were sent     2 x 4 bytes a covered pixel
-//! sums     to the owners                                                the bytes of the sums
-//! picture  to process 0                                                 16 bytes, and 4 a map's value
+//! nearest  to the owners, which answer     2 x 4 bytes for each covered pixel
+//! sums     to the owners                   the bytes of the sums
+//! picture  to process 0                    16 bytes a pixel, and 4 for each value of a map
 //! ```
 //!
 //! A process sends only the samples that its own surfels cover ([`packed`](super::packed)), so the
@@ -15,15 +15,15 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::Network;
 use super::blocks::Blocks;
 use super::packed::Packed;
+use super::{Network, exchanged, gathered};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::render::exchange::{Exchange, Rows, Then};
 use crate::scene::Samples;
 
-/// What a process sent to others for one picture.
+/// The bytes that a process sent to others for one picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wire {
     /// Bytes of nearest depths, and of answers about them.
@@ -60,7 +60,7 @@ impl<'a> Reduction<'a> {
         Self { network, samples, width: width as usize, state: Mutex::default() }
     }
 
-    /// What this process sent so far.
+    /// The bytes that this process sent so far.
     pub fn wire(&self) -> Wire {
         self.state().wire
     }
@@ -81,7 +81,7 @@ impl<'a> Reduction<'a> {
     fn sent(&self, to: Vec<Vec<u8>>, count: fn(&mut Wire) -> &mut u64) -> Result<Vec<Vec<u8>>> {
         let others = to.iter().enumerate().filter(|(to, _)| *to != self.network.rank());
         *count(&mut self.state().wire) += others.map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
-        self.network.all_to_all(to)
+        exchanged(self.network, Ok(to))
     }
 
     /// Runs an exchange and counts its time.
@@ -165,7 +165,7 @@ fn read(received: &[Vec<u8>]) -> Result<Vec<Packed>> {
 impl Exchange for Reduction<'_> {
     fn agree(&self, rows: &Rows, complete: bool) -> Result<bool> {
         let words = [rows.render as u32, rows.first, rows.rows, rows.width, u32::from(complete)];
-        let all = self.timed(|| self.network.all_gather(bytemuck::cast_slice(&words)))?;
+        let all = self.timed(|| gathered(self.network, bytemuck::cast_slice(&words)))?;
         let of = |bytes: &Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(bytes);
         let others: Vec<Vec<u32>> = all.iter().map(of).collect();
         match others.iter().all(|other| other.len() == words.len() && other[..4] == words[..4]) {

@@ -4,9 +4,10 @@
 //! integers. Both are associative and commutative, so each process may draw a share of the surfels
 //! ([`share`](crate::passes::share)) and the processes reduce their results in any order: the frame
 //! has the bits of one process. An [`Exchange`] does that over files, threads or a network. It is
-//! called three times for each band of a render:
+//! called for each band of a render, and at the end of a frame once more to agree:
 //!
 //! ```text
+//! agree       all processes have complete values, or all of them try again
 //! triangles   a process draws all of them, gets those of another, or needs none
 //! nearest     nearest(x, y) = min over processes, before accumulate compares depths with it
 //! sums        sums(x, y)    = sum over processes, before resolve divides

@@ -214,7 +214,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let reduction = Reduction::new(network, camera.width, samples);
         let drawn = self.check_together().and_then(|()| self.rendered(camera, Some(&reduction), progress));
         let (frame, report) = together(network, drawn)?;
-        let frame = reduction.gathered(frame)?;
+        let frame = together(network, reduction.gathered(frame))?;
         Ok((frame.map(|frame| self.filtered(frame, camera)), report, reduction.wire()))
     }
 

@@ -164,8 +164,8 @@ struct Request<'a> {
     views: bool,
     /// Gets the points of the inputs once they are read.
     read: Option<&'a ahead::Read<'a>>,
-    /// The share of the scene that the picture needs here; None for all of it.
-    share: Option<Share>,
+    /// The share of the scene that the picture needs here, and the view; None for all of it.
+    share: Option<(Share, &'a View)>,
 }
 
 impl Inputs {

@@ -45,9 +45,7 @@ impl Picture {
         let frame = marks.draw(self.frame, &self.camera, self.key.as_ref())?;
         Ok(Self { frame, ..self })
     }
-}
 
-impl Picture {
     /// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
     pub(super) fn of(
         scene: &Scene,

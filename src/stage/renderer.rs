@@ -20,6 +20,8 @@ use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, render};
 use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps, Share};
+#[cfg(feature = "parts")]
+use crate::{plan::check, scene::Detail};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -46,8 +48,8 @@ struct How<'a> {
     views: bool,
     /// The first view, if its kernels are to be compiled early.
     first: Option<&'a View>,
-    /// The share that it draws, together with other processes.
-    share: Option<Share>,
+    /// The share that it draws together with other processes, and the view.
+    share: Option<(Share, &'a View)>,
 }
 
 /// The data that views are drawn from.
@@ -99,9 +101,11 @@ impl Renderer {
         Self::with(scene, options, (device, None), How::default(), progress)
     }
 
-    /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`. Of a file of
-    /// `epsplat lod` that is the only input it reads only the share; else it reads everything, as
-    /// the surfels of a share may depend on points around it.
+    /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`.
+    ///
+    /// It reads only the share if the input is one file of `epsplat lod` and `view` has a position;
+    /// a view that is framed looks at all surfels. Else it reads everything, because the surfels of
+    /// a share may depend on points around it.
     ///
     /// # Errors
     ///
@@ -111,10 +115,10 @@ impl Renderer {
         scene: &Scene,
         options: &RenderOptions,
         device: &DeviceOptions,
-        share: Share,
+        (share, view): (Share, &View),
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), How { share: Some(share), ..How::default() }, progress)
+        Self::with(scene, options, (device, None), How { share: Some((share, view)), ..How::default() }, progress)
     }
 
     /// Makes a renderer as [`Renderer::new`] does, and meanwhile compiles the kernels that `first`,
@@ -171,6 +175,11 @@ impl Renderer {
         options.research.sources = sources;
         let request = Request { scene: &inputs, options: &options, device: &device, views, read: None, share };
         let settings = request.settings()?;
+        #[cfg(feature = "parts")]
+        if request.share.is_some() {
+            // Files may turn out to need no levels of detail.
+            check::options_of_ranks(&Settings { detail: Detail::FINEST, ..settings.clone() }, request.is_reference())?;
+        }
         if options.surface.separate && inputs.count() < 2 {
             progress.note(
                 "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
@@ -289,7 +298,15 @@ impl Renderer {
         self.rendered(view, (is_told, up), progress)?.marked(marks)
     }
 
-    /// Returns the scene that a view shows, and how it is drawn.
+    /// Fails if the renderer has only a share of the scene.
+    pub(super) fn check_whole(&self) -> Result<()> {
+        match self.has_share {
+            true => Err(Error::Usage("this renderer has a share of the scene: draw by Renderer::frame_over".into())),
+            false => Ok(()),
+        }
+    }
+
+    /// Returns the scene that a view shows, and how it is drawn. Notes are those of a frame.
     #[cfg(feature = "parts")]
     pub(super) fn scene_of(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
         let (camera, seen) = view.camera(self.scene(), &self.extent)?;
@@ -299,6 +316,10 @@ impl Renderer {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
                 renderer.check_lens(&camera, view.as_pinhole())?;
                 let report = ViewReport::new(&camera, &seen, scene, *guessed_up);
+                report.tell(progress);
+                lens::note(scene, &camera).iter().for_each(|line| progress.note(line));
+                let slow = overdraw::note(renderer.surfels(), renderer.fragments(&camera));
+                slow.iter().for_each(|line| progress.note(line));
                 let refined = refined::refined(scene, &camera);
                 refined.iter().filter_map(|refined| refined.note()).for_each(|line| progress.note(&line));
                 let scene = refined.map_or_else(|| scene.clone(), |refined| Arc::new(refined.scene));
@@ -309,6 +330,9 @@ impl Renderer {
                 let Part { made: (scene, preparation), settings, read, key } =
                     parts.scene(&request, (&camera, *frames), settings, progress)?;
                 let report = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
+                preparation.notes().iter().for_each(|line| progress.note(line));
+                report.tell(progress);
+                progress.note(&read.sentence());
                 let scene = Arc::new(scene);
                 Ok(SceneOfView { scene, camera, settings, report, read: Some(read), key, is_share: false })
             }
@@ -323,9 +347,7 @@ impl Renderer {
         (is_told, up): (bool, DVec3),
         progress: &dyn Progress,
     ) -> Result<Picture> {
-        if self.has_share {
-            return Err(Error::Usage("this renderer has a share of the scene: draw by Renderer::frame_over".into()));
-        }
+        self.check_whole()?;
         let (camera, seen) = view.camera(self.scene(), &self.extent)?;
         let other = view.as_pinhole();
         let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
@@ -333,8 +355,7 @@ impl Renderer {
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
             if is_told {
-                progress.note(&view.sentence());
-                view.warning().iter().for_each(|warning| progress.note(warning));
+                view.tell(progress);
             }
         };
         match drawn {
@@ -411,8 +432,8 @@ fn whole(
     (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let shared = request.share.filter(|_| settings.detail.is_finest());
-    let shared = shared.map_or(Ok(None), |share| tree::share_of(request, share, progress))?;
+    let shared = request.share.filter(|(_, view)| settings.detail.is_finest() && !view.is_framed());
+    let shared = shared.map_or(Ok(None), |(share, _)| tree::share_of(request, share, progress))?;
     let mut whole = match shared {
         Some((scene, preparation)) => {
             Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })

@@ -12,6 +12,7 @@ use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
 use crate::options::parse::{up_argument, vector_argument};
 use crate::options::values::Ortho;
+use crate::progress::Progress;
 use crate::scene::camera::check_near;
 use crate::scene::framing::fitted_height;
 use crate::scene::lens::DEFAULT_FOV;
@@ -177,6 +178,11 @@ impl View {
         }
     }
 
+    /// Whether the view is placed so that the whole scene shows.
+    pub(super) fn is_framed(&self) -> bool {
+        matches!(&self.0, Kind::Given(Given { place: Place::Framed { .. }, .. }))
+    }
+
     /// Returns the number of pixels of the picture.
     pub fn pixels(&self) -> u64 {
         let (width, height) = match &self.0 {
@@ -315,6 +321,12 @@ impl ViewReport {
         let up = if is_along { scene.up.other() } else { given };
         let turned = if is_along || seen.by == By::Pose { None } else { turned(camera, up, scene.up) };
         Self { eye: camera.eye.into(), target: seen.target.into(), up: up.into(), because, turned }
+    }
+
+    /// Notes the view, and its warning.
+    pub(super) fn tell(&self, progress: &dyn Progress) {
+        progress.note(&self.sentence());
+        self.warning().iter().for_each(|warning| progress.note(warning));
     }
 
     /// Returns the options in one line, with the source of up.

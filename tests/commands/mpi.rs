@@ -21,16 +21,21 @@ fn launchers() -> Vec<&'static str> {
     found
 }
 
-/// A command with `of` processes. Both launchers take more processes than cores, and a container's
-/// only user.
-fn job(launcher: &str, of: usize, arguments: &[&str]) -> Command {
+/// A launcher of `of` processes. It takes more processes than cores, and a container's only user.
+fn launched(launcher: &str, of: usize) -> Command {
     let mut command = Command::new(launcher);
     command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
     command
         .env("OMPI_MCA_rmaps_base_oversubscribe", "true")
         .env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe");
-    command.args(["-n", &of.to_string(), env!("CARGO_BIN_EXE_epsplat")]).args(arguments);
-    command.stdin(Stdio::null());
+    command.args(["-n", &of.to_string()]).stdin(Stdio::null());
+    command
+}
+
+/// A job of the program.
+fn job(launcher: &str, of: usize, arguments: &[&str]) -> Command {
+    let mut command = launched(launcher, of);
+    command.arg(env!("CARGO_BIN_EXE_epsplat")).args(arguments);
     command
 }
 
@@ -79,14 +84,15 @@ fn any_number_of_processes_makes_the_bytes_of_one() {
     }
 }
 
-/// Of a file of `epsplat lod` each process reads only its share: less memory, the same bytes.
+/// From a file of `epsplat lod` each process reads only its share, and the bytes are those of one.
 #[test]
 fn processes_read_their_shares_of_a_file_with_levels() {
     let folder = Folder::new();
     let [surfels, tree, alone] = ["surfels.ply", "tree.ply", "alone.exr"].map(|name| folder.path(name));
     succeeds(&["generate", "sphere", "--count", "300000", "-o", text(&surfels)]);
     succeeds(&["lod", text(&surfels), "-o", text(&tree)]);
-    let arguments = ["render", text(&tree), "--size", "100x80", "--aov", "depth,normal,count"];
+    let maps = ["--size", "100x80", "--aov", "depth,normal,count"];
+    let arguments = [&["render", text(&tree), "--eye", "2,1,3", "--target", "0,0,0"], &maps[..]].concat();
     let [alone_json, json] = ["alone.json", "json"].map(|name| folder.path(name));
     succeeds(&[&arguments[..], &["-o", text(&alone), "--json", text(&alone_json)]].concat());
     let report = |path: &Path| serde_json::from_slice::<serde_json::Value>(&std::fs::read(path).unwrap()).unwrap();
@@ -172,10 +178,7 @@ fn a_process_that_fails_ends_the_job_with_one_sentence() {
             text(&there).trim_end_matches("/0"),
         );
         let start = Instant::now();
-        let mut missing = Command::new(launcher);
-        missing.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-        missing.env("OMPI_MCA_rmaps_base_oversubscribe", "true");
-        let missing = missing.args(["-n", "3", "sh", "-c", &script]).output().unwrap();
+        let missing = launched(launcher, 3).args(["sh", "-c", &script]).output().unwrap();
         assert_eq!(errors(&missing).len(), 1, "{}", String::from_utf8_lossy(&missing.stderr));
         assert!(errors(&missing)[0].contains("process 1: cannot read"), "{:?}", errors(&missing));
         assert_eq!(missing.status.code(), Some(1));

@@ -14,9 +14,9 @@ pub struct Threads {
 
 #[derive(Default)]
 struct State {
-    /// What each thread sent in this round.
+    /// The messages of each thread in this round.
     sent: Vec<Option<Vec<Vec<u8>>>>,
-    /// Number of threads that took what was sent.
+    /// Number of threads that took their messages.
     took: usize,
     left: bool,
 }

@@ -232,7 +232,7 @@ fn what_is_sent_follows_from_the_covered_pixels() {
     let covered = frame.color.iter().filter(|color| color[3] > 0.0).count() as f64;
     let of = |bytes: fn(&Wire) -> u64| wires.iter().map(bytes).sum::<u64>() as f64 / covered;
     let [nearest, sums, picture] = [of(|w| w.nearest_bytes), of(|w| w.sums_bytes), of(|w| w.picture_bytes)];
-    // Of the front and the back each pixel is covered in about one or two of four regions, and three
+    // Each pixel of front and back is covered in about one or two of the four regions, and three
     // quarters of what is covered belongs to another process: 8 bytes twice at most, and masks.
     assert!((6.0..24.0).contains(&nearest), "{nearest}");
     assert!((6.0..40.0).contains(&sums), "{sums}");

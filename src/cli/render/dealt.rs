@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::super::{note, write_json};
 use super::output::named;
-use super::ranks::{device, gathered, speaking};
+use super::ranks::{device, gathered, speaking, told};
 use super::{Arguments, Target, views};
 
 /// The JSON report of all processes.
@@ -33,12 +33,13 @@ pub(super) fn run(arguments: &Arguments, mpi: &Mpi) -> Result<()> {
     let ready = views::ready(arguments, &target, (&device(arguments), mpi.rank() == 0), &*progress);
     let ready = together(mpi, ready)?;
     let (start, all) = (Instant::now(), ready.files.len());
-    let drawn = views::draw(arguments, &target, ready.dealt(mpi.rank(), mpi.size()), &*progress);
-    let drawn = drawn.inspect_err(|error| {
+    let drawn = views::draw(arguments, &target, ready.dealt(mpi.rank(), mpi.size()), (&*progress, mpi.rank() == 0));
+    let drawn = drawn.unwrap_or_else(|source| {
         // The others would draw all of their views first.
-        note(&format!("error: process {}: {error}", mpi.rank()));
-        mpi.abort();
-    })?;
+        let error = told(mpi, &Error::Process { rank: mpi.rank(), source: Box::new(source) });
+        mpi.abort(error.exit_code());
+        std::process::exit(error.exit_code().into())
+    });
     let of_processes = gathered(mpi, &drawn)?;
     let written = if mpi.rank() == 0 { tell(arguments, &of_processes, (all, start)) } else { Ok(()) };
     together(mpi, written)

@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use epsplat::low_level::network::mpi::{Job, Mpi};
-use epsplat::low_level::network::{Network, Wire, together};
+use epsplat::low_level::network::{Network, Wire, exchanged, together};
 use epsplat::options::DeviceOptions;
-use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, Share, View, ViewReport};
+use epsplat::{
+    Error, Files, Picture, Progress, Ranked, ReadReport, Renderer, Report, Result, Scene, Share, View, ViewReport,
+};
 use serde::Serialize;
 
 use super::super::progress::Bars;
@@ -22,9 +24,20 @@ pub(super) fn run(arguments: &Arguments, mpi: Mpi) -> Result<()> {
         true => dealt::run(arguments, &mpi),
         false => one(arguments, &mpi),
     };
-    // All processes know how the work ended, and leave together.
+    // The processes leave together, when all know how the work ended.
+    let outcome = together(&mpi, outcome);
+    let told = outcome.map_err(|error| told(&mpi, &error));
     mpi.finish();
-    outcome
+    told
+}
+
+/// Prints an error in the process that had it, before a launcher that sees another process end may
+/// end this one. Returns what is left to say, which is nothing.
+pub(super) fn told(network: &dyn Network, error: &Error) -> Error {
+    if !matches!(error, Error::OtherProcess { .. }) {
+        note(&format!("error: {error}"));
+    }
+    Error::OtherProcess { rank: network.rank(), code: error.exit_code() }
 }
 
 /// The options of the device for this process: the cards of a machine are dealt in turn.
@@ -64,6 +77,9 @@ struct Outcome<'a> {
     #[serde(flatten)]
     report: &'a Report,
     view: ViewReport,
+    /// Numbers of nodes, points and bytes that a process read; None if the inputs were read whole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    read: Option<ReadReport>,
     /// The name and version of the MPI library.
     mpi: &'a str,
     /// The processes, in order.
@@ -112,7 +128,7 @@ fn prepared(arguments: &Arguments, mpi: &Mpi, progress: &dyn Progress) -> Result
     let view = View::new(&arguments.camera)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
     let share = Share::new(mpi.rank() as u32 + 1, mpi.size() as u32)?;
-    let renderer = Renderer::of_share(&scene, &arguments.options, &device, share, progress)?;
+    let renderer = Renderer::of_share(&scene, &arguments.options, &device, (share, &view), progress)?;
     Ok((target, view, renderer))
 }
 
@@ -123,7 +139,7 @@ fn write(
     picture: Picture,
     (mpi, ranks): (&Mpi, Vec<serde_json::Value>),
 ) -> Result<()> {
-    let Picture { frame, report, view, unseen, .. } = picture;
+    let Picture { frame, report, view, read, unseen, .. } = picture;
     let drawn = ranks.iter().filter_map(|rank| rank["splats_drawn"].as_u64()).sum();
     let report = Report { splats_drawn: drawn, ..report };
     let adapters: std::collections::BTreeSet<&str> = ranks.iter().filter_map(|rank| rank["adapter"].as_str()).collect();
@@ -137,7 +153,7 @@ fn write(
     match &arguments.file.json {
         Some(path) => {
             let bits = frame.hashes();
-            write_json(path, &Outcome { report: &report, view, mpi: mpi.version(), ranks, bits })
+            write_json(path, &Outcome { report: &report, view, read, mpi: mpi.version(), ranks, bits })
         }
         None => {
             note(&format!("{}; {} processes", summary(&report, &arguments.output), mpi.size()));
@@ -149,12 +165,15 @@ fn write(
 /// Returns a value of each process in process 0, and nothing in the others.
 pub(super) fn gathered(network: &dyn Network, own: &impl Serialize) -> Result<Vec<serde_json::Value>> {
     let failed = |error: serde_json::Error| Error::Usage(format!("a report cannot be sent: {error}"));
-    let bytes = together(network, serde_json::to_vec(own).map_err(failed))?;
-    let mut to = vec![Vec::new(); network.size()];
-    to[0] = bytes;
-    let all = network.all_to_all(to)?;
+    let to_first = |bytes| {
+        let mut to = vec![Vec::new(); network.size()];
+        to[0] = bytes;
+        to
+    };
+    let all = exchanged(network, serde_json::to_vec(own).map(to_first).map_err(failed))?;
     let is_first = network.rank() == 0;
-    all.iter().filter(|_| is_first).map(|bytes| serde_json::from_slice(bytes).map_err(failed)).collect()
+    let read = all.iter().filter(|_| is_first).map(|bytes| serde_json::from_slice(bytes).map_err(failed));
+    together(network, read.collect())
 }
 
 /// The most memory that this process had so far, bytes.

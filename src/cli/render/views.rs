@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     let bars = Bars::new();
     let ready = ready(arguments, target, (&arguments.device, true), &bars)?;
     let (writers, start) = (ready.writers, Instant::now());
-    let pictures = draw(arguments, target, ready, &bars)?;
+    let pictures = draw(arguments, target, ready, (&bars, true))?;
     tell(arguments, pictures, writers, start)
 }
 
@@ -139,21 +139,21 @@ impl Ready {
     }
 }
 
-/// Draws and writes the pictures.
+/// Draws and writes the pictures. Notes are printed if it `speaks`.
 pub(super) fn draw(
     arguments: &Arguments,
     target: &Target,
     ready: Ready,
-    bars: &(impl Progress + Sync + ?Sized),
+    (bars, speaks): (&dyn Progress, bool),
 ) -> Result<Vec<Written>> {
     let Ready { files, views, mut renderer, writers } = ready;
     bars.begin("rendering views", views.len() as u64);
     // The bar counts views and not their stages.
-    let notes = Notes;
+    let notes: &dyn Progress = if speaks { &Notes } else { &() };
     // The first empty picture with the reason, and the number of empty pictures.
     let empty = RefCell::new((None, 0));
     let frames = files.iter().zip(&views).map(|(file, view)| {
-        let picture = renderer.frame(view, &notes).map_err(|error| error.of_view(file))?;
+        let picture = renderer.frame(view, notes).map_err(|error| error.of_view(file))?;
         if let Some(unseen) = &picture.unseen {
             let (first, count) = &mut *empty.borrow_mut();
             first.get_or_insert_with(|| (file, unseen.sentence()));
@@ -175,7 +175,9 @@ pub(super) fn draw(
     });
     bars.end();
     let pictures = pictures?;
-    if let (Some((first, unseen)), count) = empty.into_inner() {
+    if let (Some((first, unseen)), count) = empty.into_inner()
+        && speaks
+    {
         note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));
     }
     Ok(pictures)

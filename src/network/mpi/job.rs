@@ -1,5 +1,7 @@
 //! The MPI job that started this process, as its environment tells.
 
+use crate::error::Error;
+
 /// The families of MPI libraries, by their binary interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
@@ -14,6 +16,8 @@ pub enum Family {
 pub struct Job {
     /// Number of processes.
     pub size: usize,
+    /// Number of this process, from 0.
+    pub rank: usize,
     /// Number of this process among those on its machine, from 0.
     pub local_rank: usize,
     /// The likelier family.
@@ -32,7 +36,15 @@ const SIZES: [(&str, Family); 4] = [
 /// The variables in which launchers tell the number of a process on its machine.
 const LOCAL_RANKS: [&str; 4] = ["OMPI_COMM_WORLD_LOCAL_RANK", "MPI_LOCALRANKID", "PALS_LOCAL_RANKID", "SLURM_LOCALID"];
 
+/// The variables in which launchers tell the number of a process.
+const RANKS: [&str; 5] = ["OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "PALS_RANKID", "SLURM_PROCID"];
+
 impl Job {
+    /// An error that all processes have before they can talk: the first one prints it.
+    pub(super) fn said_once(&self, error: Error) -> Error {
+        if self.rank == 0 { error } else { Error::OtherProcess { rank: 0, code: error.exit_code() } }
+    }
+
     /// The job that the environment `variable` describes; `None` if there is none.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         let number = |name: &str| variable(name)?.trim().parse::<usize>().ok();
@@ -44,7 +56,8 @@ impl Job {
         };
         let (size, family) = SIZES.into_iter().find_map(told)?;
         let local_rank = LOCAL_RANKS.into_iter().find_map(number).unwrap_or(0);
-        Some(Self { size, local_rank, family })
+        let rank = RANKS.into_iter().find_map(number).unwrap_or(0);
+        Some(Self { size, rank, local_rank, family })
     }
 }
 
@@ -57,7 +70,7 @@ mod tests {
         let job = |variables: &[(&str, &str)]| {
             Job::of(|name| variables.iter().find(|(own, _)| *own == name).map(|(_, value)| (*value).to_owned()))
         };
-        let of = |size, local_rank, family| Some(Job { size, local_rank, family });
+        let of = |size, rank, family| Some(Job { size, rank, local_rank: rank, family });
         let open = [("OMPI_COMM_WORLD_SIZE", "8"), ("OMPI_COMM_WORLD_LOCAL_RANK", "3"), ("PMIX_RANK", "3")];
         assert_eq!(job(&open), of(8, 3, Family::OpenMpi));
         assert_eq!(job(&[("PMI_SIZE", "4"), ("PMI_RANK", "1"), ("MPI_LOCALRANKID", "1")]), of(4, 1, Family::Mpich));

@@ -30,8 +30,8 @@ const MPICH_STATUS: usize = 1;
 /// The longest time between two looks at whether all processes have come.
 const LONGEST_WAIT: Duration = Duration::from_millis(1);
 
-/// `MPI_THREAD_SERIALIZED`: any thread calls, one at a time.
-const SERIALIZED: c_int = 2;
+/// `MPI_THREAD_FUNNELED`: there are other threads, and only the one that initialises calls.
+const FUNNELED: c_int = 1;
 
 /// `MPI_MAX_LIBRARY_VERSION_STRING`, of both families at most.
 const MOST_VERSION: usize = 8192;
@@ -72,7 +72,7 @@ enum Either {
     Mpich(Functions<c_int>),
 }
 
-/// Calls the function `$name` of either family, with its handles.
+/// Evaluates `$call` with the functions of either family as `$own`.
 macro_rules! call {
     ($library:expr, |$own:ident| $call:expr) => {
         match &$library.functions {
@@ -141,7 +141,7 @@ impl Library {
         let mut provided = 0;
         // SAFETY: MPI 2 and later take null pointers for the arguments of main.
         checked("MPI_Init_thread", unsafe {
-            init(std::ptr::null_mut(), std::ptr::null_mut(), SERIALIZED, &raw mut provided)
+            init(std::ptr::null_mut(), std::ptr::null_mut(), FUNNELED, &raw mut provided)
         })?;
         Ok(Self { functions, finalize, version: text.trim().to_owned() })
     }
@@ -227,10 +227,10 @@ impl Library {
         checked("MPI_Alltoallv", code)
     }
 
-    /// Ends all processes of the job with exit code 1.
-    pub fn abort(&self) {
+    /// Ends all processes of the job with this exit code.
+    pub fn abort(&self, code: u8) {
         // SAFETY: the library is initialised.
-        unsafe { call!(self, |own| (own.abort)(own.world, 1)) };
+        unsafe { call!(self, |own| (own.abort)(own.world, code.into())) };
     }
 
     /// Leaves the job. No other function is called after it.

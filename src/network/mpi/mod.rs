@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 /// integers.
 const MOST_AT_ONCE: usize = 1 << 30;
 
-/// A process of an MPI job. Dropping it ends the job with exit code 1 and all of its processes,
+/// A process of an MPI job. Only the thread that joined calls its functions. Dropping it ends the job with exit code 1 and all of its processes,
 /// unless [`Mpi::finish`] was called: a process that leaves alone would let the others wait.
 pub struct Mpi {
     library: Library,
@@ -33,9 +33,19 @@ impl Mpi {
     pub fn join() -> Result<Option<Self>> {
         let variable = |name: &str| std::env::var(name).ok();
         let Some(job) = Job::of(variable).filter(|job| job.size > 1) else { return Ok(None) };
-        let library = Library::load(&job, variable(library::VARIABLE))?;
+        let library = Library::load(&job, variable(library::VARIABLE)).map_err(|error| job.said_once(error))?;
         let [rank, size] = library.started()?.map(|number| usize::try_from(number).unwrap_or(0));
-        Ok(Some(Self { library, rank, size: size.max(1), finished: false }))
+        if size != job.size {
+            library.finalize();
+            return Err(job.said_once(Error::Usage(format!(
+                "the MPI library ({}) starts {size} processes, and the job has {}: name that of the launcher, as in \
+                 {}=/path/libmpi.so",
+                library.version(),
+                job.size,
+                library::VARIABLE
+            ))));
+        }
+        Ok(Some(Self { library, rank, size, finished: false }))
     }
 
     /// The name and version of the library, as it says them.
@@ -49,9 +59,9 @@ impl Mpi {
         self.library.finalize();
     }
 
-    /// Ends all processes of the job at once, with exit code 1.
-    pub fn abort(&self) {
-        self.library.abort();
+    /// Ends all processes of the job at once, with this exit code.
+    pub fn abort(&self, code: u8) {
+        self.library.abort(code);
     }
 
     /// Runs one round of [`Network::all_to_all`]: at most `most` bytes for each process.
@@ -120,7 +130,7 @@ impl Network for Mpi {
 impl Drop for Mpi {
     fn drop(&mut self) {
         if !self.finished {
-            self.abort();
+            self.abort(1);
         }
     }
 }

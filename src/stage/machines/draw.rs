@@ -29,6 +29,7 @@ impl Renderer {
     /// [`Error::Malformed`] if `within` belongs to another picture; and the errors of
     /// [`Renderer::frame`].
     pub fn part(&self, view: &View, share: Share, within: Option<&Part>, progress: &dyn Progress) -> Result<Part> {
+        self.check_whole()?;
         let (camera, scene) = self.subject_of_part(view, progress)?;
         let Backend::Gpu { gpu, .. } = self.backend() else {
             return Err(Error::Usage("parts are drawn by an adapter, and there is none: `epsplat adapters`".into()));

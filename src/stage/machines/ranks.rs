@@ -5,9 +5,9 @@ use super::header::{Subject, encoded};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::network::{Network, Wire, together};
+use crate::network::{Network, Wire, gathered, together};
 use crate::passes::share::{ShareOfScene, facts_of_all};
-use crate::plan::{Facts, check};
+use crate::plan::{Facts, Settings, check};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report};
 use crate::scene::Share;
@@ -66,26 +66,30 @@ impl Renderer {
         if marks != Marks::default() {
             marks.check(&of_view.camera)?;
         }
-        progress.note(&of_view.report.sentence());
         Ok(of_view)
     }
 
     /// The picture of a frame that all processes drew.
     fn finished(&self, rendered: (Frame, Report), of_view: SceneOfView) -> Result<Picture> {
-        let SceneOfView { scene, camera, settings, report, read, key, .. } = of_view;
+        let SceneOfView { scene, camera, settings, report, read, key, is_share } = of_view;
         let picture = Picture::of(&scene, &settings, rendered, (camera, report), (read, key));
+        // The reasons of a share are not those of all surfels.
+        let unseen = picture.unseen.filter(|_| !is_share);
+        let picture = Picture { unseen, ..picture };
         picture.with_heights(scene.up.axis(), self.maps()).marked(self.options.marks.marks())
     }
 }
 
 /// Fails unless all processes draw the same picture of the same scene.
 fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
-    let own = encoded(subject);
+    // A header has no kernels, as files of parts carry none.
+    let Settings { sources, own_kernel, accumulator, .. } = &subject.settings;
+    let kernels = format!("{sources:?} {own_kernel:?} {accumulator:?}");
+    let own = encoded(subject).into_iter().chain(kernels.into_bytes());
     // FNV-1a of 64 bits.
-    let hash = own
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    let all = network.all_gather(&hash.to_le_bytes())?;
+    let hash =
+        own.fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    let all = gathered(network, &hash.to_le_bytes())?;
     match all.iter().position(|other| *other != all[0]) {
         None => Ok(()),
         Some(other) => Err(Error::Usage(format!(
@@ -96,11 +100,15 @@ fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
 
 /// The device of this process, with the least limit of buffers of all: bands follow from it.
 fn common_backend(own: &Backend, network: &dyn Network) -> Result<Backend> {
-    let Backend::Gpu { gpu, sources } = own else {
-        return Err(Error::Usage("processes draw together by adapters".into()));
-    };
-    let all = network.all_gather(&gpu.adapter.max_storage_buffer_binding_size.to_le_bytes())?;
+    let limit = if let Backend::Gpu { gpu, .. } = own { gpu.buffer_limit() } else { 0 };
+    let all = gathered(network, &limit.to_le_bytes())?;
     let of = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes);
     let least = all.iter().map(of).min().unwrap_or(0);
-    Ok(Backend::Gpu { gpu: Box::new((**gpu).clone().with_buffer_limit(least)), sources: sources.clone() })
+    match own {
+        Backend::Gpu { gpu, sources } => {
+            let gpu = Box::new((**gpu).clone().with_buffer_limit(least));
+            Ok(Backend::Gpu { gpu, sources: sources.clone() })
+        }
+        Backend::Reference => Ok(Backend::Reference),
+    }
 }

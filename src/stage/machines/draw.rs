@@ -39,7 +39,7 @@ impl Renderer {
         let settings = self.settings().clone();
         let facts = Facts::of(&scene);
         check::files_of_parts(&facts, &settings)?;
-        let subject = subject(&scene, facts, &camera, &settings);
+        let subject = subject(&scene, (facts, digest_of(&scene)), &camera, &settings);
         let subject = Subject { maps: self.maps(), ..subject };
         let own = own_digest(&scene, share, &subject, &settings);
         let holds = if within.is_some() { Holds::Sums } else { Holds::Depths };
@@ -107,9 +107,7 @@ fn check_marks(options: &RenderOptions) -> Result<()> {
 }
 
 /// The picture that a part belongs to.
-pub(super) fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &Settings) -> Subject {
-    let all: Vec<u32> = (0..scene.surfels.len() as u32).collect();
-    let digest = digest::of_surfels(scene, &all).wrapping_add(digest::of_triangles(&scene.triangles));
+pub(super) fn subject(scene: &Scene, (facts, digest): (Facts, u64), camera: &Camera, settings: &Settings) -> Subject {
     Subject {
         version: VERSION.to_owned(),
         facts,
@@ -119,6 +117,12 @@ pub(super) fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &S
         maps: settings.maps,
         up: scene.up.axis().to_array(),
     }
+}
+
+/// The digest of all surfels and triangles.
+pub(super) fn digest_of(scene: &Scene) -> u64 {
+    let all: Vec<u32> = (0..scene.surfels.len() as u32).collect();
+    digest::of_surfels(scene, &all).wrapping_add(digest::of_triangles(&scene.triangles))
 }
 
 /// The digest of the surfels of `share`, and of the triangles in the first share.

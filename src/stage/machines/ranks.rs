@@ -1,6 +1,6 @@
 //! Draws a picture together with the other processes of a network: each draws a share of the scene.
 
-use super::draw::subject;
+use super::draw::{digest_of, subject};
 use super::header::{Subject, encoded};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
@@ -36,10 +36,11 @@ impl Renderer {
     pub fn frame_over(&mut self, view: &View, network: &dyn Network, progress: &dyn Progress) -> Result<Ranked> {
         let of_view = together(network, self.shared(view, progress))?;
         let SceneOfView { scene, camera, settings, is_share, .. } = &of_view;
-        let subject = match is_share {
-            true => Subject { digest: 0, ..subject(scene, facts_of_all(scene), camera, settings) },
-            false => subject(scene, Facts::of(scene), camera, settings),
+        let of_all = match is_share {
+            true => (facts_of_all(scene), 0),
+            false => (Facts::of(scene), digest_of(scene)),
         };
+        let subject = subject(scene, of_all, camera, settings);
         together(network, check_same(network, &Subject { maps: self.maps(), ..subject }))?;
         let backend = together(network, common_backend(self.backend(), network))?;
         let made = Share::new(network.rank() as u32 + 1, network.size() as u32).and_then(|share| {

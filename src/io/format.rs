@@ -87,6 +87,12 @@ impl Format {
     /// The formats that hold meshes.
     pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off, Self::Gltf];
 
+    /// Whether the reader of a remote file of this format asks for parts of it.
+    #[cfg(feature = "http")]
+    pub(super) fn is_read_in_part(self) -> bool {
+        matches!(self, Self::Las | Self::Ply)
+    }
+
     /// The names in [`Self::READ`] as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {
         Self::joined(Self::READ.iter().map(|(name, _)| *name))

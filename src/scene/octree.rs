@@ -103,12 +103,18 @@ impl PointOctree {
         (0..self.nodes.len()).filter(|&node| self.nodes[node].level < levels).collect()
     }
 
-    /// The sorted indices of the nodes that a picture needs.
+    /// Whether all points, and those around them that matter, lie outside the picture. False if
+    /// their bounding box is unknown.
+    fn is_beside(&self, camera: &Camera) -> bool {
+        !self.bounds.is_empty() && is_box_beside(&self.bounds, camera)
+    }
+
+    /// The sorted indices of the nodes that a picture needs; none if [`is_box_beside`] the picture.
     ///
     /// They are the nodes in view for which every ancestor is coarse enough to be refined: a disk
     /// with the ancestor's spacing as its radius has an image of at least `size` square pixels.
     fn taken(&self, camera: &Camera, size: f64) -> Vec<usize> {
-        let mut open: Vec<usize> = self.find(0, [0; 3]).into_iter().collect();
+        let mut open: Vec<usize> = self.find(0, [0; 3]).into_iter().filter(|_| !self.is_beside(camera)).collect();
         let mut taken = Vec::new();
         while let Some(index) = open.pop() {
             let node = &self.nodes[index];
@@ -141,6 +147,19 @@ impl PointOctree {
         taken.sort_unstable();
         taken
     }
+}
+
+/// Whether the points of an octree with this bounding box, world coordinates, are left out of a
+/// picture. They and what matters around them lie outside of it.
+///
+/// The test knows no more than the box, so a file is left out before it is opened. Programs that
+/// write COPC choose the spacing in the root so that 128 points lie along an edge of its cube.
+pub fn is_box_beside(bounds: &Bounds, camera: &Camera) -> bool {
+    const ALONG_EDGE: f64 = 128.0;
+    let extent = bounds.extent();
+    let reach = 0.5 * extent.length() + NEIGHBOURHOOD / ALONG_EDGE * extent.max_element();
+    let at = camera.rotation * (bounds.center() - camera.eye);
+    camera.depth(at) + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE)
 }
 
 /// The nodes of each octree that a picture with this `detail` needs.

@@ -1,14 +1,16 @@
 //! The files of a scene. A folder stands for the files in it, and parts that cannot be read are
 //! left out with a note.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use crate::address;
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
 use crate::io::place::GeoKeys;
 use crate::io::ply::{Levels, Rows};
-use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions};
+use crate::io::vpc::{self, Tile};
+use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions, Up};
 use crate::options::{FormatOptions, InputOptions};
 use crate::progress::Progress;
 
@@ -22,11 +24,15 @@ pub struct Files {
     options: InputOptions,
     /// Paths that were found in folders.
     of_folders: BTreeSet<PathBuf>,
+    /// The tiles of virtual point clouds, by their path.
+    tiles: BTreeMap<PathBuf, Tile>,
 }
 
 impl Files {
-    /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name.
-    /// Nothing is read yet.
+    /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name,
+    /// and each virtual point cloud (`.vpc`) for its tiles. Nothing else is read yet.
+    ///
+    /// A path that begins with `http://` or `https://` is the address of a file on a server.
     ///
     /// A file of a folder is readable if its extension is a format's name; `.txt` and `.csv` files
     /// also have to start as a table. Names with a leading dot are skipped, as they are files that
@@ -35,11 +41,19 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file.
+    /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file,
+    /// and the errors of [`vpc::read`].
     pub fn new(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &InputOptions) -> Result<Self> {
         let mut files = Self { options: options.clone(), ..Self::default() };
         for path in paths {
             let path = path.into();
+            if vpc::is_one(&path) && !path.is_dir() {
+                for tile in vpc::read(&path)? {
+                    files.paths.push(tile.path.clone());
+                    files.tiles.insert(tile.path.clone(), tile);
+                }
+                continue;
+            }
             if !path.is_dir() {
                 files.paths.push(path);
                 continue;
@@ -120,9 +134,28 @@ impl Files {
         Ok((all, (count > 0).then_some(sentence)))
     }
 
-    /// Opens a regular file. Returns None for standard input and other paths in which no position
-    /// can be sought.
-    fn seekable(&self, path: &Path) -> Result<Option<Input>> {
+    /// Whether the path is that of a tile of a virtual point cloud. It may be on a disk that is not
+    /// there as long as no picture shows it.
+    pub(super) fn is_tile(&self, path: &Path) -> bool {
+        self.tiles.contains_key(path)
+    }
+
+    /// The tile at each path; None if a path is not that of a tile of a virtual point cloud.
+    pub(super) fn tiles(&self) -> Option<Vec<&Tile>> {
+        self.paths.iter().map(|path| self.tiles.get(path)).collect()
+    }
+
+    /// Opens a regular file, or a remote one that is read in part. Returns None for standard input
+    /// and other paths in which no position can be sought.
+    pub(super) fn seekable(&self, path: &Path) -> Result<Option<Input>> {
+        if address::is_remote(path) {
+            let input = Input::open(path, self.options.file.input_format)?;
+            if !input.is_copy() {
+                return Ok(Some(input));
+            }
+            // The copy is what the next call that opens the path gets.
+            return input.keep(path).map(|()| None).map_err(|error| Error::read(path, error));
+        }
         let is_file = path.is_file() && path != Path::new("-");
         is_file.then(|| Input::open(path, self.options.file.input_format)).transpose()
     }
@@ -154,7 +187,7 @@ impl Files {
             rows.ok_or_else(|| {
                 Error::Usage(format!(
                     "--memory needs binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, which {} is not: make surfels of it first (epsplat surfels), or leave --memory out",
-                    path.display()
+                    address::shown(path).display()
                 ))
             })
         };
@@ -164,18 +197,21 @@ impl Files {
         Ok(files)
     }
 
-    /// Reads the points of the given nodes of each octree.
+    /// Reads the points of the given nodes of each octree, none where there is no octree.
     ///
     /// The first points read with `rules` decide how colours are interpreted, so that later calls
     /// with the same rules agree.
     pub(super) fn nodes<'a>(
         &self,
-        octrees: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
+        octrees: impl Iterator<Item = (Option<&'a mut Copc>, &'a Vec<usize>)>,
         (rules, column): (&mut ColorRules, Option<String>),
         progress: &dyn Progress,
     ) -> Result<Vec<Points>> {
         let options = self.options.with_column(column);
-        let read = |(file, nodes): (&mut Copc, &Vec<usize>)| file.read_raw(nodes, &options, progress);
+        let read = |(file, nodes): (Option<&mut Copc>, &Vec<usize>)| match file {
+            Some(file) => file.read_raw(nodes, &options, progress),
+            None => Ok(Points { up: Some(Up::Z), ..Points::default() }),
+        };
         let mut points = octrees.map(read).collect::<Result<Vec<_>>>()?;
         rules.settle(&mut points);
         Ok(points)

@@ -3,8 +3,7 @@
 
 use super::chunks::Scheme;
 use crate::io::fault::{Fault, reserve};
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use crate::io::source::Source;
 use std::ops::Range;
 
 /// The part of a chunk that is needed.
@@ -41,14 +40,18 @@ impl Layers {
         self.start.len() as u64 + self.runs.iter().map(|run| run.end - run.start).sum::<u64>()
     }
 
+    /// The ranges of bytes that are read of a chunk at this offset of the file, without its head.
+    pub(super) fn ranges(&self, offset: u64) -> impl Iterator<Item = Range<u64>> {
+        self.runs.iter().map(move |run| offset + run.start..offset + run.end)
+    }
+
     /// Reads the chunk at this offset of the file as if it had no other layers.
-    pub(super) fn read(&self, mut file: &File, offset: u64) -> Result<Vec<u8>, Fault> {
+    pub(super) fn read(&self, file: &Source, offset: u64) -> Result<Vec<u8>, Fault> {
         let mut bytes = Vec::new();
         reserve(&mut bytes, self.bytes())?;
         bytes.extend(&self.start);
         for run in &self.runs {
-            file.seek(SeekFrom::Start(offset + run.start))?;
-            file.take(run.end - run.start).read_to_end(&mut bytes)?;
+            file.read_at(offset + run.start, run.end - run.start, &mut bytes)?;
         }
         Ok(bytes)
     }
@@ -81,7 +84,7 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(&[[1; 5].as_slice(), &chunk, &[2; 9]].concat()).unwrap();
         let layers = Layers::of(start, &scheme);
-        let read = layers.read(&file, 5).unwrap();
+        let read = layers.read(&Source::File(file), 5).unwrap();
         let kept: Vec<u8> = [3u32, 2, 0, 0, 1, 0, 2].into_iter().flat_map(u32::to_le_bytes).collect();
         assert_eq!(read, [&[7, 8, 9, 0, 0, 0], kept.as_slice(), &[10, 10, 10, 11, 11, 14, 16, 16]].concat());
         assert_eq!(layers.bytes(), read.len() as u64);

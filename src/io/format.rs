@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::off;
 use super::values::BYTE_ORDER_MARK;
+use crate::address;
 
 /// A format of points or meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +87,11 @@ impl Format {
 
     /// The formats that hold meshes.
     pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off, Self::Gltf];
+
+    /// Whether a name is that of a LAS file.
+    pub(crate) fn is_las(path: &Path) -> bool {
+        Self::of_name(&address::shown(path)) == Some(Self::Las)
+    }
 
     /// Whether the reader of a remote file of this format asks for parts of it.
     #[cfg(feature = "http")]

@@ -219,7 +219,7 @@ impl Opened {
     #[cfg(feature = "http")]
     fn remote(address: &str) -> io::Result<Self> {
         use super::remote::{self, Patience, Remote};
-        Ok(match Remote::open(address, Patience::default())? {
+        Ok(match Remote::open(address, Patience::of_environment()?)? {
             remote::Opened::Ranges(remote) => Self::Remote(remote),
             remote::Opened::Whole(_, Some(length)) if length > MOST_COPIED => return Err(remote::too_long()),
             remote::Opened::Whole(bytes, _) => Self::Stream(bytes),
@@ -288,7 +288,7 @@ impl Opened {
                 if let Some(what) = format.fault_of_start(&start) {
                     return Err(Error::malformed(path, what));
                 }
-                let (file, length) = self::copied(&start, stream, MOST_COPIED).map_err(failed)?;
+                let (file, length) = copied(&start, stream, MOST_COPIED).map_err(failed)?;
                 (Source::File(file), length, format, true)
             }
         };

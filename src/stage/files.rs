@@ -162,7 +162,18 @@ impl Files {
 
     /// Opens the files as octrees if all of them are COPC. Otherwise returns None.
     pub(super) fn octrees(&self, progress: &dyn Progress) -> Result<Option<Vec<Copc>>> {
-        let (files, left_out) = self.each(|path| self.seekable(path)?.map_or(Ok(None), Copc::open), || None)?;
+        let open = |path: &Path| {
+            let input = self.seekable(path)?;
+            if input.is_none() && address::is_remote(path) && Format::is_las(path) {
+                let path = address::shown(path);
+                progress.note(&format!(
+                    "{}: its server sends no ranges of bytes, so the whole file is copied and read",
+                    path.display()
+                ));
+            }
+            input.map_or(Ok(None), Copc::open)
+        };
+        let (files, left_out) = self.each(open, || None)?;
         let files: Option<Vec<Copc>> = files.into_iter().collect();
         left_out.iter().filter(|_| files.is_some()).for_each(|line| progress.note(line));
         Ok(files)

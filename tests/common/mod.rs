@@ -6,6 +6,7 @@
 pub mod any_options;
 pub mod any_scene;
 pub mod command;
+pub mod copc_made;
 pub mod enclosure;
 pub mod evaluated;
 pub mod gaussians;
@@ -15,6 +16,7 @@ pub mod meshes;
 pub mod modules;
 mod random;
 pub mod scenes;
+pub mod server;
 pub mod solids;
 pub mod variants;
 

@@ -309,12 +309,12 @@ pub(super) fn chunk_table(
 
 /// Checks that the layers of each chunk lie within it. Also limits each chunk's number of points to
 /// that in its head, because the last chunk may be shorter.
-fn check_layers(
-    file: &mut (impl Read + Seek),
-    mut at: u64,
-    scheme: &Scheme,
-    chunks: &mut [Chunk],
-) -> Result<(), Fault> {
+fn check_layers(file: &mut BufReader<Shown>, mut at: u64, scheme: &Scheme, chunks: &mut [Chunk]) -> Result<(), Fault> {
+    let starts = chunks.iter().scan(at, |at, chunk| {
+        *at += chunk.bytes;
+        Some(*at - chunk.bytes)
+    });
+    file.get_ref().source().expect(starts.map(|start| start..start + scheme.start()))?;
     let mut start = vec![0; scheme.start() as usize];
     for (index, chunk) in chunks.iter_mut().enumerate() {
         if chunk.bytes > 0 || chunk.points > 0 {

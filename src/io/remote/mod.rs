@@ -56,14 +56,23 @@ impl Patience {
     }
 }
 
-impl Default for Patience {
-    /// 30 s without a byte, or as many as the environment variable `EPSPLAT_HTTP_TIMEOUT` says, and
-    /// at most 10 s for a connection. TCP sends a lost packet again after 1, 2, 4 and 8 s, so 30 s
-    /// outlast four losses in a row.
-    fn default() -> Self {
-        let asked = std::env::var("EPSPLAT_HTTP_TIMEOUT").ok().and_then(|value| value.trim().parse::<f64>().ok());
-        let seconds = asked.filter(|seconds| (0.01..=86_400.0).contains(seconds)).unwrap_or(30.0);
-        Self::of_stall(Duration::from_secs_f64(seconds))
+impl Patience {
+    /// The limits that the environment asks for: 30 s without a byte, or as many as the variable
+    /// `EPSPLAT_HTTP_TIMEOUT` says, and at most 10 s for a connection. TCP sends a lost packet again
+    /// after 1, 2, 4 and 8 s, so 30 s outlast four losses in a row.
+    ///
+    /// # Errors
+    ///
+    /// The variable is no number of seconds from 0.01 to 86,400.
+    pub fn of_environment() -> io::Result<Self> {
+        let Some(asked) = std::env::var_os("EPSPLAT_HTTP_TIMEOUT") else {
+            return Ok(Self::of_stall(Duration::from_secs(30)));
+        };
+        let seconds = asked.to_str().and_then(|asked| asked.trim().parse::<f64>().ok());
+        match seconds.filter(|seconds| (0.01..=86_400.0).contains(seconds)) {
+            Some(seconds) => Ok(Self::of_stall(Duration::from_secs_f64(seconds))),
+            None => Err(answer::error("EPSPLAT_HTTP_TIMEOUT is no number of seconds from 0.01 to 86400")),
+        }
     }
 }
 
@@ -259,7 +268,7 @@ impl Seek for Remote {
 /// The first bytes of the file at `address`, at most `most`.
 pub fn start_of(address: &str, most: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    match Remote::open(address, Patience::default())? {
+    match Remote::open(address, Patience::of_environment()?)? {
         Opened::Ranges(remote) => remote.read_at(0, most, &mut bytes)?,
         Opened::Whole(whole, _) => drop(whole.take(most).read_to_end(&mut bytes)?),
     }

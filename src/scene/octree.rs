@@ -156,10 +156,18 @@ impl PointOctree {
 /// write COPC choose the spacing in the root so that 128 points lie along an edge of its cube.
 pub fn is_box_beside(bounds: &Bounds, camera: &Camera) -> bool {
     const ALONG_EDGE: f64 = 128.0;
-    let extent = bounds.extent();
-    let reach = 0.5 * extent.length() + NEIGHBOURHOOD / ALONG_EDGE * extent.max_element();
-    let at = camera.rotation * (bounds.center() - camera.eye);
-    camera.depth(at) + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE)
+    let reach = NEIGHBOURHOOD / ALONG_EDGE * bounds.extent().max_element();
+    let half = 0.5 * bounds.extent() + reach;
+    let in_camera = |place: DVec3| camera.rotation * (place - camera.eye);
+    let corners: [DVec3; 8] = std::array::from_fn(|at| {
+        let signs = [at & 1, at >> 1 & 1, at >> 2 & 1].map(|upper| 2.0 * upper as f64 - 1.0);
+        in_camera(bounds.center() + half * DVec3::from_array(signs))
+    });
+    let deepest = match camera.depth_is_distance() {
+        false => corners.iter().map(|corner| camera.depth(*corner)).fold(f64::NEG_INFINITY, f64::max),
+        true => camera.depth(in_camera(bounds.center())) + half.length(),
+    };
+    deepest < camera.near || camera.is_body_beside_image(&corners, DVec2::ONE)
 }
 
 /// The nodes of each octree that a picture with this `detail` needs.
@@ -282,6 +290,29 @@ mod tests {
         let away = self::camera(DVec3::new(0.0, 0.0, 9.0), lens);
         let turned = Camera { rotation: glam::DMat3::from_rotation_y(PI) * away.rotation, ..away };
         assert!(octree.taken(&turned, 0.0).is_empty());
+    }
+
+    #[test]
+    fn a_box_is_beside_the_image_if_all_of_it_is() {
+        let side = |x: f64| Bounds { min: DVec3::new(x, -1.0, -1.0), max: DVec3::new(x + 2.0, 1.0, 1.0) };
+        let (narrow, wide) = (Lens::OrthographicHeight(2.0), Lens::Fov(90.0));
+        let down = |lens| camera(DVec3::new(0.0, 0.0, 3.0), lens);
+        // The parallel view sees x from -1 to 1. Points up to 3/128 of the edge beyond it matter.
+        for (x, beside) in [(-1.0, false), (0.99, false), (1.04, false), (1.06, true), (-3.04, false), (-3.06, true)] {
+            assert_eq!(is_box_beside(&side(x), &down(narrow)), beside, "{x}");
+        }
+        // At the far side of the box the pinhole sees x up to 4. A ball around this box would reach
+        // into the view.
+        for (x, beside) in [(3.9, false), (4.2, true)] {
+            assert_eq!(is_box_beside(&side(x), &down(wide)), beside, "{x}");
+        }
+        // A box around the camera, and one behind it, where pixel coordinates change their signs.
+        let at = |z: f64| Bounds { min: DVec3::new(-1.0, -1.0, z - 1.0), max: DVec3::new(1.0, 1.0, z + 1.0) };
+        assert!(!is_box_beside(&at(3.0), &down(wide)) && is_box_beside(&at(4.2), &down(wide)));
+        // An octree whose points lie beside the image is not looked at, although its cube is seen.
+        let octree = PointOctree { bounds: side(1.06), ..full(3, 10) };
+        assert!(octree.taken(&down(narrow), 0.0).is_empty());
+        assert!(!PointOctree { bounds: side(0.9), ..octree }.taken(&down(narrow), 0.0).is_empty());
     }
 
     #[test]

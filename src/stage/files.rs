@@ -75,15 +75,19 @@ impl Files {
     }
 
     /// Returns the keys of the coordinate system of the files; None if they name none, or if some
-    /// of them name others.
+    /// of them name others. Of the tiles of virtual point clouds only the first is looked at.
     ///
     /// # Errors
     ///
     /// [`Error::Read`] and [`Error::Malformed`] for files whose header cannot be read.
     pub fn geo_keys(&self) -> Result<Option<GeoKeys>> {
         let of_file = |path: &PathBuf| GeoKeys::of_file(path, self.options.file.input_format);
-        let keys = self.each(|path| of_file(&path.to_owned()), || None)?.0;
-        let mut keys = keys.into_iter().flatten();
+        let mut tiles = self.paths.iter().filter(|path| self.is_tile(path));
+        let first_tile = tiles.next();
+        let looked_at = |path: &Path| !self.is_tile(path) || first_tile.is_some_and(|first| first == path);
+        let open = |path: &Path| if looked_at(path) { of_file(&path.to_owned()).map(Some) } else { Ok(None) };
+        let keys = self.each(open, || None)?.0;
+        let mut keys = keys.into_iter().flatten().flatten();
         let first = keys.next();
         Ok(first.filter(|first| keys.all(|other| other == *first)))
     }

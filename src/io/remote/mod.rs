@@ -33,6 +33,9 @@ const MOST_AHEAD: u64 = 1 << 22;
 /// share them and a lost connection costs little.
 const MOST_ASKED: u64 = 1 << 20;
 
+/// Most bytes that are received before they are read, gaps included.
+const MOST_EXPECTED: u64 = 3 << 24;
+
 /// Ranges with at most this many bytes between them are one request. On 8 connections of 100 ms
 /// and 10 MB/s together, a request takes as long as 125 kB, so this is far from a loss.
 const GAP: u64 = 1 << 13;
@@ -136,24 +139,28 @@ impl Remote {
         let end = at.saturating_add(length).min(self.length());
         let mut at = at;
         while at < end {
-            match self.shared.cache().at(at) {
-                Some(bytes) => {
-                    let taken = &bytes[..bytes.len().min((end - at) as usize)];
-                    into.extend_from_slice(taken);
-                    at += taken.len() as u64;
-                    continue;
-                }
-                None => self.shared.receive(vec![at..end])?,
+            if let Some(bytes) = self.shared.cache().at(at) {
+                let taken = &bytes[..bytes.len().min((end - at) as usize)];
+                into.extend_from_slice(taken);
+                at += taken.len() as u64;
+                continue;
             }
+            self.shared.receive(joined(vec![at..end.min(at + MOST_AHEAD)]))?;
         }
         Ok(())
     }
 
-    /// Receives ranges that will be read soon, several at the same time.
+    /// Receives ranges that will be read soon, several at the same time: as many of the first ones
+    /// as are kept for sure.
     pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> io::Result<()> {
         let within = |range: Range<u64>| range.start..range.end.min(self.length());
         let missing = self.shared.cache().missing(ranges.into_iter().map(within));
-        self.shared.receive(joined(missing))
+        let mut sum = 0;
+        let kept = |range: &Range<u64>| {
+            sum += range.end - range.start;
+            sum <= MOST_EXPECTED
+        };
+        self.shared.receive(joined(missing).into_iter().take_while(kept).collect())
     }
 
     /// Fails with the first error of any earlier read.

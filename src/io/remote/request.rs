@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use ureq::http::{HeaderMap, Response, StatusCode, header};
+use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
 use ureq::{Agent, Body};
 
 use super::answer::{self, Version, body_length, check_plain, checked, error, refusal, says_empty};
@@ -52,10 +53,13 @@ impl From<io::Error> for Failure {
 
 impl Server {
     pub fn new(address: &str, patience: Patience) -> io::Result<Self> {
+        let is_encrypted = address.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:"));
+        let roots = if is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
         let config = Agent::config_builder()
+            .tls_config(TlsConfig::builder().root_certs(roots).build())
             .http_status_as_error(false)
             // A redirect must not give up the encryption.
-            .https_only(address.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:")))
+            .https_only(is_encrypted)
             .user_agent(concat!("epsplat/", env!("CARGO_PKG_VERSION")))
             .accept_encoding("identity")
             .max_idle_connections(CONNECTIONS)
@@ -179,6 +183,25 @@ impl Server {
             408 | 425 | 429 | 500.. => Failure::Passing(refused, asked.map(Duration::from_secs)),
             _ => Failure::Final(refused),
         }
+    }
+}
+
+/// The certificates that servers are checked against: those of the file that the environment
+/// variable `SSL_CERT_FILE` names, as OpenSSL and curl read it, else Mozilla's.
+fn root_certs() -> io::Result<RootCerts> {
+    let Some(path) = std::env::var_os("SSL_CERT_FILE").filter(|path| !path.is_empty()) else {
+        return Ok(RootCerts::WebPki);
+    };
+    let pem = std::fs::read(path).map_err(|failed| error(format!("SSL_CERT_FILE cannot be read: {failed}")))?;
+    let certs: Vec<Certificate<'static>> = parse_pem(&pem)
+        .filter_map(|item| match item {
+            Ok(PemItem::Certificate(cert)) => Some(cert),
+            _ => None,
+        })
+        .collect();
+    match certs.is_empty() {
+        true => Err(error("SSL_CERT_FILE names a file without certificates")),
+        false => Ok(RootCerts::new_with_certs(&certs)),
     }
 }
 

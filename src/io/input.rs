@@ -271,12 +271,11 @@ impl Opened {
             Self::Remote(remote) => {
                 remote.read_at(0, START, &mut start).map_err(failed)?;
                 let format = named.map_or_else(|| detected(&start), Ok)?;
-                if let Some(what) = format.fault_of_start(&start) {
-                    return Err(Error::malformed(path, what));
-                }
                 let length = remote.length();
                 if format.is_read_in_part() {
                     (Source::Remote(remote), length, format, false)
+                } else if let Some(what) = format.fault_of_start(&start) {
+                    return Err(Error::malformed(path, what));
                 } else {
                     (Source::File(remote.copied().map_err(failed)?), length, format, true)
                 }

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const BLOCK: u64 = 1 << 14;
 
 /// Largest gap between ranges that are read together, bytes.
-const GAP: u64 = 1 << 13;
+const GAP: u64 = 1 << 10;
 
 /// Longest stall in these tests.
 const STALL: Duration = Duration::from_millis(600);

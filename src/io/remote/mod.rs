@@ -36,9 +36,9 @@ const MOST_ASKED: u64 = 1 << 20;
 /// Most bytes that are received before they are read, gaps included.
 const MOST_EXPECTED: u64 = 3 << 24;
 
-/// Ranges with at most this many bytes between them are one request. On 8 connections of 100 ms
-/// and 10 MB/s together, a request takes as long as 125 kB, so this is far from a loss.
-const GAP: u64 = 1 << 13;
+/// Ranges with at most this many bytes between them are one request: the headers of a request and
+/// its answer take about as many.
+const GAP: u64 = 1 << 10;
 
 /// Number of requests at the same time.
 const CONNECTIONS: usize = 8;

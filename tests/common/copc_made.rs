@@ -52,8 +52,10 @@ pub fn copc([x, y]: [f64; 2], edge: f64, levels: u32) -> Made {
     for (&(level, cube), points) in &nodes {
         let before = compressor.get().position();
         let records: Vec<u8> = points.iter().flat_map(|at| record(place(at), at, edge)).collect();
-        compressor.compress_many(&records).unwrap();
-        compressor.finish_current_chunk().unwrap();
+        if !points.is_empty() {
+            compressor.compress_many(&records).unwrap();
+            compressor.finish_current_chunk().unwrap();
+        }
         let size = compressor.get().position() - before;
         let cube = cube.map(|part| part as i32);
         entries.extend([level as i32, cube[0], cube[1], cube[2]].into_iter().flat_map(i32::to_le_bytes));
@@ -101,7 +103,6 @@ fn nodes(edge: f64, levels: u32) -> Nodes {
             nodes.entry((level - up, cube.map(|part| part >> up))).or_default();
         }
     }
-    nodes.retain(|_, points| !points.is_empty());
     nodes
 }
 

@@ -214,7 +214,7 @@ fn entries(
             ));
         };
         left = rest;
-        file.get_ref().source().expect([offset..offset + bytes])?;
+        file.get_ref().source().expect(std::iter::once(offset..offset + bytes))?;
         file.seek(SeekFrom::Start(offset))?;
         for _ in 0..bytes / ENTRY {
             let mut entry = [0; ENTRY as usize];

@@ -12,6 +12,7 @@ mod request;
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
+use std::iter::once;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -145,7 +146,7 @@ impl Remote {
                 at += taken.len() as u64;
                 continue;
             }
-            self.shared.receive(joined(vec![at..end.min(at + MOST_AHEAD)]))?;
+            self.shared.receive(joined(once(at..end.min(at + MOST_AHEAD))))?;
         }
         Ok(())
     }
@@ -185,7 +186,7 @@ pub fn too_long() -> io::Error {
 }
 
 /// Joins sorted ranges with small gaps, and divides large ones.
-fn joined(ranges: Vec<Range<u64>>) -> Vec<Range<u64>> {
+fn joined(ranges: impl IntoIterator<Item = Range<u64>>) -> Vec<Range<u64>> {
     let mut joined: Vec<Range<u64>> = Vec::new();
     for range in ranges {
         match joined.last_mut() {
@@ -255,7 +256,7 @@ impl Read for Remote {
             self.window = if self.at == self.read_to { (2 * self.window).min(MOST_AHEAD) } else { BLOCK };
             let end = (self.at + self.window).min(self.length());
             let end = self.shared.cache().next_long(self.at + 1..end, BLOCK).unwrap_or(end);
-            self.shared.receive(joined(vec![self.at..end]))?;
+            self.shared.receive(joined(once(self.at..end)))?;
         }
     }
 }

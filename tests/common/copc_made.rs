@@ -32,7 +32,7 @@ pub fn copc([x, y]: [f64; 2], edge: f64, levels: u32) -> Made {
     let scale = edge / 1e6;
     let place = |at: &[f64; 3]| at.map(|part| (part / scale).round() as i32);
     let (mut min, mut max) = ([i32::MAX; 3], [i32::MIN; 3]);
-    for at in nodes.values().flatten().map(|at| place(at)) {
+    for at in nodes.values().flatten().map(&place) {
         for axis in 0..3 {
             (min[axis], max[axis]) = (min[axis].min(at[axis]), max[axis].max(at[axis]));
         }

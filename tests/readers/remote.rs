@@ -66,7 +66,7 @@ fn any_range_is_that_of_the_file() {
     assert_eq!(remote.length(), 100_000);
     let mut random = super::Random(7);
     for _ in 0..300 {
-        let (at, length) = (random.below(100_100) as usize, random.below(40_000) as usize);
+        let (at, length) = (random.below(100_100), random.below(40_000));
         let expected = &noise[at.min(100_000)..(at + length).min(100_000)];
         let mut read = Vec::new();
         if random.below(2) == 0 {

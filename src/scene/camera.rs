@@ -304,8 +304,8 @@ impl Camera {
         self.beside(at, radius, margin).iter().any(|sides| sides.any())
     }
 
-    /// Whether a convex body, given by its corners in camera space, lies entirely beyond one edge of
-    /// the image, by more than `margin` pixels.
+    /// Whether a convex body, given by its corners in camera space, lies entirely beyond one edge
+    /// of the image, by more than `margin` pixels.
     pub(crate) fn is_body_beside_image(&self, corners: &[DVec3], margin: DVec2) -> bool {
         let sides = corners.iter().map(|corner| self.beside(*corner, 0.0, margin));
         sides.reduce(|[a, b], [c, d]| [a & c, b & d]).is_some_and(|all| all.iter().any(|sides| sides.any()))

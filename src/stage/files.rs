@@ -186,6 +186,9 @@ impl Files {
     /// Opens the only file if it is a regular file with levels of detail. Otherwise returns None.
     pub(super) fn levels(&self) -> Result<Option<Levels>> {
         let [path] = &self.paths[..] else { return Ok(None) };
+        if self.options.file.input_format.is_none() && Format::is_las(path) {
+            return Ok(None);
+        }
         self.seekable(path)?.map_or(Ok(None), Levels::open)
     }
 

@@ -95,6 +95,8 @@ impl Server {
                 if shared.over.load(Ordering::Relaxed) {
                     return;
                 }
+                // Headers and body are two writes, the second of which would wait for the client.
+                stream.set_nodelay(true).unwrap();
                 let state = shared.clone();
                 std::thread::spawn(move || while serve(&stream, &state).is_some() {});
             }

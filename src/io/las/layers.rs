@@ -1,10 +1,20 @@
 //! Chunks that consist of layers. Each layer holds one quantity of all points; only needed layers
 //! are read.
 
-use super::chunks::Scheme;
+use super::chunks::{Chunk, Scheme, malformed};
+use super::shown::Shown;
 use crate::io::fault::{Fault, reserve};
 use crate::io::source::Source;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
+
+/// Chunks of a remote file with fewer bytes than this are received whole when their heads are
+/// checked, as requests for the heads alone would take longer. They are kept for the decoder unless
+/// the file is large.
+const SMALL: u64 = 1 << 16;
+
+/// Bytes of the chunks of a remote file whose heads are received together.
+const LOOKED_AT: u64 = 1 << 24;
 
 /// The part of a chunk that is needed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,6 +65,55 @@ impl Layers {
         }
         Ok(bytes)
     }
+}
+
+/// Checks that the layers of each chunk lie within it. Also limits each chunk's number of points to
+/// that in its head, because the last chunk may be shorter.
+pub(super) fn check_layers(
+    file: &mut BufReader<Shown>,
+    mut at: u64,
+    scheme: &Scheme,
+    chunks: &mut [Chunk],
+) -> Result<(), Fault> {
+    let mut start = vec![0; scheme.start() as usize];
+    let mut expected = at;
+    for index in 0..chunks.len() {
+        if at >= expected {
+            expected = expect_starts(file.get_ref().source(), at, &chunks[index..], scheme)?;
+        }
+        let chunk = &mut chunks[index];
+        if chunk.bytes > 0 || chunk.points > 0 {
+            file.seek(SeekFrom::Start(at))?;
+            let whole = file.read_exact(&mut start).is_ok();
+            let Some(count) = scheme.points_in(&start, chunk.bytes).filter(|_| whole) else {
+                return malformed(format!("the layers of its chunk {} do not fit in it", index + 1));
+            };
+            if count > 0 {
+                chunk.points = chunk.points.min(count);
+            }
+        }
+        at += chunk.bytes;
+    }
+    Ok(())
+}
+
+/// Receives the heads of the next chunks, the first of which is at this offset, from a server.
+/// Returns the end of these chunks.
+fn expect_starts(source: &Source, at: u64, chunks: &[Chunk], scheme: &Scheme) -> Result<u64, Fault> {
+    let (mut end, mut starts) = (at, Vec::new());
+    for chunk in chunks {
+        if end >= at + LOOKED_AT {
+            break;
+        }
+        starts.push(end..end + scheme.start());
+        end += chunk.bytes;
+    }
+    if end - at < SMALL * starts.len() as u64 {
+        source.expect(std::iter::once(at..end))?;
+    } else {
+        source.expect(starts)?;
+    }
+    Ok(end.max(at + 1))
 }
 
 #[cfg(test)]

@@ -41,8 +41,8 @@ const MOST_EXPECTED: u64 = 3 << 24;
 /// its answer take about as many.
 const GAP: u64 = 1 << 10;
 
-/// Number of requests at the same time.
-const CONNECTIONS: usize = 8;
+/// Number of requests for a file at the same time. At 50 ms each, 16 make 320 requests a second.
+const CONNECTIONS: usize = 16;
 
 /// Limits of waiting for a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 
 use std::io::{self, Read};
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use ureq::http::{HeaderMap, Response, StatusCode, header};
@@ -54,22 +55,7 @@ impl From<io::Error> for Failure {
 impl Server {
     pub fn new(address: &str, patience: Patience) -> io::Result<Self> {
         let is_encrypted = address.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:"));
-        let roots = if is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
-        let config = Agent::config_builder()
-            .tls_config(TlsConfig::builder().root_certs(roots).build())
-            .http_status_as_error(false)
-            // A redirect must not give up the encryption.
-            .https_only(is_encrypted)
-            .user_agent(concat!("epsplat/", env!("CARGO_PKG_VERSION")))
-            .accept_encoding("identity")
-            .max_idle_connections(CONNECTIONS)
-            .max_idle_connections_per_host(CONNECTIONS)
-            .timeout_resolve(Some(patience.connect))
-            .timeout_connect(Some(patience.connect))
-            .timeout_recv_response(Some(patience.stall))
-            .timeout_per_read(Some(patience.stall))
-            .timeout_per_write(Some(patience.stall));
-        Ok(Self { agent: config.build().into(), address: address.to_owned(), patience })
+        Ok(Self { agent: agent(is_encrypted, patience)?, address: address.to_owned(), patience })
     }
 
     /// Asks for the first `most` bytes.
@@ -184,6 +170,38 @@ impl Server {
             _ => Failure::Final(refused),
         }
     }
+}
+
+/// The clients that were made, with what they are for. Connections stay open in a client, and files
+/// of one server share them.
+static AGENTS: Mutex<Vec<(bool, Patience, Agent)>> = Mutex::new(Vec::new());
+
+/// The client for addresses of this kind. One for encrypted addresses follows no redirect that
+/// gives up the encryption.
+fn agent(is_encrypted: bool, patience: Patience) -> io::Result<Agent> {
+    let mut agents = AGENTS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = agents.iter().find(|(kind, limits, _)| (*kind, *limits) == (is_encrypted, patience));
+    if let Some((.., agent)) = known {
+        return Ok(agent.clone());
+    }
+    // An address without encryption may redirect to one with it.
+    let roots = if is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
+    let config = Agent::config_builder()
+        .tls_config(TlsConfig::builder().root_certs(roots).build())
+        .http_status_as_error(false)
+        .https_only(is_encrypted)
+        .user_agent(concat!("epsplat/", env!("CARGO_PKG_VERSION")))
+        .accept_encoding("identity")
+        .max_idle_connections(4 * CONNECTIONS)
+        .max_idle_connections_per_host(CONNECTIONS)
+        .timeout_resolve(Some(patience.connect))
+        .timeout_connect(Some(patience.connect))
+        .timeout_recv_response(Some(patience.stall))
+        .timeout_per_read(Some(patience.stall))
+        .timeout_per_write(Some(patience.stall));
+    let agent: Agent = config.build().into();
+    agents.push((is_encrypted, patience, agent.clone()));
+    Ok(agent)
 }
 
 /// The certificates that servers are checked against: those of the file that the environment

@@ -81,6 +81,22 @@ pub enum Error {
         /// Why there is none.
         source: Box<Error>,
     },
+    /// This process of a job failed. All others know that.
+    #[error("{}{source}", of_process(*rank))]
+    Process {
+        /// The number of the process, from 0.
+        rank: usize,
+        /// Why it failed.
+        source: Box<Error>,
+    },
+    /// Another process of the job failed, and prints why.
+    #[error("process {rank} of the job failed")]
+    OtherProcess {
+        /// The number of that process, from 0.
+        rank: usize,
+        /// Its exit code.
+        code: u8,
+    },
     /// A benchmark study ran to its end, but a configuration did not do what the study states.
     #[error("the study {name} failed: {what}")]
     Study {
@@ -89,6 +105,11 @@ pub enum Error {
         /// The configuration and scene that failed, and how.
         what: String,
     },
+}
+
+/// Names a process for a message. The errors of the first one are mostly those of all.
+fn of_process(rank: usize) -> String {
+    if rank == 0 { String::new() } else { format!("process {rank}: ") }
 }
 
 /// Formats a path for a message, without control characters. Paths may come from a file's content,
@@ -132,7 +153,8 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::View { source, .. } => source.exit_code(),
+            Self::View { source, .. } | Self::Process { source, .. } => source.exit_code(),
+            Self::OtherProcess { code, .. } => *code,
             _ => 1,
         }
     }

@@ -71,9 +71,9 @@ pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
 pub use stage::{Files, Given, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport, Visible};
 #[cfg(feature = "parts")]
-pub use stage::{Merged, Part, merge};
+pub use stage::{Merged, Part, Ranked, merge};
 
 // Modules inside the library import these as `crate::...`, without `low_level`.
-use low_level::{annotate, frame, gpu, passes, plan, render, scene, surfels, truth};
+use low_level::{annotate, frame, gpu, network, passes, plan, render, scene, surfels, truth};
 #[cfg(feature = "bench")]
 use low_level::{bench, hardcases, metrics, report};

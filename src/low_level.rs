@@ -19,6 +19,8 @@ pub mod hardcases;
 #[cfg(feature = "bench")]
 #[path = "metrics/mod.rs"]
 pub mod metrics;
+#[path = "network/mod.rs"]
+pub mod network;
 #[path = "passes/mod.rs"]
 pub mod passes;
 #[path = "plan/mod.rs"]

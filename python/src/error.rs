@@ -14,7 +14,8 @@ fn class(error: &Error) -> &'static str {
         Error::EmptyScene(_) => "EmptySceneError",
         Error::NoMemory { .. } => "NoMemoryError",
         Error::NoAdapter(_) | Error::Limit { .. } | Error::Gpu { .. } => "DeviceError",
-        Error::View { source, .. } => class(source),
+        Error::View { source, .. } | Error::Process { source, .. } => class(source),
+        Error::OtherProcess { .. } => "Error",
         Error::Study { .. } => "StudyError",
     }
 }

@@ -1,5 +1,7 @@
 """The same bits as the command line, for every map and mode."""
 
+import subprocess
+
 import numpy as np
 import pytest
 from conftest import DATA, same
@@ -41,6 +43,16 @@ def test_every_mode_has_the_bits_of_the_command_line(command, name, file, scene,
     for map_name in maps:
         assert same(frames.maps[map_name][0].view(np.uint32), known[map_name].view(np.uint32)), map_name
     assert frames.reports[0]["backend"] == report["backend"]
+
+
+def test_texture_coordinates_have_the_bits_of_the_command_line(command, program, tmp_path):
+    surfels = tmp_path / "torus.ply"
+    subprocess.run([program, "generate", "torus", "--count", "4000", "--texture", "-o", surfels], check=True)
+    known, _ = command(surfels, *SIZE, "--aov", "texz")
+    frames = epsplat.Renderer(epsplat.read(surfels), 160, 120, aov=["texz"]).render()
+    assert same(frames.texz[0], known["texz"]) and np.isfinite(frames.texz).any()
+    # Each of the twelve maps is compared, here or by MODES.
+    assert len({name for mode in MODES for name in mode[4]} | {"texz"}) == 12
 
 
 def test_another_picture_has_other_bits(command):

@@ -1,6 +1,7 @@
 """Progress, signals and threads."""
 
 import functools
+import io
 import os
 import random
 import signal
@@ -46,6 +47,19 @@ def test_progress_reaches_a_function_and_a_class(sphere):
     with pytest.raises(RuntimeError, match="enough"):
         renderer.render(progress=Stopping)
     assert all(bar.closed for bar in bars)
+
+
+def test_progress_reaches_tqdm(sphere):
+    from tqdm import tqdm
+
+    out = io.StringIO()
+    bars = functools.partial(tqdm, file=out, mininterval=0)
+    renderer = epsplat.Renderer(epsplat.Scene(sphere), 64, 48, backend="reference", progress=bars)
+    renderer.render(progress=bars)
+    shown = out.getvalue()
+    for what in ["finding neighbours", "rendering rows"]:
+        assert what in shown
+    assert "48/48" in shown and "5000/5000" in shown
 
 
 def test_an_exception_of_a_callback_stops_the_call(reference):

@@ -72,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     part.check_picture()?;
     let target = Target::of_picture(output, file, part.maps())?;
     let backend = Chosen(Some(BackendName::Gpu));
-    let device = &DeviceOptions { backend, adapter: adapter.clone(), memory: None };
+    let device = &DeviceOptions { backend, adapter: adapter.clone(), ..DeviceOptions::default() };
     target.closed_is_done(picture(&part, device, (&target, output), file.json.as_deref()))
 }
 

@@ -94,6 +94,8 @@ pub fn run() -> ExitCode {
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
+        // The process that failed prints why.
+        Err(error @ Error::OtherProcess { .. }) => ExitCode::from(error.exit_code()),
         Err(error) => {
             // `eprintln!` would panic if stderr is closed.
             let _ = writeln!(std::io::stderr(), "error: {error}");

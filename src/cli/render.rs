@@ -1,14 +1,17 @@
 //! `epsplat render`: renders files to an image with its maps, or to one image for each camera.
 
 pub(super) mod arguments;
+mod dealt;
 mod map;
 mod output;
 mod part;
+mod ranks;
 pub(super) mod target;
 mod views;
 
 use std::collections::BTreeMap;
 
+use epsplat::low_level::network::mpi::Mpi;
 use epsplat::{Files, Picture, ReadReport, Renderer, Report, Result, Scene, View, ViewReport};
 use serde::Serialize;
 
@@ -21,6 +24,9 @@ use super::{note, outputs, write_json};
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(share) = arguments.part.part {
         return part::run(arguments, share);
+    }
+    if let Some(mpi) = Mpi::join()? {
+        return ranks::run(arguments, mpi);
     }
     if arguments.views.cameras.is_some() || arguments.views.turntable.is_some() {
         let target = Target::of_many(arguments)?;

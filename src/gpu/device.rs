@@ -82,8 +82,9 @@ pub fn adapters() -> Vec<AdapterDescription> {
     all
 }
 
-/// Returns the best adapter of this name; see [`Gpu::open`].
-fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
+/// Returns the best adapter of this name, and among equally good ones that of number `turn`, modulo
+/// their number; see [`Gpu::open`].
+fn best(name: Option<&str>, turn: usize) -> Result<(AdapterDescription, wgpu::Adapter)> {
     let wanted = |d: &AdapterDescription| d.usable && name.is_none_or(|name| d.is_meant_by(name));
     // OpenGL is tried last and only if needed: its libraries complain on stderr where there is no
     // display.
@@ -92,7 +93,10 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
         all.extend(enumerate(true));
     }
     let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
-    all.into_iter().find(|(d, _)| wanted(d)).ok_or_else(|| {
+    let kinds: Vec<_> = all.iter().map(|(d, _)| wanted(d).then_some((d.rank(), &*d.name, &*d.api))).collect();
+    let chosen = in_turn(&kinds, turn);
+    let chosen = chosen.map(|chosen| all.swap_remove(chosen));
+    chosen.ok_or_else(|| {
         Error::NoAdapter(match (name, known.is_empty()) {
             (_, true) => format!("no graphics adapter was found: {INSTALL_HINT}"),
             (Some(name), false) => {
@@ -101,6 +105,14 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
             (None, false) => format!("no adapter can run compute kernels ({known}): {INSTALL_HINT}"),
         })
     })
+}
+
+/// The index of the adapter for the process of number `turn` on a machine: the first one in order,
+/// or one of the same kind. None stands for an adapter that is not wanted.
+fn in_turn<T: PartialEq>(kinds: &[Option<T>], turn: usize) -> Option<usize> {
+    let first = kinds.iter().find(|kind| kind.is_some())?;
+    let equal: Vec<usize> = (0..kinds.len()).filter(|index| kinds[*index] == *first).collect();
+    Some(equal[turn % equal.len()])
 }
 
 /// An open device. Clones share the device and the cache of compiled kernels. They also share the
@@ -127,11 +139,20 @@ impl Gpu {
     /// [`Error::NoAdapter`] if no usable adapter matches, or [`Error::Gpu`] if the device cannot be
     /// opened.
     pub fn open(name: Option<&str>) -> Result<Self> {
+        Self::open_in_turn(name, 0)
+    }
+
+    /// Opens the adapter of [`open`](Self::open), or another one of the same kind and name where a
+    /// machine has several: number `turn` of them, modulo their number.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_in_turn(name: Option<&str>, turn: usize) -> Result<Self> {
         if name.is_some_and(|name| name.eq_ignore_ascii_case(twin::API)) {
             let (device, queue) = twin::open();
             return Ok(Self::watching(twin::adapter(), device, queue));
         }
-        let (adapter, handle) = best(name)?;
+        let (adapter, handle) = best(name, turn)?;
         let wanted = OPTIONAL_FEATURES | wanted_by_kernels(&adapter);
         let (features, limits) = (handle.features() & wanted, handle.limits());
         Self::of(adapter, &handle, features, limits)
@@ -142,7 +163,7 @@ impl Gpu {
     /// and pipeline caches are the only optional features, so that kernels are compiled in the same
     /// way.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
-        let (adapter, handle) = best(name)?;
+        let (adapter, handle) = best(name, 0)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
         let adapter = AdapterDescription { name, api, kind, driver, vertex_storage, ..AdapterDescription::core() };
         let features = handle.features() & of_spirv(&adapter);

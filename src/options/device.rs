@@ -42,6 +42,10 @@ pub struct DeviceOptions {
     /// it that the picture shows is read. A picture that needs more memory is an error
     #[cfg_attr(feature = "cli", arg(long, value_name = "SIZE", value_parser = super::parse::memory, requires = "cut", hide_short_help = true))]
     pub memory: Option<u64>,
+    /// The place of this process among those of its machine: equally good adapters, such as the
+    /// cards of a node, are dealt to them in turn.
+    #[cfg_attr(feature = "cli", arg(skip))]
+    pub turn: usize,
 }
 
 #[cfg(feature = "cli")]

@@ -14,24 +14,40 @@ use crate::scene::{Mipmap, Provenance, Scene, Share, Triangles};
 /// A share of a scene's surfels, with all of its triangles.
 pub struct ShareOfScene {
     scene: Arc<Scene>,
-    share: Share,
+    /// The share that is drawn; None if the scene has no other surfels, but the facts of all.
+    share: Option<Share>,
 }
 
 impl ShareOfScene {
     /// The `share` of `scene`.
     pub fn new(scene: Arc<Scene>, share: Share) -> Self {
-        Self { scene, share }
+        Self { scene, share: Some(share) }
     }
+
+    /// All surfels of `scene`, which is a share of what its [`part_of`](Scene::part_of) describes.
+    pub fn whole(scene: Arc<Scene>) -> Self {
+        Self { scene, share: None }
+    }
+}
+
+/// The facts of all surfels of which a scene has a share: those that its
+/// [`part_of`](Scene::part_of) states, and nothing that depends on the share.
+pub fn facts_of_all(scene: &Scene) -> Facts {
+    let facts = Facts::of(scene);
+    Facts { individuals: vec![facts.surfels], copies: false, sample: Vec::new(), ..facts }
 }
 
 impl Source for ShareOfScene {
     fn facts(&self) -> Facts {
-        let own = self.share.range(self.scene.surfels.len()).len();
-        Facts { share: Some(own as u64), ..Facts::of(&self.scene) }
+        let count = self.scene.surfels.len();
+        match self.share {
+            Some(share) => Facts { share: Some(share.range(count).len() as u64), ..Facts::of(&self.scene) },
+            None => Facts { share: Some(count as u64), ..facts_of_all(&self.scene) },
+        }
     }
 
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
-        pages_of(&self.scene, needs, most, (ordered, Some(self.share)))
+        pages_of(&self.scene, needs, most, (ordered, self.share))
     }
 
     fn textures(&self) -> &[Mipmap] {

@@ -4,9 +4,10 @@
 //! integers. Both are associative and commutative, so each process may draw a share of the surfels
 //! ([`share`](crate::passes::share)) and the processes reduce their results in any order: the frame
 //! has the bits of one process. An [`Exchange`] does that over files, threads or a network. It is
-//! called three times for each band of a render:
+//! called for each band of a render, and at the end of a frame once more to agree:
 //!
 //! ```text
+//! agree       all processes have complete values, or all of them try again
 //! triangles   a process draws all of them, gets those of another, or needs none
 //! nearest     nearest(x, y) = min over processes, before accumulate compares depths with it
 //! sums        sums(x, y)    = sum over processes, before resolve divides
@@ -15,12 +16,9 @@
 //! A frame without an exchange is the same steps without these calls. An exchange only ever gets
 //! values of complete bands: a try whose buffers were too small is repeated before it is called.
 
-use std::collections::HashMap;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-
 use super::count::Capacities;
 use super::run::Run;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::passes::accumulate;
 use crate::plan::Plan;
 use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
@@ -40,6 +38,11 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// No rows of a render.
+    pub fn none(render: usize) -> Self {
+        Self { render, first: 0, rows: 0, width: 0 }
+    }
+
     /// The range of these samples among those of the whole render, row by row.
     pub fn samples(&self) -> std::ops::Range<usize> {
         let [first, rows, width] = [self.first, self.rows, self.width].map(|n| n as usize);
@@ -60,12 +63,21 @@ pub enum Then {
 ///
 /// Bands follow from the adapter's limits, so processes that exchange at once need the same limits.
 /// An exchange through files may have other rows in each process. A frame that is retried repeats
-/// its calls with the same values.
+/// its calls.
 pub trait Exchange: Sync {
     /// Whether the process draws the triangles itself. If not, [`Exchange::triangles`] gives them,
     /// unless the band ends before they are needed.
     fn draws_triangles(&self) -> bool {
         true
+    }
+
+    /// Whether all processes have values of complete buffers for `rows`, so that none exchanges
+    /// values of a try that others repeat. A frame ends with a call for no rows.
+    ///
+    /// # Errors
+    /// Any error of the exchange.
+    fn agree(&self, _rows: &Rows, complete: bool) -> Result<bool> {
+        Ok(complete)
     }
 
     /// Keeps or gives the shaded triangles of `rows`, 8 words for each sample; all are 0 where no
@@ -127,7 +139,7 @@ impl Run<'_> {
                 Then::Go
             }
             Exchanged::Nearest => {
-                if !self.is_complete(band)? {
+                if !exchange.agree(&rows, self.is_complete(band)?)? {
                     return Ok(Onward::Retry);
                 }
                 let mut words = self.words("nearest", of.pixels)?;
@@ -138,7 +150,7 @@ impl Run<'_> {
                 then
             }
             Exchanged::Sums => {
-                if !self.is_complete(band)? {
+                if !exchange.agree(&rows, self.is_complete(band)?)? {
                     return Ok(Onward::Retry);
                 }
                 let stored = self.words("sums", of.pixels * u64::from(self.plan.sum_words))?;
@@ -234,89 +246,4 @@ fn triangle_words(plan: &Plan, band: usize) -> u64 {
 /// The triangle stages of a process that is given the triangles are left out.
 pub(super) fn is_of_triangles(pass: &str) -> bool {
     pass == crate::passes::triangles::PASS.name
-}
-
-/// A meeting of threads that draw a frame together: each waits until all have given their values.
-/// It serves tests, and is the model of exchanges over a network.
-pub struct Meeting {
-    parts: usize,
-    state: Mutex<State>,
-    changed: Condvar,
-}
-
-/// One thread of a [`Meeting`]. Dropping it before the frame is done ends the frame of all others
-/// with an error.
-pub struct Member<'a> {
-    meeting: &'a Meeting,
-    /// Results that this member has had, for a frame that is tried again.
-    had: Mutex<HashMap<(Exchanged, Rows), Vec<u64>>>,
-}
-
-#[derive(Default)]
-struct State {
-    /// The reduced values so far, and how many members gave theirs.
-    met: HashMap<(Exchanged, Rows), (Vec<u64>, usize)>,
-    left: bool,
-}
-
-impl Meeting {
-    /// A meeting of `parts` members, for one frame.
-    pub fn new(parts: usize) -> Self {
-        Self { parts, state: Mutex::default(), changed: Condvar::new() }
-    }
-
-    /// A member of the meeting.
-    pub fn member(&self) -> Member<'_> {
-        Member { meeting: self, had: Mutex::default() }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Member<'_> {
-    /// Waits for the values of all members, reduced by `reduce`.
-    fn meet(&self, key: (Exchanged, Rows), own: Vec<u64>, reduce: fn(u64, u64) -> u64) -> Result<Vec<u64>> {
-        let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(values) = had.get(&key) {
-            return Ok(values.clone());
-        }
-        let mut state = self.meeting.state();
-        let (values, given) = state.met.entry(key).or_insert_with(|| (vec![0; own.len()], 0));
-        values.iter_mut().zip(own).for_each(|(value, own)| *value = reduce(*value, own));
-        *given += 1;
-        self.meeting.changed.notify_all();
-        loop {
-            match state.met.get(&key) {
-                Some((values, given)) if *given == self.meeting.parts => {
-                    had.insert(key, values.clone());
-                    return Ok(values.clone());
-                }
-                _ if state.left => return Err(Error::Usage("another part of the frame failed".into())),
-                _ => state = self.meeting.changed.wait(state).unwrap_or_else(PoisonError::into_inner),
-            }
-        }
-    }
-}
-
-impl Exchange for Member<'_> {
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
-        let own = words.iter().map(|word| u64::from(*word)).collect();
-        let all = self.meet((Exchanged::Nearest, *rows), own, u64::max)?;
-        *words = all.into_iter().map(|word| word as u32).collect();
-        Ok(Then::Go)
-    }
-
-    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
-        *sums = self.meet((Exchanged::Sums, *rows), std::mem::take(sums), u64::wrapping_add)?;
-        Ok(Then::Go)
-    }
-}
-
-impl Drop for Member<'_> {
-    fn drop(&mut self) {
-        self.meeting.state().left = true;
-        self.meeting.changed.notify_all();
-    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::encode::Recorded;
-use super::exchange::Among;
+use super::exchange::{Among, Rows};
 use super::kernels::Kernels;
 use super::report::{DeviceBytes, Report};
 use super::run::{Run, Tally};
@@ -89,7 +89,12 @@ impl Kept {
                 *all_passes.entry(pass).or_insert(0.0) += ms;
             }
             traffic = traffic + (Traffic::so_far() - before);
-            if let Some(tally) = tally.filter(|tally| tally.complete) {
+            let complete = tally.as_ref().is_some_and(|tally| tally.complete);
+            let complete = match among.filter(|_| all) {
+                Some(among) => among.exchange.agree(&Rows::none(among.render), complete)?,
+                None => complete,
+            };
+            if let Some(tally) = tally.filter(|_| complete) {
                 finish(&mut frame, &plan.needs, &source.provenance(), order);
                 bar.end();
                 let report = self.report(gpu, &plan, image, (tally, clock, all_passes, total_ms));

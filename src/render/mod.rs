@@ -32,6 +32,7 @@ use std::time::Instant;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
+use crate::network::{Network, Reduction, Wire, together};
 use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
 use crate::passes::{eye_dome, index, tiles};
@@ -192,12 +193,36 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         exchange: &dyn Exchange,
         progress: &dyn Progress,
     ) -> Result<(Option<Frame>, Report)> {
-        if !self.together {
-            return Err(Error::Usage("a renderer draws together with others after Renderer::among".into()));
-        }
+        self.check_together()?;
         let (frame, report) = self.rendered(camera, Some(exchange), progress)?;
         let whole = frame.height == camera.height;
         Ok((whole.then(|| self.filtered(frame, camera)), report))
+    }
+
+    /// Renders one frame as [`Renderer::frame_among`] does, over a network. Returns it in process 0
+    /// and no frame in the others, with what this process sent.
+    ///
+    /// # Errors
+    /// The first error of a process, in that process, and [`Error::OtherProcess`] in the others.
+    pub fn frame_over(
+        &mut self,
+        camera: &Camera,
+        network: &dyn Network,
+        progress: &dyn Progress,
+    ) -> Result<(Option<Frame>, Report, Wire)> {
+        let samples = [&self.kept].into_iter().chain(&self.of_maps).map(|part| part.options.samples).collect();
+        let reduction = Reduction::new(network, camera.width, samples);
+        let drawn = self.check_together().and_then(|()| self.rendered(camera, Some(&reduction), progress));
+        let (frame, report) = together(network, drawn)?;
+        let frame = together(network, reduction.gathered(frame))?;
+        Ok((frame.map(|frame| self.filtered(frame, camera)), report, reduction.wire()))
+    }
+
+    fn check_together(&self) -> Result<()> {
+        match self.together {
+            true => Ok(()),
+            false => Err(Error::Usage("a renderer draws together with others after Renderer::among".into())),
+        }
     }
 
     /// Renders one frame, before the filters of finished pictures. It has no rows if the exchange

@@ -5,6 +5,7 @@
 
 use std::thread;
 
+use super::extent::Extent;
 use super::whole::surfels_of;
 use super::{Request, View};
 use crate::error::Result;
@@ -65,7 +66,7 @@ impl Guess {
             }
         }
         let settings = request.for_scene(settings.clone(), &scene, &())?;
-        let camera = view.camera(&scene)?.0;
+        let camera = view.camera(&scene, &Extent::default())?.0;
         render::warm(&scene, self.count as u64, &camera, &settings, backend)
     }
 }

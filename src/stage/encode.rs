@@ -19,6 +19,7 @@ impl Renderer {
     /// [`Error::Usage`] if the frame cannot stay on the device, as those of
     /// [`encode`](Self::encode).
     pub fn layout(&self, camera: &Camera) -> Result<FrameLayout> {
+        self.check_whole()?;
         match &self.drawn {
             Drawn::Whole { renderer, .. } => renderer.layout(camera),
             Drawn::Parts { .. } => Err(in_parts()),
@@ -66,6 +67,7 @@ impl Renderer {
         encoder: &mut wgpu::CommandEncoder,
         target: Target<'_>,
     ) -> Result<Ticket> {
+        self.check_whole()?;
         self.of_whole()?.encode(camera, encoder, target)
     }
 

@@ -9,6 +9,7 @@
 mod ahead;
 mod coloring;
 mod encode;
+mod extent;
 mod files;
 mod given;
 mod heights;
@@ -22,6 +23,7 @@ mod memory;
 mod meshes;
 mod octrees;
 mod overdraw;
+mod picture;
 mod refined;
 mod renderer;
 mod settings;
@@ -41,9 +43,10 @@ pub use self::files::Files;
 pub use self::given::Given;
 pub use self::in_part::ReadReport;
 #[cfg(feature = "parts")]
-pub use self::machines::{Merged, Part, merge};
+pub use self::machines::{Merged, Part, Ranked, merge};
 pub use self::map::Survey;
-pub use self::renderer::{Picture, Renderer};
+pub use self::picture::Picture;
+pub use self::renderer::Renderer;
 pub use self::view::{View, ViewReport};
 pub use self::visible::Visible;
 
@@ -55,7 +58,7 @@ use crate::io::Points;
 use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
 use crate::plan::BackendName;
 use crate::progress::Progress;
-use crate::scene::ColorKey;
+use crate::scene::{ColorKey, Share};
 
 /// Files, or points in memory, that [`Renderer`]s draw.
 ///
@@ -164,6 +167,8 @@ struct Request<'a> {
     views: bool,
     /// Gets the points of the inputs once they are read.
     read: Option<&'a ahead::Read<'a>>,
+    /// The share of the scene that the picture needs here, and the view; None for all of it.
+    share: Option<(Share, &'a View)>,
 }
 
 impl Inputs {

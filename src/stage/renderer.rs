@@ -4,21 +4,24 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+#[cfg(feature = "parts")]
+use super::ReadReport;
+use super::extent::Extent;
 use super::in_part::{Part, Parts};
+use super::whole::Whole;
 use super::{
-    Files, Inputs, ReadReport, Request, Scene, View, ViewReport, ahead, heights, lens, levels, memory, overdraw,
-    refined,
+    Files, Inputs, Picture, Request, Scene, View, ViewReport, ahead, lens, levels, memory, overdraw, refined, tree,
 };
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
-use crate::frame::Frame;
 use crate::gpu::{Gpu, Replacement};
 use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
-use crate::passes::unseen::{Unseen, is_empty};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
-use crate::render::{self, Backend, Report, render};
-use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps};
+use crate::render::{self, Backend, render};
+use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps, Share};
+#[cfg(feature = "parts")]
+use crate::{plan::check, scene::Detail};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.
@@ -32,6 +35,21 @@ pub struct Renderer {
     pub(super) drawn: Drawn,
     /// Number of frames in memory at once, which counts against the limit of memory.
     frames: u64,
+    /// The extent of [`Renderer::scene`].
+    pub(super) extent: Extent,
+    /// Whether only a share of the scene was read, for [`Renderer::frame_over`].
+    has_share: bool,
+}
+
+/// The use of a renderer.
+#[derive(Clone, Copy, Default)]
+struct How<'a> {
+    /// It draws many views, from one to the next of which levels of detail fade.
+    views: bool,
+    /// The first view, if its kernels are to be compiled early.
+    first: Option<&'a View>,
+    /// The share that it draws together with other processes, and the view.
+    share: Option<(Share, &'a View)>,
 }
 
 /// The data that views are drawn from.
@@ -52,23 +70,18 @@ pub(super) enum Drawn {
     },
 }
 
-/// A rendered view.
-#[derive(Debug)]
-pub struct Picture {
-    /// The colour and the maps.
-    pub frame: Frame,
-    /// Times and counts.
-    pub report: Report,
-    /// The camera, with values from the scene filled in.
+/// The scene that a view shows, and how it is drawn.
+#[cfg(feature = "parts")]
+pub(super) struct SceneOfView {
+    pub scene: Arc<scene::Scene>,
     pub camera: Camera,
-    /// The camera as the options that reproduce it.
-    pub view: ViewReport,
+    pub settings: Settings,
+    pub report: ViewReport,
     /// Counts of what was read for this view; None if the inputs were read whole.
     pub read: Option<ReadReport>,
-    /// Why nothing is visible; None if something is.
-    pub unseen: Option<Unseen>,
-    /// The meaning of the colours, if they show an attribute.
     pub key: Option<ColorKey>,
+    /// Whether the scene is only the share of this process.
+    pub is_share: bool,
 }
 
 impl Renderer {
@@ -85,7 +98,27 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (false, None), progress)
+        Self::with(scene, options, (device, None), How::default(), progress)
+    }
+
+    /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`.
+    ///
+    /// It reads only the share if the input is one file of `epsplat lod` and `view` has a position;
+    /// a view that is framed looks at all surfels. Else it reads everything, because the surfels of
+    /// a share may depend on points around it.
+    ///
+    /// # Errors
+    ///
+    /// The same as those of [`Renderer::new`].
+    #[cfg(feature = "parts")]
+    pub fn of_share(
+        scene: &Scene,
+        options: &RenderOptions,
+        device: &DeviceOptions,
+        (share, view): (Share, &View),
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        Self::with(scene, options, (device, None), How { share: Some((share, view)), ..How::default() }, progress)
     }
 
     /// Makes a renderer as [`Renderer::new`] does, and meanwhile compiles the kernels that `first`,
@@ -101,7 +134,7 @@ impl Renderer {
         first: &View,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (false, Some(first)), progress)
+        Self::with(scene, options, (device, None), How { first: Some(first), ..How::default() }, progress)
     }
 
     /// Makes a renderer on a device that is open already, such as that of the caller's own program
@@ -112,7 +145,7 @@ impl Renderer {
     /// The same as those of [`Renderer::new`].
     pub fn on_device(scene: &Scene, options: &RenderOptions, gpu: &Gpu, progress: &dyn Progress) -> Result<Self> {
         let device = DeviceOptions { backend: Chosen(Some(BackendName::Gpu)), ..DeviceOptions::default() };
-        Self::with(scene, options, (&device, Some(gpu)), (false, None), progress)
+        Self::with(scene, options, (&device, Some(gpu)), How::default(), progress)
     }
 
     /// Makes a renderer for a camera that moves: cuts of levels of detail fade from view to view
@@ -127,21 +160,26 @@ impl Renderer {
         device: &DeviceOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), (true, None), progress)
+        Self::with(scene, options, (device, None), How { views: true, ..How::default() }, progress)
     }
 
     fn with(
         scene: &Scene,
         options: &RenderOptions,
         (device, open): (&DeviceOptions, Option<&Gpu>),
-        (views, first): (bool, Option<&View>),
+        How { views, first, share }: How<'_>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (inputs, mut options, device) = (scene.0.clone(), options.clone(), device.clone());
         let sources = options.research.sources.iter().map(Replacement::loaded).collect::<Result<_>>()?;
         options.research.sources = sources;
-        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None };
+        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None, share };
         let settings = request.settings()?;
+        #[cfg(feature = "parts")]
+        if request.share.is_some() {
+            // Files may turn out to need no levels of detail.
+            check::options_of_ranks(&Settings { detail: Detail::FINEST, ..settings.clone() }, request.is_reference())?;
+        }
         if options.surface.separate && inputs.count() < 2 {
             progress.note(
                 "--separate keeps the surfels of several files apart: it changes nothing here, as there is at most one file",
@@ -156,7 +194,20 @@ impl Renderer {
             Some(parts) => (settings, Drawn::Parts { parts: Box::new(parts), noted: false }),
             None => whole(&request, settings, (&backend, first), progress)?,
         };
-        Ok(Self { inputs, options, device, views, settings, backend, drawn, frames: 1 })
+        // A renderer of everything draws a scene that is part of nothing.
+        let has_share = matches!(&drawn, Drawn::Whole { scene, .. } if scene.part_of.is_some());
+        Ok(Self {
+            inputs,
+            options,
+            device,
+            views,
+            settings,
+            backend,
+            drawn,
+            frames: 1,
+            extent: Extent::default(),
+            has_share,
+        })
     }
 
     /// Rejects options that cannot be combined, before any input is read.
@@ -166,7 +217,7 @@ impl Renderer {
     /// [`Error::Usage`], as [`Renderer::new`].
     pub fn check(files: &Files, scene: &SceneOptions, options: &RenderOptions, device: &DeviceOptions) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        Request { scene: &inputs, options, device, views: false, read: None }.settings().map(drop)
+        Request { scene: &inputs, options, device, views: false, read: None, share: None }.settings().map(drop)
     }
 
     /// Sets how many frames the caller has in memory at once (1 by default). They count against the
@@ -199,6 +250,11 @@ impl Renderer {
         Bounds { min: min + scene.origin, max: max + scene.origin }
     }
 
+    /// The number of surfels in memory that all views share.
+    pub fn surfels_read(&self) -> u64 {
+        self.scene().surfels.len() as u64
+    }
+
     /// The scene, or an overview of files that are read in part.
     pub(super) fn scene(&self) -> &scene::Scene {
         match &self.drawn {
@@ -221,7 +277,7 @@ impl Renderer {
     ///
     /// [`Error::Usage`] if the view and the scene give no camera.
     pub fn camera(&self, view: &View) -> Result<Camera> {
-        view.camera(self.scene()).map(|(camera, _)| camera)
+        view.camera(self.scene(), &self.extent).map(|(camera, _)| camera)
     }
 
     /// Renders a view.
@@ -242,6 +298,47 @@ impl Renderer {
         self.rendered(view, (is_told, up), progress)?.marked(marks)
     }
 
+    /// Fails if the renderer has only a share of the scene.
+    pub(super) fn check_whole(&self) -> Result<()> {
+        match self.has_share {
+            true => Err(Error::Usage("this renderer has a share of the scene: draw by Renderer::frame_over".into())),
+            false => Ok(()),
+        }
+    }
+
+    /// Returns the scene that a view shows, and how it is drawn. Notes are those of a frame.
+    #[cfg(feature = "parts")]
+    pub(super) fn scene_of(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
+        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
+        let Self { inputs, options, device, views, settings, drawn, frames, .. } = self;
+        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
+        match drawn {
+            Drawn::Whole { scene, guessed_up, key, renderer } => {
+                renderer.check_lens(&camera, view.as_pinhole())?;
+                let report = ViewReport::new(&camera, &seen, scene, *guessed_up);
+                report.tell(progress);
+                lens::note(scene, &camera).iter().for_each(|line| progress.note(line));
+                let slow = overdraw::note(renderer.surfels(), renderer.fragments(&camera));
+                slow.iter().for_each(|line| progress.note(line));
+                let refined = refined::refined(scene, &camera);
+                refined.iter().filter_map(|refined| refined.note()).for_each(|line| progress.note(&line));
+                let scene = refined.map_or_else(|| scene.clone(), |refined| Arc::new(refined.scene));
+                let (settings, key) = (settings.clone(), key.clone());
+                Ok(SceneOfView { scene, camera, settings, report, read: None, key, is_share: self.has_share })
+            }
+            Drawn::Parts { parts, .. } => {
+                let Part { made: (scene, preparation), settings, read, key } =
+                    parts.scene(&request, (&camera, *frames), settings, progress)?;
+                let report = ViewReport::new(&camera, &seen, &scene, preparation.guessed_up);
+                preparation.notes().iter().for_each(|line| progress.note(line));
+                report.tell(progress);
+                progress.note(&read.sentence());
+                let scene = Arc::new(scene);
+                Ok(SceneOfView { scene, camera, settings, report, read: Some(read), key, is_share: false })
+            }
+        }
+    }
+
     /// Renders a view without marks, and describes it in a note if `is_told`. `up` is the axis of
     /// heights, of length 1.
     pub(super) fn rendered(
@@ -250,15 +347,15 @@ impl Renderer {
         (is_told, up): (bool, DVec3),
         progress: &dyn Progress,
     ) -> Result<Picture> {
-        let (camera, seen) = view.camera(self.scene())?;
+        self.check_whole()?;
+        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
         let other = view.as_pinhole();
-        let Self { inputs, options, device, views, settings, backend, drawn, frames } = self;
-        let request = Request { scene: inputs, options, device, views: *views, read: None };
+        let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
+        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
             if is_told {
-                progress.note(&view.sentence());
-                view.warning().iter().for_each(|warning| progress.note(warning));
+                view.tell(progress);
             }
         };
         match drawn {
@@ -277,7 +374,7 @@ impl Renderer {
                     }
                     None => renderer.frame(&camera, progress)?,
                 };
-                Ok(picture(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
+                Ok(Picture::of(scene, settings, rendered, (camera, view), (None, key.clone())).with_heights(up, maps))
             }
             Drawn::Parts { parts, noted } => {
                 let Part { made: (scene, preparation), settings, read, key } =
@@ -296,26 +393,9 @@ impl Renderer {
                 let rendered = renderer.frame(&camera, progress)?;
                 let wrong = rendered.1.kernel.as_ref().filter(|_| first).and_then(KernelFaults::sentence);
                 wrong.iter().for_each(|line| progress.note(line));
-                Ok(picture(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))
+                Ok(Picture::of(&scene, &settings, rendered, (camera, view), (Some(read), key)).with_heights(up, maps))
             }
         }
-    }
-}
-
-impl Picture {
-    /// Adds the maps of `wanted` that are made from others. `up` is the axis of heights.
-    fn with_heights(self, up: DVec3, wanted: Maps) -> Self {
-        let frame = heights::made(self.frame, &self.camera, up, wanted);
-        Self { frame, ..self }
-    }
-
-    /// Draws marks on the frame.
-    fn marked(self, marks: Marks) -> Result<Self> {
-        if marks == Marks::default() {
-            return Ok(self);
-        }
-        let frame = marks.draw(self.frame, &self.camera, self.key.as_ref())?;
-        Ok(Self { frame, ..self })
     }
 }
 
@@ -331,7 +411,7 @@ pub(super) fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result
         }
         return Ok(Backend::Reference);
     }
-    match Gpu::open(device.adapter.as_deref()) {
+    match Gpu::open_in_turn(device.adapter.as_deref(), device.turn) {
         Ok(gpu) => {
             progress.note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
             let gpu = if device.memory.is_some() { gpu.with_buffer_limit(memory::BUFFER) } else { gpu };
@@ -352,8 +432,17 @@ fn whole(
     (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
-    let mut whole = ahead::compiling(request, &settings, first, backend, read)?;
+    let shared = request.share.filter(|(_, view)| settings.detail.is_finest() && !view.is_framed());
+    let shared = shared.map_or(Ok(None), |(share, _)| tree::share_of(request, share, progress))?;
+    let mut whole = match shared {
+        Some((scene, preparation)) => {
+            Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })
+        }
+        None => {
+            let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
+            ahead::compiling(request, &settings, first, backend, read)?
+        }
+    };
     whole.preparation.notes().iter().for_each(|line| progress.note(line));
     let settings = request.for_scene(settings, &whole.scene, progress)?;
     if levels::lack(&whole.scene, &settings) {
@@ -364,16 +453,4 @@ fn whole(
     let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
     let key = whole.key.clone();
     Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
-}
-
-/// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
-fn picture(
-    scene: &scene::Scene,
-    settings: &Settings,
-    (frame, report): (Frame, Report),
-    (camera, view): (Camera, ViewReport),
-    (read, key): (Option<ReadReport>, Option<ColorKey>),
-) -> Picture {
-    let unseen = is_empty(&frame, settings).then(|| Unseen::of(scene, &camera, settings));
-    Picture { frame, report, camera, view, read, unseen, key }
 }

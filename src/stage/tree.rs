@@ -10,8 +10,9 @@ use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::taken;
 use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Scene, Surfel};
-use crate::surfels::part::{Taken, nothing};
+use crate::scene::{Camera, Scene, Share, Surfel};
+use crate::stage::whole::Made;
+use crate::surfels::part::{Taken, nothing, surfels};
 use crate::surfels::{Limits, Preparation};
 
 /// Files with fewer surfels are read whole, as that takes little time.
@@ -62,8 +63,8 @@ impl Tree {
         let lowest = nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.len());
         // Points instead of disks, as the ellipses of nodes reach past the surfels below them. Few
         // surfels reach past these points by more than the margin of the framed view.
-        let surfels = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
-        let overview = Scene { surfels, ..nothing(&levels) };
+        let points = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
+        let overview = Scene { surfels: points, ..nothing(&levels) };
         Ok(Some(Self { levels, overview }))
     }
 
@@ -89,6 +90,19 @@ impl Tree {
         };
         Ok(Part { made: (scene, preparation), settings: settings.clone(), read, key: None })
     }
+}
+
+/// Reads the `share` of a file of `epsplat lod`, with the facts that the file states about all of
+/// its surfels. Returns None if the input is no such file, or if an option needs all surfels.
+pub(super) fn share_of(request: &Request<'_>, share: Share, progress: &dyn Progress) -> Result<Option<Made>> {
+    if asks_for_all(request).is_some() || request.surfels().radius_scale.is_some() {
+        return Ok(None);
+    }
+    let Some(levels) = request.files().levels()? else { return Ok(None) };
+    let own = share.range(levels.whole.surfels as usize);
+    let scene = surfels(&levels, own.start as u32..own.end as u32, progress)?;
+    let count = scene.surfels.len() as u64;
+    Ok(Some((scene, Preparation { points: count, surfels: count, ..Preparation::default() })))
 }
 
 /// Returns the first given option that needs all surfels of a file, other inputs or triangles.

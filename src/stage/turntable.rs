@@ -25,7 +25,7 @@ impl Renderer {
         // Checks size, lens and near depth.
         View::new(options)?;
         let scene = self.scene();
-        let near = options.near.unwrap_or(Camera::default_near(scene));
+        let near = options.near.unwrap_or_else(|| self.extent.near(scene));
         let (size, (lens, _)) = (options.size.unwrap_or(View::DEFAULT_SIZE), options.lens());
         let cameras = Camera::turntable(size, lens, scene, near, (options.side()?, options.up), count)?;
         Ok(cameras.into_iter().map(View::from).collect())

@@ -6,11 +6,13 @@ use std::path::Path;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::extent::Extent;
 use crate::error::{Error, Result};
 use crate::io::camera::{self, CameraFile, Pose};
 use crate::options::CameraOptions;
 use crate::options::parse::{up_argument, vector_argument};
 use crate::options::values::Ortho;
+use crate::progress::Progress;
 use crate::scene::camera::check_near;
 use crate::scene::framing::fitted_height;
 use crate::scene::lens::DEFAULT_FOV;
@@ -157,10 +159,10 @@ impl View {
     }
 
     /// Returns the camera of the view and the point that it looks at.
-    pub(super) fn camera(&self, scene: &Scene) -> Result<(Camera, Seen)> {
+    pub(super) fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
         match &self.0 {
-            Kind::Given(given) => given.camera(scene, Camera::default_near(scene)),
-            Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, scene))),
+            Kind::Given(given) => given.camera(scene, extent),
+            Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, extent.middle(scene)))),
         }
     }
 
@@ -174,6 +176,11 @@ impl View {
             Kind::Given(Given { source: Source::Set, lens: Lens::Curved(..), .. }) => "take --ignore-distortion",
             Kind::Given(_) | Kind::Camera(_) => "",
         }
+    }
+
+    /// Whether the view is placed so that the whole scene shows.
+    pub(super) fn is_framed(&self) -> bool {
+        matches!(&self.0, Kind::Given(Given { place: Place::Framed { .. }, .. }))
     }
 
     /// Returns the number of pixels of the picture.
@@ -214,10 +221,8 @@ impl Given {
     }
 
     /// Returns the camera of the view and the point that it looks at.
-    ///
-    /// `default_near` is [`Camera::default_near`] of the scene.
-    fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
-        let near = self.near.unwrap_or(default_near);
+    fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
+        let near = self.near.unwrap_or_else(|| extent.near(scene));
         let (pose, up, by) = match &self.place {
             Place::Framed { side, up, fits } => {
                 let lens = match fits {
@@ -232,10 +237,7 @@ impl Given {
                 };
                 return Ok((camera, Seen { target, up, by: By::Choice }));
             }
-            Place::Eye(eye, up) => {
-                let center = scene.origin + scene.framed().0.center();
-                (&Pose::LookAt(*eye, center, *up), *up, By::Choice)
-            }
+            Place::Eye(eye, up) => (&Pose::LookAt(*eye, extent.middle(scene), *up), *up, By::Choice),
             Place::Pose(pose @ Pose::LookAt(.., up)) => (pose, *up, By::Arguments),
             Place::Pose(pose @ Pose::Rigid(..)) => (pose, None, By::Pose),
         };
@@ -243,7 +245,7 @@ impl Given {
         Ok(match *pose {
             Pose::LookAt(_, target, _) => (camera, Seen { target, up, by }),
             Pose::Rigid(..) => {
-                let seen = Seen::of_pose(&camera, scene);
+                let seen = Seen::of_pose(&camera, extent.middle(scene));
                 (camera, seen)
             }
         })
@@ -262,8 +264,8 @@ pub(super) struct Seen {
 
 impl Seen {
     /// Returns the point that a camera with known rotation and eye looks at.
-    fn of_pose(camera: &Camera, scene: &Scene) -> Self {
-        let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(camera.near);
+    fn of_pose(camera: &Camera, middle: DVec3) -> Self {
+        let distance = camera.to_camera(middle).z.max(camera.near);
         let target = camera.eye + camera.rotation.row(2) * distance;
         Self { target, up: Some(-camera.rotation.row(1)), by: By::Pose }
     }
@@ -319,6 +321,12 @@ impl ViewReport {
         let up = if is_along { scene.up.other() } else { given };
         let turned = if is_along || seen.by == By::Pose { None } else { turned(camera, up, scene.up) };
         Self { eye: camera.eye.into(), target: seen.target.into(), up: up.into(), because, turned }
+    }
+
+    /// Notes the view, and its warning.
+    pub(super) fn tell(&self, progress: &dyn Progress) {
+        progress.note(&self.sentence());
+        self.warning().iter().for_each(|warning| progress.note(warning));
     }
 
     /// Returns the options in one line, with the source of up.

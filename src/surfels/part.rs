@@ -74,6 +74,20 @@ pub fn part(
     Ok((scene?, taken))
 }
 
+/// Reads the surfels of a file with these indices, without the tree over them. The scene has the
+/// facts that the file states about all surfels.
+///
+/// # Errors
+///
+/// As [`part`].
+pub fn surfels(levels: &Levels, numbers: Range<u32>, progress: &dyn Progress) -> Result<Scene> {
+    progress.begin("reading surfels", numbers.len() as u64);
+    let nodes = (Hierarchy::default(), LevelFacts::default());
+    let scene = scene(levels, std::slice::from_ref(&numbers), nodes, progress);
+    progress.end();
+    Ok(Scene { hierarchy: None, ..scene? })
+}
+
 /// Reads the nodes of a part, whose leaves hold the indices of surfels in the file. Returns the
 /// nodes, the size of the part, and the facts about all nodes of the part.
 fn grown(

@@ -12,6 +12,7 @@ mod examples;
 #[cfg(feature = "gltf")]
 mod gltf;
 mod machines;
+mod mpi;
 mod own_kernel;
 mod prose;
 mod readme;

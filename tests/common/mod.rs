@@ -14,6 +14,7 @@ pub mod judged;
 pub mod levels;
 pub mod meshes;
 pub mod modules;
+pub mod network;
 mod random;
 pub mod scenes;
 pub mod server;

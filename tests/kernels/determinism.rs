@@ -130,7 +130,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let mut noticed = [false; 2];
     for (number, (name, scene, camera, options)) in crowded.chain(hard).enumerate() {
         let all_noticed = seen == [true; 2] && noticed == [true; 2];
-        if all_noticed && !common::takes(number, 3) {
+        if all_noticed && !common::takes(number, 6) {
             continue;
         }
         let options = Settings { accumulator: own.accumulator, ..options };
@@ -166,7 +166,7 @@ fn hidden_splats_do_not_change_a_bit() {
     let too_many = with("1.05 * reached > farthest_accepted(");
     let crowded =
         crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, options(Accumulator::Fixed)));
-    let taken = cases().unwrap().into_iter().enumerate().filter(|(k, _)| common::takes(*k, 3));
+    let taken = cases().unwrap().into_iter().enumerate().filter(|(k, _)| common::takes(*k, 5));
     let hard = taken.map(|(_, case)| (case.name, case.scene, case.camera, case.options));
     let mut noticed = 0;
     for (name, scene, camera, options) in crowded.chain(hard) {

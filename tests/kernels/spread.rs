@@ -76,7 +76,7 @@ fn spreading_changes_no_bit_of_any_form() {
     let mut spread = Vec::new();
     let always = ["unlit", "constant", "max", "radius"];
     for (k, (name, scene, camera, options)) in drawn().into_iter().enumerate() {
-        if !always.contains(&name) && !common::takes(k, 3) {
+        if !always.contains(&name) && !common::takes(k, 6) {
             continue;
         }
         let (expected, ..) = alone((&scene, &camera), &options);

@@ -7,7 +7,7 @@ use common::Random;
 use common::scenes::{sphere, sphere_camera};
 use epsplat::io::Points;
 use epsplat::low_level::frame::Frame;
-use epsplat::low_level::gpu::Sources;
+use epsplat::low_level::gpu::{Replacement, Sources};
 use epsplat::low_level::plan::{BlendFormat, Optimisation, Organisation, Raster, RasterDepth, Settings, check};
 use epsplat::low_level::render::{Backend, render};
 use epsplat::low_level::scene::facing::POINT_SHAPES;
@@ -239,6 +239,60 @@ fn a_point_shows_at_its_own_pixel_and_is_no_larger_than_its_limit() {
             let held = frame.map(Map::Count).unwrap().iter().sum::<f32>();
             assert!((held - area).abs() < 60.0, "{held} {area} {name}");
         }
+    }
+}
+
+/// The depth of each pixel is the plane's less the shape's height times the radius: 1 at the axis
+/// and 0 at the rim; shapes on squares fall further, to -1 or 1 - sqrt(2) at the corners.
+#[test]
+fn shapes_have_the_heights_of_the_paper() {
+    let Some(gpu) = common::gpu() else { return };
+    let (size, radius, depth) = (161, 0.8, 4.0);
+    let lens = Lens::Fov(45.0);
+    let camera = Camera::look_at((size, size), lens, DVec3::Z * depth, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
+    let alone = Scene { surfels: vec![Surfel::disk(Vec3::ZERO, Vec3::X, radius as f32)], ..sites(1, 1.0, |_| 0.0) };
+    let study = |name: &str| {
+        let path = format!("{}/benches/{name}.wgsl", env!("CARGO_MANIFEST_DIR"));
+        Sources::default().with(&[Replacement::new("shape_flat.wgsl", std::fs::read_to_string(path).unwrap())])
+    };
+    type Height = fn(f64) -> f64;
+    let cone: Height = |rho2| 1.0 - rho2.sqrt();
+    let bowl: Height = |rho2| 1.0 - rho2;
+    let rows: [(&str, PointShape, Option<&str>, Height, [f64; 3]); 5] = [
+        ("sphere", PointShape::Sphere, None, |rho2| (1.0 - rho2).sqrt(), [1.0, 0.0, f64::NAN]),
+        ("cone", PointShape::Cone, None, cone, [1.0, 0.0, f64::NAN]),
+        ("paraboloid", PointShape::Paraboloid, None, bowl, [1.0, 0.0, f64::NAN]),
+        ("cone on a square", PointShape::Square, Some("square-cone"), cone, [1.0, 0.0, 1.0 - 2f64.sqrt()]),
+        ("paraboloid on a square", PointShape::Square, Some("square-paraboloid"), bowl, [1.0, 0.0, -1.0]),
+    ];
+    for (name, shape, file, height, ends) in rows {
+        assert_eq!([height(0.0), height(1.0)], [ends[0], ends[1]], "{name}");
+        let sources = file.map_or_else(|| Ok(Sources::default()), study).unwrap();
+        let backend = Backend::Gpu { gpu: Box::new(gpu.clone()), sources };
+        let facing = Some(Facing { shape, pixels: [1.0, 500.0] });
+        let (frame, _) = render(&alone, &camera, &Settings { facing, ..nearest(shape) }, &backend, &()).unwrap();
+        let depths = frame.map(Map::Depth).unwrap();
+        let (mut covered, mut lowest, mut highest) = (0, f64::INFINITY, f64::NEG_INFINITY);
+        for (pixel, found) in depths.iter().map(|depth| f64::from(*depth)).enumerate().filter(|(_, z)| z.is_finite()) {
+            let at = DVec2::new((pixel as u32 % size).into(), (pixel as u32 / size).into()) + 0.5;
+            let beside = (at - DVec2::new(camera.cx, camera.cy)) * depth / (camera.fx * radius);
+            let rise = (depth - found) / radius;
+            assert!((rise - height(beside.length_squared().min(2.0))).abs() < 2e-3, "{name} {beside} {rise}");
+            (covered, lowest, highest) = (covered + 1, rise.min(lowest), rise.max(highest));
+        }
+        // The last pixel centre lies within a pixel of the rim or of the corner.
+        let last = if ends[2].is_nan() { ends[1] } else { ends[2] };
+        let pixel = depth / (camera.fx * radius);
+        assert!(covered > 4000 && (highest - ends[0]).abs() < 1e-3, "{name} {covered} {highest}");
+        assert!(
+            (lowest - last).abs() < (4.0 * pixel).max((4.0 * pixel).sqrt() * f64::from(u8::from(name == "sphere")))
+        );
+        // Control: the flat shape has no height.
+        let flat = if file.is_some() { PointShape::Square } else { PointShape::Circle };
+        let flat = Settings { facing: Some(Facing { shape: flat, pixels: [1.0, 500.0] }), ..nearest(flat) };
+        let (flat, _) = render(&alone, &camera, &flat, &Backend::gpu(gpu.clone()), &()).unwrap();
+        let off = |z: &f32| z.is_finite() && (f64::from(*z) - depth).abs() > 1e-5;
+        assert!(!flat.map(Map::Depth).unwrap().iter().any(off), "{name}");
     }
 }
 

@@ -10,21 +10,23 @@ use std::sync::Arc;
 use std::sync::Mutex;
 
 use common::any_scene::taken;
+use common::network::Threads;
 use common::scenes::{sphere, sphere_camera};
 use common::{Random, any_options, any_scene};
 use epsplat::io::part::{Content, Section};
 use epsplat::low_level::frame::Frame;
 use epsplat::low_level::gpu::Gpu;
+use epsplat::low_level::network::{Reduction, Wire};
 use epsplat::low_level::passes::share::ShareOfScene;
 use epsplat::low_level::passes::source::{Page, Source};
 use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Settings, check};
-use epsplat::low_level::render::exchange::{Exchange, Meeting, Rows, Then};
+use epsplat::low_level::render::exchange::{Exchange, Rows, Then};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Share, Triangles,
 };
 use epsplat::options::{Cull, Epsilon};
-use epsplat::{DeviceOptions, Part, RenderOptions, Result, SceneOptions, View, merge};
+use epsplat::{DeviceOptions, Error, Part, RenderOptions, Result, SceneOptions, View, merge};
 
 /// Some surfels of a scene, with the facts of the whole scene.
 struct Hand {
@@ -74,23 +76,27 @@ fn hands(scene: &Scene, of: u32, random: &mut Random) -> Vec<Box<dyn Source>> {
     dealt.into_iter().map(|indices| hand(indices) as Box<dyn Source>).collect()
 }
 
-/// Draws a frame with a thread for each source, and returns the frames of all of them.
-fn together(sources: &[Box<dyn Source>], camera: &Camera, options: &Settings, gpu: &Gpu) -> Vec<Frame> {
-    let meeting = Meeting::new(sources.len());
+/// Draws a frame with a thread for each source, and returns it, with what each thread sent.
+fn together(sources: &[Box<dyn Source>], camera: &Camera, options: &Settings, gpu: &Gpu) -> (Frame, Vec<Wire>) {
+    let threads = Threads::new(sources.len());
     let backend = Backend::gpu(gpu.clone());
     // The members outlive all threads: one that left early would end the frames of the others.
-    let members: Vec<_> = sources.iter().map(|_| meeting.member()).collect();
-    std::thread::scope(|scope| {
+    let members: Vec<_> = (0..sources.len()).map(|rank| threads.member(rank)).collect();
+    let drawn: Vec<_> = std::thread::scope(|scope| {
         let mut threads = Vec::new();
         for (source, member) in sources.iter().zip(&members) {
             let backend = &backend;
             threads.push(scope.spawn(move || {
                 let mut renderer = Renderer::new(Box::as_ref(source), options, backend).unwrap().among().unwrap();
-                renderer.frame_among(camera, member, &()).unwrap().0.unwrap()
+                let (frame, _, wire) = renderer.frame_over(camera, member, &()).unwrap();
+                (frame, wire)
             }));
         }
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
-    })
+    });
+    assert!(drawn[1..].iter().all(|(frame, _)| frame.is_none()));
+    let (mut frames, wires): (Vec<_>, Vec<_>) = drawn.into_iter().unzip();
+    (frames.swap_remove(0).unwrap(), wires)
 }
 
 fn alone(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Frame {
@@ -132,9 +138,8 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
         // Places in an image are stored relative to the range of all, which a hand does not know.
         let runs = random.one_in(2) || matches!(scene.colors, Colors::Textured(_));
         let sources = if runs { shares(&scene, of) } else { hands(&scene, of, random) };
-        for frame in together(&sources, &camera, &options, &gpu) {
-            assert!(frame.hashes() == whole.hashes(), "seed {seed}: {about:?} of {of}, {options:?}");
-        }
+        let (frame, _) = together(&sources, &camera, &options, &gpu);
+        assert!(frame.hashes() == whole.hashes(), "seed {seed}: {about:?} of {of}, {options:?}");
         drawn += 1;
         features.extend(about);
     }
@@ -167,15 +172,16 @@ fn floats_would_depend_on_the_shares() {
     let options = Settings::default();
     let added = |of: u32| {
         let sources = shares(&scene, of);
-        let (meeting, parts) = (Meeting::new(sources.len()), Mutex::default());
-        let members: Vec<_> = sources.iter().map(|_| meeting.member()).collect();
+        let (threads, parts) = (Threads::new(sources.len()), Mutex::default());
+        let members: Vec<_> = (0..sources.len()).map(|rank| threads.member(rank)).collect();
         std::thread::scope(|scope| {
             for (source, member) in sources.iter().zip(&members) {
                 let (gpu, camera, options, parts) = (&gpu, &camera, &options, &parts);
                 scope.spawn(move || {
                     let backend = Backend::gpu(gpu.clone());
                     let mut renderer = Renderer::new(&**source, options, &backend).unwrap().among().unwrap();
-                    let exchange = Floats { of_depths: member, parts };
+                    let of_depths = Reduction::new(member, camera.width, vec![Samples::ONE]);
+                    let exchange = Floats { of_depths: &of_depths, parts };
                     assert!(renderer.frame_among(camera, &exchange, &()).unwrap().0.is_none());
                 });
             }
@@ -188,22 +194,54 @@ fn floats_would_depend_on_the_shares() {
     let [one, three] = [1, 3].map(added);
     assert!(one.iter().zip(&three).any(|(one, three)| one != three), "floats gave the same sums");
     let whole = alone(&scene, &camera, &options, &gpu);
-    let parts = together(&shares(&scene, 3), &camera, &options, &gpu);
-    assert!(parts.iter().all(|frame| frame.hashes() == whole.hashes()));
+    assert_eq!(together(&shares(&scene, 3), &camera, &options, &gpu).0.hashes(), whole.hashes());
 }
 
+/// A process that fails says so in its place, and all of them end.
 #[test]
-fn a_part_that_fails_ends_the_others() {
+fn a_process_that_fails_ends_the_others() {
     let Some(gpu) = common::gpu() else { return };
     let (scene, camera) = (sphere(500, 1.5), sphere_camera(32, Projection::Pinhole));
-    let sources = shares(&scene, 2);
-    let meeting = Meeting::new(2);
-    let member = meeting.member();
-    drop(meeting.member());
-    let backend = Backend::gpu(gpu);
-    let mut renderer = Renderer::new(&*sources[0], &Settings::default(), &backend).unwrap().among().unwrap();
-    let error = renderer.frame_among(&camera, &member, &()).unwrap_err().to_string();
-    assert!(error.contains("another part"), "{error}");
+    let (sources, threads, backend) = (shares(&scene, 3), Threads::new(3), Backend::gpu(gpu));
+    let members: Vec<_> = (0..3).map(|rank| threads.member(rank)).collect();
+    let errors: Vec<Error> = std::thread::scope(|scope| {
+        let draw = |rank: usize| {
+            let (source, member, backend, camera) = (&sources[rank], &members[rank], &backend, &camera);
+            scope.spawn(move || {
+                let renderer = Renderer::new(&**source, &Settings::default(), backend).unwrap();
+                // Process 1 has not prepared to draw with others.
+                let mut renderer = if rank == 1 { renderer } else { renderer.among().unwrap() };
+                renderer.frame_over(camera, member, &()).unwrap_err()
+            })
+        };
+        [0, 1, 2].map(draw).into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    assert_eq!(errors[1].to_string(), "process 1: a renderer draws together with others after Renderer::among");
+    for rank in [0, 2] {
+        assert!(matches!(errors[rank], Error::OtherProcess { rank: 1, code: 2 }), "{}", errors[rank]);
+    }
+}
+
+/// A process sends what its own surfels cover, and the picture: the documented bytes a pixel.
+#[test]
+fn what_is_sent_follows_from_the_covered_pixels() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = (sphere(20_000, 2.0), sphere_camera(256, Projection::Pinhole));
+    let options = Settings::default();
+    let (frame, wires) = together(&shares(&scene, 4), &camera, &options, &gpu);
+    let covered = frame.color.iter().filter(|color| color[3] > 0.0).count() as f64;
+    let of = |bytes: fn(&Wire) -> u64| wires.iter().map(bytes).sum::<u64>() as f64 / covered;
+    let [nearest, sums, picture] = [of(|w| w.nearest_bytes), of(|w| w.sums_bytes), of(|w| w.picture_bytes)];
+    // Each pixel of front and back is covered in about one or two of the four regions, and three
+    // quarters of what is covered belongs to another process: 8 bytes twice at most, and masks.
+    assert!((6.0..24.0).contains(&nearest), "{nearest}");
+    assert!((6.0..40.0).contains(&sums), "{sums}");
+    // Three quarters of the pixels come from others, with four values and their number.
+    assert!((picture / (0.75 * 20.0) - 1.0).abs() < 0.1, "{picture}");
+    // An empty view costs nothing but the numbers of blocks.
+    let away = Camera { eye: camera.eye + camera.rotation.row(2) * 100.0, ..camera.clone() };
+    let (_, wires) = together(&shares(&scene, 4), &away, &options, &gpu);
+    assert!(wires.iter().all(|wire| wire.nearest_bytes + wire.sums_bytes + wire.picture_bytes < 200), "{wires:?}");
 }
 
 #[test]

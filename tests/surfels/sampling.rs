@@ -307,6 +307,23 @@ fn projected_samples_cover_the_surface_less_evenly() {
     }
 }
 
+/// Fewer samples than voxels go to the voxels of the highest priority alone, as in Tien 2008; by
+/// shares of the priority, a fifth of them lies elsewhere.
+#[test]
+fn few_projected_samples_lie_where_the_priority_is_highest() {
+    let mesh = strip(1);
+    let richer = |_: &MeshSurface<'_>, voxels: &[Voxel]| {
+        voxels.iter().map(|voxel| if voxel.bounds.center().x > 0.0 { 4.0 } else { 1.0 }).collect()
+    };
+    let (points, sampling) =
+        sample(&mesh, 250, &Method::Projected { priority: &richer, depth: Some(10) }, 0, &()).unwrap();
+    assert_eq!((points.positions.len(), right_of(&points, 1.0)), (250, 250));
+    assert_eq!((sampling.voxels, sampling.empty_voxels), (1024, 774));
+    let (shared, _) = sample(&mesh, 250, &Method::Stratified { priority: &richer, depth: Some(10) }, 0, &()).unwrap();
+    let right = right_of(&shared, 1.0);
+    assert!((190..=210).contains(&right), "{right}");
+}
+
 #[test]
 fn a_triangle_counts_wholly_in_each_voxel_that_it_reaches() {
     let surface_mesh = strip(1);

@@ -10,6 +10,7 @@ use std::time::Instant;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::low_level::frame::pixel_bytes;
+use epsplat::options::DeviceOptions;
 use epsplat::{Error, Files, Maps, Picture, Progress, ReadReport, Renderer, Report, Result, Scene, View};
 use serde::Serialize;
 
@@ -27,7 +28,7 @@ const MOST_WAITING: u64 = 1 << 30;
 
 /// The JSON report of a view's picture.
 #[derive(Serialize)]
-struct Written {
+pub(super) struct Written {
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
@@ -82,32 +83,77 @@ impl Shots {
     }
 }
 
+/// The pictures of a command, ready to be drawn.
+pub(super) struct Ready {
+    pub files: Vec<PathBuf>,
+    views: Vec<View>,
+    renderer: Renderer,
+    /// Number of threads that encode and write.
+    writers: NonZeroUsize,
+}
+
 /// Renders a picture for each camera.
 pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
-    let maps = Maps::of(&arguments.options.maps.aov);
-    let files = Files::new(&arguments.inputs, &arguments.scene.input)?;
-    Renderer::check(&files, &arguments.scene, &arguments.options, &arguments.device)?;
-    let shots = Shots::of(arguments, target)?;
-    check_outputs(arguments, &files, target, &shots.files)?;
-    let scene = Scene::of_files(files, &arguments.scene)?;
-
     let bars = Bars::new();
+    let ready = ready(arguments, target, (&arguments.device, true), &bars)?;
+    let (writers, start) = (ready.writers, Instant::now());
+    let pictures = draw(arguments, target, ready, (&bars, true))?;
+    tell(arguments, pictures, writers, start)
+}
+
+/// Checks the arguments, and reads and prepares the scene. The outputs are checked too if
+/// `checks_outputs`.
+pub(super) fn ready(
+    arguments: &Arguments,
+    target: &Target,
+    (device, checks_outputs): (&DeviceOptions, bool),
+    progress: &dyn Progress,
+) -> Result<Ready> {
+    let maps = Maps::of(&arguments.options.maps.aov);
+    let inputs = Files::new(&arguments.inputs, &arguments.scene.input)?;
+    Renderer::check(&inputs, &arguments.scene, &arguments.options, device)?;
+    let shots = Shots::of(arguments, target)?;
+    if checks_outputs {
+        check_outputs(arguments, &inputs, target, &shots.files)?;
+    }
+    let scene = Scene::of_files(inputs, &arguments.scene)?;
     // A stream has the pictures in order, so a single thread writes them.
     let writers = if target.is_standard { NonZeroUsize::MIN } else { writers(shots.pixels(arguments), maps) };
-    let renderer = Renderer::of_views(&scene, &arguments.options, &arguments.device, &bars)?;
-    let mut renderer = renderer.with_frames(writers.get() as u64 + 1);
+    let renderer = Renderer::of_views(&scene, &arguments.options, device, progress)?;
+    let renderer = renderer.with_frames(writers.get() as u64 + 1);
     let views = match (shots.views, arguments.views.turntable) {
         (Some(views), _) => views,
         (None, count) => renderer.turntable(&arguments.camera, count.unwrap_or(NonZeroU32::MIN))?,
     };
-    let start = Instant::now();
+    Ok(Ready { files: shots.files, views, renderer, writers })
+}
+
+impl Ready {
+    /// Leaves only the views out of every `of` that are number `turn` of them.
+    pub(super) fn dealt(self, turn: usize, of: usize) -> Self {
+        let own = |index: &usize| index % of == turn;
+        let files = self.files.iter().enumerate().filter(|(index, _)| own(index)).map(|(_, file)| file.clone());
+        let (files, views) = (files.collect(), self.views.into_iter().enumerate());
+        let views = views.filter(|(index, _)| own(index)).map(|(_, view)| view).collect();
+        Self { files, views, ..self }
+    }
+}
+
+/// Draws and writes the pictures. Notes are printed if it `speaks`.
+pub(super) fn draw(
+    arguments: &Arguments,
+    target: &Target,
+    ready: Ready,
+    (bars, speaks): (&dyn Progress, bool),
+) -> Result<Vec<Written>> {
+    let Ready { files, views, mut renderer, writers } = ready;
     bars.begin("rendering views", views.len() as u64);
     // The bar counts views and not their stages.
-    let notes = Notes;
+    let notes: &dyn Progress = if speaks { &Notes } else { &() };
     // The first empty picture with the reason, and the number of empty pictures.
     let empty = RefCell::new((None, 0));
-    let frames = shots.files.iter().zip(&views).map(|(file, view)| {
-        let picture = renderer.frame(view, &notes).map_err(|error| error.of_view(file))?;
+    let frames = files.iter().zip(&views).map(|(file, view)| {
+        let picture = renderer.frame(view, notes).map_err(|error| error.of_view(file))?;
         if let Some(unseen) = &picture.unseen {
             let (first, count) = &mut *empty.borrow_mut();
             first.get_or_insert_with(|| (file, unseen.sentence()));
@@ -129,10 +175,12 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     });
     bars.end();
     let pictures = pictures?;
-    if let (Some((first, unseen)), count) = empty.into_inner() {
+    if let (Some((first, unseen)), count) = empty.into_inner()
+        && speaks
+    {
         note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));
     }
-    tell(arguments, pictures, writers, start)
+    Ok(pictures)
 }
 
 /// Returns the file of the picture `name`. On standard output it is only a name for messages.

@@ -73,6 +73,14 @@ fn first_scene(clashes: &[SceneClash], facts: &Facts, options: &Settings) -> Res
     }
 }
 
+/// Rejects options with which several processes cannot draw a picture together.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage).
+pub fn options_of_ranks(options: &Settings, reference: bool) -> Result<()> {
+    first(&OPTIONS, options, !reference)
+}
+
 /// Rejects options with which several processes cannot draw a picture together through files.
 ///
 /// # Errors

@@ -29,6 +29,7 @@ impl Renderer {
     /// [`Error::Malformed`] if `within` belongs to another picture; and the errors of
     /// [`Renderer::frame`].
     pub fn part(&self, view: &View, share: Share, within: Option<&Part>, progress: &dyn Progress) -> Result<Part> {
+        self.check_whole()?;
         let (camera, scene) = self.subject_of_part(view, progress)?;
         let Backend::Gpu { gpu, .. } = self.backend() else {
             return Err(Error::Usage("parts are drawn by an adapter, and there is none: `epsplat adapters`".into()));
@@ -74,7 +75,7 @@ impl Renderer {
         device: &DeviceOptions,
     ) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        let request = Request { scene: &inputs, options, device, views: false, read: None };
+        let request = Request { scene: &inputs, options, device, views: false, read: None, share: None };
         check_marks(options)?;
         check::options_of_parts(&request.settings()?, request.is_reference())
     }
@@ -105,7 +106,7 @@ fn check_marks(options: &RenderOptions) -> Result<()> {
 }
 
 /// The picture that a part belongs to.
-fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &Settings) -> Subject {
+pub(super) fn subject(scene: &Scene, facts: Facts, camera: &Camera, settings: &Settings) -> Subject {
     let all: Vec<u32> = (0..scene.surfels.len() as u32).collect();
     let digest = digest::of_surfels(scene, &all).wrapping_add(digest::of_triangles(&scene.triangles));
     Subject {

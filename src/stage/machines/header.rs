@@ -169,7 +169,7 @@ fn different_setting(one: &Settings, two: &Settings) -> Option<String> {
 }
 
 /// The bytes of a value as CBOR.
-fn encoded(value: &impl Serialize) -> Vec<u8> {
+pub(super) fn encoded(value: &impl Serialize) -> Vec<u8> {
     let mut bytes = Vec::new();
     // Writing to memory does not fail, and all types of a header have a form in CBOR.
     let written = ciborium::into_writer(value, &mut bytes);

@@ -1,6 +1,7 @@
-//! Pictures that several processes draw: each draws a share of the scene and leaves a [`Part`], and
-//! [`merge`] joins the parts of all. Parts are bytes, so files, object stores or the messages of a
-//! task system carry them.
+//! Pictures that several processes draw. Either each draws a share of the scene and leaves a
+//! [`Part`], and [`merge`] joins the parts of all: parts are bytes, so files, object stores or the
+//! messages of a task system carry them. Or the processes of a network exchange values while they
+//! draw ([`Renderer::frame_over`](crate::Renderer::frame_over)).
 //!
 //! ```text
 //! depths  = merge(renderer.part(view, share, None) for all shares)
@@ -12,11 +13,13 @@ mod draw;
 mod files;
 mod header;
 mod merge;
+mod ranks;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::merge::{Merged, merge};
+pub use self::ranks::Ranked;
 
 use self::header::{Header, Holds};
 use crate::error::{Error, Result};

@@ -1,0 +1,114 @@
+//! Draws a picture together with the other processes of a network: each draws a share of the scene.
+
+use super::draw::subject;
+use super::header::{Subject, encoded};
+use crate::annotate::Marks;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::network::{Network, Wire, gathered, together};
+use crate::passes::share::{ShareOfScene, facts_of_all};
+use crate::plan::{Facts, Settings, check};
+use crate::progress::Progress;
+use crate::render::{self, Backend, Report};
+use crate::scene::Share;
+use crate::stage::renderer::SceneOfView;
+use crate::stage::{Picture, Renderer, View};
+
+/// A picture that several processes drew, as one of them knows it.
+#[derive(Debug)]
+pub struct Ranked {
+    /// The picture, in process 0.
+    pub picture: Option<Picture>,
+    /// Times and counts of this process.
+    pub report: Report,
+    /// Bytes that this process sent, and the time that it took.
+    pub wire: Wire,
+}
+
+impl Renderer {
+    /// Draws a view together with the other processes of a network, all of which call this with the
+    /// same scene, options and view. The picture has the bits of [`Renderer::frame`].
+    ///
+    /// # Errors
+    /// The first error of a process, in that process, and [`Error::OtherProcess`] in the others:
+    /// [`Error::Usage`] for pictures that processes cannot draw together, and the errors of
+    /// [`Renderer::frame`].
+    pub fn frame_over(&mut self, view: &View, network: &dyn Network, progress: &dyn Progress) -> Result<Ranked> {
+        let of_view = together(network, self.shared(view, progress))?;
+        let SceneOfView { scene, camera, settings, is_share, .. } = &of_view;
+        let subject = match is_share {
+            true => Subject { digest: 0, ..subject(scene, facts_of_all(scene), camera, settings) },
+            false => subject(scene, Facts::of(scene), camera, settings),
+        };
+        together(network, check_same(network, &Subject { maps: self.maps(), ..subject }))?;
+        let backend = together(network, common_backend(self.backend(), network))?;
+        let made = Share::new(network.rank() as u32 + 1, network.size() as u32).and_then(|share| {
+            let source = match is_share {
+                true => ShareOfScene::whole(scene.clone()),
+                false => ShareOfScene::new(scene.clone(), share),
+            };
+            render::Renderer::new(source, settings, backend)?.among()
+        });
+        let (frame, report, wire) = together(network, made)?.frame_over(camera, network, progress)?;
+        let picture = frame.map(|frame| self.finished((frame, report.clone()), of_view)).transpose();
+        Ok(Ranked { picture: together(network, picture)?, report, wire })
+    }
+
+    /// The scene of a view that processes can draw together.
+    fn shared(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
+        if matches!(self.backend(), Backend::Reference) {
+            let what = "processes draw together by adapters, and this one has none: `epsplat adapters`";
+            return Err(Error::Usage(what.into()));
+        }
+        let of_view = self.scene_of(view, progress)?;
+        check::options_of_ranks(&of_view.settings, false)?;
+        let marks = self.options.marks.marks();
+        if marks != Marks::default() {
+            marks.check(&of_view.camera)?;
+        }
+        Ok(of_view)
+    }
+
+    /// The picture of a frame that all processes drew.
+    fn finished(&self, rendered: (Frame, Report), of_view: SceneOfView) -> Result<Picture> {
+        let SceneOfView { scene, camera, settings, report, read, key, is_share } = of_view;
+        let picture = Picture::of(&scene, &settings, rendered, (camera, report), (read, key));
+        // The reasons of a share are not those of all surfels.
+        let unseen = picture.unseen.filter(|_| !is_share);
+        let picture = Picture { unseen, ..picture };
+        picture.with_heights(scene.up.axis(), self.maps()).marked(self.options.marks.marks())
+    }
+}
+
+/// Fails unless all processes draw the same picture of the same scene.
+fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
+    // A header has no kernels, as files of parts carry none.
+    let Settings { sources, own_kernel, accumulator, .. } = &subject.settings;
+    let kernels = format!("{sources:?} {own_kernel:?} {accumulator:?}");
+    let own = encoded(subject).into_iter().chain(kernels.into_bytes());
+    // FNV-1a of 64 bits.
+    let hash =
+        own.fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    let all = gathered(network, &hash.to_le_bytes())?;
+    match all.iter().position(|other| *other != all[0]) {
+        None => Ok(()),
+        Some(other) => Err(Error::Usage(format!(
+            "process {other} has another scene, camera or options than process 0: give all processes the same inputs"
+        ))),
+    }
+}
+
+/// The device of this process, with the least limit of buffers of all: bands follow from it.
+fn common_backend(own: &Backend, network: &dyn Network) -> Result<Backend> {
+    let limit = if let Backend::Gpu { gpu, .. } = own { gpu.buffer_limit() } else { 0 };
+    let all = gathered(network, &limit.to_le_bytes())?;
+    let of = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes);
+    let least = all.iter().map(of).min().unwrap_or(0);
+    match own {
+        Backend::Gpu { gpu, sources } => {
+            let gpu = Box::new((**gpu).clone().with_buffer_limit(least));
+            Ok(Backend::Gpu { gpu, sources: sources.clone() })
+        }
+        Backend::Reference => Ok(Backend::Reference),
+    }
+}

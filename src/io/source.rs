@@ -63,6 +63,15 @@ impl Source {
         }
     }
 
+    /// Frees the memory of bytes that were received from a server.
+    pub fn forget(&self) {
+        match self {
+            Self::File(_) => {}
+            #[cfg(feature = "http")]
+            Self::Remote(remote) => remote.forget(),
+        }
+    }
+
     /// Fails if any earlier read from a server failed. Readers that take an error of reading for
     /// damage call it in the end.
     pub fn check(&self) -> io::Result<()> {

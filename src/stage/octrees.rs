@@ -124,6 +124,9 @@ impl Octrees {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
             points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
         }
+        // Tiles that a flight has passed would fill the memory.
+        let passed = self.files.iter().zip(&nodes).filter(|(_, nodes)| nodes.is_empty());
+        passed.filter_map(|(file, _)| file.as_ref()).for_each(Copc::forget);
         let key = Coloring::of(&request.scene.options.colors, self.ends).settle(&mut points)?;
         let mut made = scene_of(request, points, progress)?;
         self.end(&mut made.0, &nodes);

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Request;
 use super::files::Files;
+use crate::address;
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
 use crate::io::vpc::Tile;
@@ -23,8 +24,10 @@ const TOGETHER: usize = 8;
 /// more digits.
 const ROUNDED: f64 = 1e-12;
 
-/// Tolerance of stated bounds, world units: some programs write coordinates with 3 decimals.
+/// Tolerance of stated bounds, world units: some programs write coordinates with 3 decimals. It is
+/// at most a ten-thousandth of a tile, whose units may be degrees.
 const DECIMALS: f64 = 2e-3;
+const OF_TILE: f64 = 1e-4;
 
 /// COPC files with stated bounds.
 pub(super) struct Tiles(Vec<(Tile, Bounds)>);
@@ -39,7 +42,7 @@ impl Tiles {
             return None;
         }
         let is_copc = |tile: &Tile| {
-            let path = crate::address::shown(&tile.path).to_string_lossy().to_ascii_lowercase();
+            let path = address::shown(&tile.path).to_string_lossy().to_ascii_lowercase();
             path.ends_with(".copc.laz")
         };
         let stated = |tile: &Tile| {
@@ -127,7 +130,7 @@ impl Tiles {
         }
         let own = file.octree.bounds;
         let largest = own.min.abs().max(own.max.abs()).max_element();
-        let tolerance = DVec3::splat((ROUNDED * largest).max(DECIMALS));
+        let tolerance = DVec3::splat((ROUNDED * largest).max(DECIMALS.min(OF_TILE * bounds.extent().max_element())));
         let within = own.min.cmpge(bounds.min - tolerance).all() && own.max.cmple(bounds.max + tolerance).all();
         if !own.is_empty() && !within {
             return Err(wrong(format!(

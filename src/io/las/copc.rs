@@ -111,6 +111,11 @@ impl Copc {
         self.count
     }
 
+    /// Frees the memory of bytes that were received from a server and may be read again.
+    pub fn forget(&self) {
+        self.source.forget();
+    }
+
     /// Adds the path of the file to an error.
     pub(super) fn fault(&self, fault: Fault) -> Error {
         fault.of(&self.path)

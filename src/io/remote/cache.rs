@@ -60,6 +60,12 @@ impl Cache {
         self.kept -= self.ranges.remove(&start).map_or(0, |removed| removed.bytes.len());
     }
 
+    /// Drops all ranges.
+    pub fn clear(&mut self) {
+        self.ranges.clear();
+        self.kept = 0;
+    }
+
     /// Drops ranges until a quarter of the limit is free, but not the one at `newest`.
     fn drop_oldest(&mut self, newest: u64) {
         let mut by_use: Vec<(u64, u64)> = self.ranges.iter().map(|(start, range)| (range.used, *start)).collect();
@@ -135,5 +141,7 @@ mod tests {
         assert!(cache.kept <= MOST_KEPT && cache.at(0).is_some() && cache.at(1 << 20).is_none());
         assert!(cache.at(most << 20).is_some());
         assert_eq!(cache.kept, cache.ranges.values().map(|range| range.bytes.len()).sum::<usize>());
+        cache.clear();
+        assert!(cache.kept == 0 && cache.at(most << 20).is_none());
     }
 }

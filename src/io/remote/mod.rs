@@ -164,6 +164,11 @@ impl Remote {
         self.shared.receive(joined(missing).into_iter().take_while(kept).collect())
     }
 
+    /// Frees the memory of received bytes. They are asked for again if they are read again.
+    pub fn forget(&self) {
+        self.shared.cache().clear();
+    }
+
     /// Fails with the first error of any earlier read.
     pub fn check(&self) -> io::Result<()> {
         self.shared.check()

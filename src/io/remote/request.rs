@@ -250,7 +250,11 @@ fn sorted(failed: ureq::Error, patience: Patience) -> Failure {
                 late(format!("the server sent nothing for {}", seconds(patience.stall)))
             }
             kind if lost(kind) => Failure::Passing(error("the server ended the connection"), None),
-            kind => Failure::Final(io::Error::new(kind, failed.to_string())),
+            // As such come the faults of certificates.
+            io::ErrorKind::InvalidData => Failure::Final(error(format!(
+                "its encryption is not accepted, {failed}: SSL_CERT_FILE may name a file of certificates"
+            ))),
+            _ => Failure::Final(error(failed.to_string())),
         },
         ureq::Error::Protocol(_) => {
             Failure::Passing(error("the server does not speak HTTP, or ended the answer"), None)

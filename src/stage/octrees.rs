@@ -72,8 +72,8 @@ impl Octrees {
         Ok(Some(made))
     }
 
-    /// Reads the coarsest nodes of the files with these indices. The first ones that are read decide
-    /// what colours mean in all nodes.
+    /// Reads the coarsest nodes of the files with these indices. The first ones that are read
+    /// decide what colours mean in all nodes.
     fn coarsest(&mut self, request: &Request<'_>, of: &[usize], progress: &dyn Progress) -> Result<Vec<Points>> {
         let mut nodes = vec![Vec::new(); self.files.len()];
         of.iter().for_each(|&index| nodes[index] = self.octrees[index].overview());

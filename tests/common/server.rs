@@ -47,7 +47,7 @@ pub enum Manner {
     Longer(u64),
 }
 
-/// What was sent in answer to a request.
+/// The answer to a request.
 #[derive(Clone, Debug)]
 pub struct Sent {
     pub asked: Asked,
@@ -114,7 +114,7 @@ impl Server {
         self.at.to_string()
     }
 
-    /// What was sent so far; the record is emptied.
+    /// The answers so far; the record is emptied.
     pub fn sent(&self) -> Vec<Sent> {
         std::mem::take(&mut self.state.log.lock().unwrap())
     }

@@ -192,9 +192,17 @@ fn las_and_ply_are_read_in_place() {
         points.positions.len()
     );
     let ply = [header.into_bytes(), rows].concat();
+    let mut las = las::Writer::from_path(folder.path().join("a.las"), las::Header::default()).unwrap();
+    for &[x, y, z] in &points.positions {
+        las.write_point(las::Point { x: x - 1000.0, y: y - 2000.0, z, ..las::Point::default() }).unwrap();
+    }
+    las.close().unwrap();
+    drop(las);
     std::fs::write(folder.path().join("a.ply"), &ply).unwrap();
-    let server = Server::new([("a.ply".to_owned(), ply), ("a.copc.laz".to_owned(), made.bytes.clone())]);
-    for name in ["a.ply", "a.copc.laz"] {
+    let las = std::fs::read(folder.path().join("a.las")).unwrap();
+    let files = [("a.ply", ply), ("a.las", las), ("a.copc.laz", made.bytes.clone())];
+    let server = Server::new(files.map(|(name, bytes)| (name.to_owned(), bytes)));
+    for name in ["a.ply", "a.las", "a.copc.laz"] {
         let here = io::read(&folder.path().join(name), &()).unwrap();
         assert!(io::read(Path::new(&server.address(name)), &()).unwrap() == here, "{name}");
         let longest = server.sent().iter().map(|sent| sent.bytes).max().unwrap();
@@ -237,7 +245,7 @@ fn lost_connections_are_made_again() {
             assert!(read.as_deref() == Ok(&noise[..]), "{name}, request {which}: {:?}", read.map(|read| read.len()));
         }
     }
-    // What arrived before the connection was lost is not sent again.
+    // Bytes that arrived before the connection was lost are not sent again.
     let server = Server::with(a(&noise), |asked| if asked.number == 1 { Manner::Die(10_000) } else { Manner::Well });
     let mut read = Vec::new();
     ranges(&server.address("a")).unwrap().read_to_end(&mut read).unwrap();

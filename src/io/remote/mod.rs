@@ -62,8 +62,8 @@ impl Patience {
 
 impl Patience {
     /// The limits that the environment asks for: 30 s without a byte, or as many as the variable
-    /// `EPSPLAT_HTTP_TIMEOUT` says, and at most 10 s for a connection. TCP sends a lost packet again
-    /// after 1, 2, 4 and 8 s, so 30 s outlast four losses in a row.
+    /// `EPSPLAT_HTTP_TIMEOUT` says, and at most 10 s for a connection. TCP sends a lost packet
+    /// again after 1, 2, 4 and 8 s, so 30 s outlast four losses in a row.
     ///
     /// # Errors
     ///

@@ -19,8 +19,8 @@ const TRIES: u32 = 4;
 /// one is four times as long.
 const FIRST_PAUSE: u32 = 120;
 
-/// Slowest server that is waited for, bytes per second, counted over an answer. It ends an answer of
-/// single bytes, none of which stalls.
+/// Slowest server that is waited for, bytes per second, counted over an answer. It ends an answer
+/// of single bytes, none of which stalls.
 const SLOWEST: f64 = 4096.0;
 
 /// A file on a server, and how long it is waited for.

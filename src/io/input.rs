@@ -92,11 +92,7 @@ impl Input {
     /// The input as a file of this system. A file on a server is copied.
     pub(super) fn local(self) -> Result<Local> {
         let Self { source, length, path, .. } = self;
-        let file = match source {
-            Source::File(file) => file,
-            #[cfg(feature = "http")]
-            Source::Remote(remote) => remote.copied().map_err(|error| Error::read(&path, error))?,
-        };
+        let file = source.into_file().map_err(|error| Error::read(&path, error))?;
         Ok(Local { file, length, path })
     }
 

@@ -27,6 +27,15 @@ impl Source {
         }
     }
 
+    /// The file, or a copy of the one on a server: an unnamed temporary file.
+    pub fn into_file(self) -> io::Result<File> {
+        match self {
+            Self::File(file) => Ok(file),
+            #[cfg(feature = "http")]
+            Self::Remote(remote) => remote.copied(),
+        }
+    }
+
     /// Another source of the same bytes. Its position may be shared: seek before reading.
     pub fn try_clone(&self) -> io::Result<Self> {
         Ok(match self {

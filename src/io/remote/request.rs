@@ -5,9 +5,9 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use ureq::http::{HeaderMap, Response, StatusCode, header};
+use ureq::http::{HeaderMap, Response, StatusCode, Uri, header};
 use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
-use ureq::{Agent, Body};
+use ureq::{Agent, Body, Proxy};
 
 use super::answer::{self, Version, body_length, check_plain, checked, error, refusal, says_empty};
 use super::{CONNECTIONS, Patience};
@@ -54,8 +54,7 @@ impl From<io::Error> for Failure {
 
 impl Server {
     pub fn new(address: &str, patience: Patience) -> io::Result<Self> {
-        let is_encrypted = address.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:"));
-        Ok(Self { agent: agent(is_encrypted, patience)?, address: address.to_owned(), patience })
+        Ok(Self { agent: agent(Kind::of(address), patience)?, address: address.to_owned(), patience })
     }
 
     /// Asks for the first `most` bytes.
@@ -172,24 +171,42 @@ impl Server {
     }
 }
 
+/// A kind of addresses that share a client.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Kind {
+    /// Connections are encrypted, and no redirect may give that up.
+    is_encrypted: bool,
+    /// The server is this machine, so no proxy is asked.
+    is_here: bool,
+}
+
+impl Kind {
+    fn of(address: &str) -> Self {
+        let is_encrypted = address.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:"));
+        let parsed = address.parse::<Uri>().ok();
+        let host = parsed.as_ref().and_then(Uri::host).unwrap_or_default();
+        Self { is_encrypted, is_here: ["127.0.0.1", "localhost", "[::1]"].contains(&host) }
+    }
+}
+
 /// The clients that were made, with what they are for. Connections stay open in a client, and files
 /// of one server share them.
-static AGENTS: Mutex<Vec<(bool, Patience, Agent)>> = Mutex::new(Vec::new());
+static AGENTS: Mutex<Vec<(Kind, Patience, Agent)>> = Mutex::new(Vec::new());
 
-/// The client for addresses of this kind. One for encrypted addresses follows no redirect that
-/// gives up the encryption.
-fn agent(is_encrypted: bool, patience: Patience) -> io::Result<Agent> {
+/// The client for addresses of this kind.
+fn agent(kind: Kind, patience: Patience) -> io::Result<Agent> {
     let mut agents = AGENTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = agents.iter().find(|(kind, limits, _)| (*kind, *limits) == (is_encrypted, patience));
+    let known = agents.iter().find(|(own, limits, _)| (*own, *limits) == (kind, patience));
     if let Some((.., agent)) = known {
         return Ok(agent.clone());
     }
     // An address without encryption may redirect to one with it.
-    let roots = if is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
+    let roots = if kind.is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
     let config = Agent::config_builder()
         .tls_config(TlsConfig::builder().root_certs(roots).build())
         .http_status_as_error(false)
-        .https_only(is_encrypted)
+        .https_only(kind.is_encrypted)
+        .proxy(Proxy::try_from_env().filter(|_| !kind.is_here))
         .user_agent(concat!("epsplat/", env!("CARGO_PKG_VERSION")))
         .accept_encoding("identity")
         .max_idle_connections(4 * CONNECTIONS)
@@ -200,7 +217,7 @@ fn agent(is_encrypted: bool, patience: Patience) -> io::Result<Agent> {
         .timeout_per_read(Some(patience.stall))
         .timeout_per_write(Some(patience.stall));
     let agent: Agent = config.build().into();
-    agents.push((is_encrypted, patience, agent.clone()));
+    agents.push((kind, patience, agent.clone()));
     Ok(agent)
 }
 
@@ -293,5 +310,23 @@ impl Read for Paced {
             return Err(io::Error::new(io::ErrorKind::TimedOut, "the server sends too slowly"));
         }
         Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_have_kinds() {
+        for (address, is_encrypted, is_here) in [
+            ("http://127.0.0.1:80/a", false, true),
+            ("HTTPS://me:secret@localhost/a?b", true, true),
+            ("http://[::1]:8080/a", false, true),
+            ("https://example.org/127.0.0.1", true, false),
+            ("http://127.0.0.1.example.org/", false, false),
+        ] {
+            assert!(Kind::of(address) == Kind { is_encrypted, is_here }, "{address}");
+        }
     }
 }

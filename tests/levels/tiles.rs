@@ -188,7 +188,7 @@ fn tiles_that_are_not_what_is_stated_are_refused() {
     let (name, made) = &tiles[0];
     let whole = feature(&format!("./{name}"), made);
     let output = folder.path("a.png");
-    let mut check = |text_of: String, said: &str| {
+    let check = |text_of: String, said: &str| {
         let vpc = folder.file("bad.vpc", text_of);
         let view = view(0);
         let mut run = vec!["render", text(&vpc), "--lod", "2px", "-o", text(&output)];
@@ -203,7 +203,7 @@ fn tiles_that_are_not_what_is_stated_are_refused() {
     );
     let fewer = whole.replace(&format!("\"pc:count\": {}", made.points), "\"pc:count\": 7");
     check(collection(&[fewer]), "and the virtual point cloud states 7: build the .vpc file again");
-    check(collection(&[whole.clone()])[..200].to_owned(), "it is not a virtual point cloud in JSON");
+    check(collection(std::slice::from_ref(&whole))[..200].to_owned(), "it is not a virtual point cloud in JSON");
     check(collection(&[whole.replace("href", "link")]), "names no file (assets.data.href)");
     check(collection(&[whole.replace("\"proj:bbox\": [", "\"proj:bbox\": [null, ")]), "are no box of 4 or 6 numbers");
     check(collection(&[whole.replace(".copc.laz\"}}", ".copc.txt\"}}")]), "cannot read ");

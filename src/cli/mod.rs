@@ -27,6 +27,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use epsplat::low_level::network::mpi::Job;
 use epsplat::{Error, Result};
 use serde::Serialize;
 
@@ -74,7 +75,12 @@ enum Command {
 /// Parses the arguments, runs the subcommand, and returns its exit code after printing any error.
 pub fn run() -> ExitCode {
     signals::watch();
-    let outcome = match Arguments::parse().command {
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        // All processes of a job have the same arguments, and the first one prints what is wrong.
+        let is_told = Job::of(|name| std::env::var(name).ok()).is_none_or(|job| job.rank == 0);
+        if is_told { error.exit() } else { std::process::exit(error.exit_code()) }
+    });
+    let outcome = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Merge(arguments) => merge::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

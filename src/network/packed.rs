@@ -12,6 +12,8 @@
 //!
 //! All integers are little-endian.
 
+use std::ops::Range;
+
 use super::blocks::{Blocks, marked, mask};
 
 /// Samples with values, in the order in which they are packed.
@@ -32,7 +34,11 @@ impl Packed {
     pub fn of(layout: Blocks, blocks: &[u32], all: &[u64], channels: usize) -> Self {
         let of_sample = |sample: usize| &all[sample * channels..(sample + 1) * channels];
         let has = |sample: usize| of_sample(sample).iter().any(|number| *number != 0);
-        let masks = blocks.iter().map(|block| (*block, mask(layout.samples(*block), has)));
+        let any = |samples: Range<usize>| {
+            all[samples.start * channels..samples.end * channels].iter().any(|number| *number != 0)
+        };
+        let used = blocks.iter().filter(|block| any(layout.samples(**block)));
+        let masks = used.map(|block| (*block, mask(layout.samples(*block), has)));
         let blocks: Vec<(u32, u64)> = masks.filter(|(_, mask)| *mask != 0).collect();
         let mut largest = vec![0; channels];
         let samples = || blocks.iter().flat_map(|(block, mask)| marked(layout.samples(*block), *mask));

@@ -10,9 +10,11 @@
 //! A process sends only the samples that its own surfels cover ([`packed`](super::packed)), so the
 //! bytes do not grow with the image where it is empty.
 
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::Blocks;
@@ -101,7 +103,7 @@ impl<'a> Reduction<'a> {
                 owned[owner].push(block);
             }
         }
-        owned.iter().map(|own| Packed::of(blocks, own, all, channels)).collect()
+        owned.par_iter().map(|own| Packed::of(blocks, own, all, channels)).collect()
     }
 
     /// Reduces what others sent for the pixels of this process, and notes which have values.
@@ -119,8 +121,12 @@ impl<'a> Reduction<'a> {
         let (width, samples) = (rows.width as usize, self.samples(rows));
         let mut state = self.state();
         let own = blocks.of(rows).filter(|(_, owner)| *owner == self.network.rank());
-        for sample in own.flat_map(|(block, _)| blocks.samples(block)) {
-            if all[sample * channels..(sample + 1) * channels].iter().any(|number| *number != 0) {
+        let own = own.map(|(block, _)| blocks.samples(block));
+        let any = |samples: &Range<usize>| {
+            all[samples.start * channels..samples.end * channels].iter().any(|number| *number != 0)
+        };
+        for sample in own.filter(any).flatten() {
+            if any(&(sample..sample + 1)) {
                 let row = (rows.first as usize + sample / width) / samples.down as usize;
                 let pixel = row * self.width + sample % width / samples.across as usize;
                 let word = pixel / 64;

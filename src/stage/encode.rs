@@ -1,7 +1,7 @@
 //! Frames that stay on the device.
 
 use super::Renderer;
-use super::renderer::Drawn;
+use super::drawn::Drawn;
 use crate::error::{Error, Result};
 use crate::render::{self, Backend, FrameLayout, Target, Ticket};
 use crate::scene::{self, Camera, Map};

@@ -8,6 +8,7 @@
 
 mod ahead;
 mod coloring;
+mod drawn;
 mod encode;
 mod extent;
 mod files;

@@ -6,12 +6,10 @@ use glam::DVec3;
 
 #[cfg(feature = "parts")]
 use super::ReadReport;
+use super::drawn::{Drawn, whole};
 use super::extent::Extent;
 use super::in_part::{Part, Parts};
-use super::whole::Whole;
-use super::{
-    Files, Inputs, Picture, Request, Scene, View, ViewReport, ahead, lens, levels, memory, overdraw, refined, tree,
-};
+use super::{Files, Inputs, Picture, Request, Scene, View, ViewReport, lens, memory, overdraw, refined};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Replacement};
@@ -50,24 +48,6 @@ struct How<'a> {
     first: Option<&'a View>,
     /// The share that it draws together with other processes, and the view.
     share: Option<(Share, &'a View)>,
-}
-
-/// The data that views are drawn from.
-pub(super) enum Drawn {
-    /// Surfels and triangles that all views share.
-    Whole {
-        scene: Arc<scene::Scene>,
-        guessed_up: bool,
-        /// The meaning of colours, if they show an attribute.
-        key: Option<ColorKey>,
-        renderer: Box<render::Renderer<Arc<scene::Scene>, Arc<Backend>>>,
-    },
-    /// Files of which each view reads a part.
-    Parts {
-        parts: Box<Parts>,
-        /// Whether the notes of the first view were given; later views would repeat them.
-        noted: bool,
-    },
 }
 
 /// The scene that a view shows, and how it is drawn.
@@ -423,34 +403,4 @@ pub(super) fn backend(device: &DeviceOptions, progress: &dyn Progress) -> Result
         }
         Err(error) => Err(error),
     }
-}
-
-/// Reads and prepares a scene that all views share, and returns it with the settings that suit it.
-fn whole(
-    request: &Request<'_>,
-    settings: Settings,
-    (backend, first): (&Arc<Backend>, Option<&View>),
-    progress: &dyn Progress,
-) -> Result<(Settings, Drawn)> {
-    let shared = request.share.filter(|(_, view)| settings.detail.is_finest() && !view.is_framed());
-    let shared = shared.map_or(Ok(None), |(share, _)| tree::share_of(request, share, progress))?;
-    let mut whole = match shared {
-        Some((scene, preparation)) => {
-            Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })
-        }
-        None => {
-            let read = |read: &ahead::Read<'_>| Request { read: Some(read), ..*request }.whole(progress);
-            ahead::compiling(request, &settings, first, backend, read)?
-        }
-    };
-    whole.preparation.notes().iter().for_each(|line| progress.note(line));
-    let settings = request.for_scene(settings, &whole.scene, progress)?;
-    if levels::lack(&whole.scene, &settings) {
-        whole = request.with_levels(whole, progress)?;
-    }
-    let renderer = render::Renderer::new(whole.scene.clone(), &settings, backend.clone())?;
-    renderer.kernel_faults().and_then(KernelFaults::sentence).iter().for_each(|line| progress.note(line));
-    let (scene, guessed_up) = (whole.scene.clone(), whole.preparation.guessed_up);
-    let key = whole.key.clone();
-    Ok((settings, Drawn::Whole { scene, guessed_up, key, renderer: Box::new(renderer) }))
 }

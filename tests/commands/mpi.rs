@@ -21,13 +21,19 @@ fn launchers() -> Vec<&'static str> {
     found
 }
 
-/// A launcher of `of` processes. It takes more processes than cores, and a container's only user.
+/// Open MPI takes more processes than cores, a container's only user, and a machine without ssh.
+const ENVIRONMENT: [(&str, &str); 5] = [
+    ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
+    ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+    ("OMPI_MCA_rmaps_base_oversubscribe", "true"),
+    ("OMPI_MCA_plm_rsh_agent", "sh"),
+    ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
+];
+
+/// A launcher of `of` processes.
 fn launched(launcher: &str, of: usize) -> Command {
     let mut command = Command::new(launcher);
-    command.env("OMPI_ALLOW_RUN_AS_ROOT", "1").env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
-    command
-        .env("OMPI_MCA_rmaps_base_oversubscribe", "true")
-        .env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe");
+    command.envs(ENVIRONMENT);
     command.args(["-n", &of.to_string()]).stdin(Stdio::null());
     command
 }
@@ -61,7 +67,7 @@ fn any_number_of_processes_makes_the_bytes_of_one() {
         (&[&autzen, "--triangles", &bunny, "--size", "100x80", "--samples", "4", "--aov", "depth"], &[3]),
         (&[&bunny, "--mesh", "surfels", "--size", "90x90", "--shading", "phong", "--edl"], &[2]),
         // Nodes of the levels of detail that the view reads.
-        (&[&copc, "--lod", "4", "--size", "80x60", "--aov", "depth"], &[2]),
+        (&[&copc, "--lod", "4px", "--size", "80x60", "--aov", "depth"], &[2]),
         (&[&autzen, &bunny, "--size", "64x48", "--projection", "fisheye", "--eye", "0,0,300"], &[3]),
     ];
     for (number, (arguments, counts)) in pictures.iter().enumerate() {
@@ -163,7 +169,7 @@ fn views_are_dealt_to_processes() {
 /// Every failure ends all processes soon, with one sentence, exit code 1 or 2, and no picture.
 #[test]
 fn a_process_that_fails_ends_the_job_with_one_sentence() {
-    let (autzen, bunny) = (format!("{DATA}/autzen.laz"), format!("{DATA}/bunny.obj"));
+    let autzen = format!("{DATA}/autzen.laz");
     for launcher in launchers() {
         let folder = Folder::new();
         let image = folder.path("a.png");
@@ -184,10 +190,11 @@ fn a_process_that_fails_ends_the_job_with_one_sentence() {
         assert_eq!(missing.status.code(), Some(1));
         assert!(start.elapsed() < Duration::from_secs(10) && !image.exists());
 
-        let cases: [(&[&str], i32, &str); 5] = [
+        let cases: [(&[&str], i32, &str); 6] = [
             (&[&autzen, "--composite", "layers", "--opacity", "0.5"], 2, "--composite"),
             (&[&autzen, "--blend", "nearest"], 2, "--blend"),
-            (&[&bunny, "--lod", "4"], 2, "--lod"),
+            (&[&autzen, "--lod", "4px"], 2, "--lod"),
+            (&[&autzen, "--lod", "4"], 2, "--lod"),
             (&[&autzen, "--pixel-size", "5"], 2, "--pixel-size"),
             (&[&autzen, "--backend", "reference"], 2, "adapter"),
         ];
@@ -250,6 +257,28 @@ fn processes_with(argument: &str) -> Vec<u32> {
         program.ends_with(b"epsplat") && words.any(|word| word == argument.as_bytes())
     };
     ids.filter(is_drawing).collect()
+}
+
+/// The lines of the guide.
+#[test]
+fn the_job_of_the_guide_makes_the_bytes_of_one_process() {
+    if launchers().is_empty() {
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = std::fs::read_to_string(root.join("src/guide/machines.md")).unwrap();
+    let mut blocks = guide.split("```bash\n").skip(1).map(|block| block.split("```").next().unwrap());
+    let script = blocks.find(|block| block.contains("mpirun")).unwrap();
+    let folder = Folder::new();
+    std::os::unix::fs::symlink(root.join("data"), folder.path("data")).unwrap();
+    std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_epsplat"), folder.path("epsplat")).unwrap();
+    let own = folder.path("data").parent().unwrap().to_owned();
+    let path = format!("{}:{}", own.display(), std::env::var("PATH").unwrap());
+    let mut shell = Command::new("sh");
+    let output = shell.args(["-e", "-c", script]).current_dir(&own).envs(ENVIRONMENT).env("PATH", path).output();
+    let output = output.unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(folder.path("together.exr").exists());
 }
 
 /// Without a library, a job says so; without a job, none is needed.

@@ -17,7 +17,8 @@ use crate::progress::Progress;
 use crate::render::exchange::Exchange;
 use crate::render::{self, Backend};
 use crate::scene::{Camera, Scene, Share};
-use crate::stage::renderer::{Drawn, Renderer};
+use crate::stage::drawn::Drawn;
+use crate::stage::renderer::Renderer;
 use crate::stage::{Files, Inputs, Request, View, refined};
 
 impl Renderer {

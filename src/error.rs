@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::address;
+
 /// The library's result.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -111,9 +113,9 @@ fn of_process(rank: usize) -> String {
 }
 
 /// Formats a path for a message, without control characters. Paths may come from a file's content,
-/// and a terminal would obey control characters in them.
+/// and a terminal would obey control characters in them. Addresses lose their secrets.
 fn shown(path: &Path) -> String {
-    path.display().to_string().replace(char::is_control, "\u{fffd}")
+    address::shown(path).display().to_string().replace(char::is_control, "\u{fffd}")
 }
 
 impl Error {

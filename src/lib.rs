@@ -44,6 +44,7 @@
 //! # Ok::<(), epsplat::Error>(())
 //! ```
 
+mod address;
 mod error;
 pub mod guide;
 pub mod io;

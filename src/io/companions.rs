@@ -51,14 +51,16 @@ fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<Pat
     // Names are relative to the folder that readers use; for standard input this is the current
     // folder.
     let own = if path == Path::new("-") { Path::new("") } else { path };
+    // Only files of this system are searched for names.
+    let Some(source) = input.source.file() else { return Ok(Vec::new()) };
     let named = match input.format {
-        Format::Ply => ply::companions(&mut input.file, own),
-        Format::Obj => obj::companions(&mut input.file, own),
+        Format::Ply => ply::companions(source, own),
+        Format::Obj => obj::companions(source, own),
         #[cfg(feature = "gltf")]
-        Format::Gltf => super::gltf::companions(&mut input.file, own),
+        Format::Gltf => super::gltf::companions(source, own),
         _ => Vec::new(),
     };
-    let ready = if stream { input.keep(path) } else { input.file.rewind() };
+    let ready = if stream { input.keep(path) } else { input.source.rewind() };
     ready.map_err(|error| Error::read(path, error))?;
     Ok(named)
 }

@@ -12,6 +12,7 @@ use crate::io::about::{About, Attribute, Role};
 use crate::io::color_range::{Numbers, RawColors, Run, Shades, Values};
 use crate::io::dimensions::Collector;
 use crate::io::fault::{self, Fault, Unread, reserve, surviving};
+use crate::io::input::Local;
 use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
@@ -37,7 +38,7 @@ const MOST_ATTRIBUTES: usize = 64;
 /// [`Error::Malformed`](crate::Error::Malformed) where the file is not E57, ends early, fails its
 /// checksums or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let opened = surviving(|| {
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
         let mut unread = Unread::default();

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use super::off;
 use super::values::BYTE_ORDER_MARK;
+use crate::address;
 
 /// A format of points or meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +87,17 @@ impl Format {
 
     /// The formats that hold meshes.
     pub const MESHES: &[Self] = &[Self::Obj, Self::Ply, Self::Stl, Self::Off, Self::Gltf];
+
+    /// Whether a name is that of a LAS file.
+    pub(crate) fn is_las(path: &Path) -> bool {
+        Self::of_name(&address::shown(path)) == Some(Self::Las)
+    }
+
+    /// Whether the reader of a remote file of this format asks for parts of it.
+    #[cfg(feature = "http")]
+    pub(super) fn is_read_in_part(self) -> bool {
+        matches!(self, Self::Las | Self::Ply)
+    }
 
     /// The names in [`Self::READ`] as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
     pub fn sentence() -> String {

@@ -1,13 +1,14 @@
-//! Inputs of readers: a file, or a copy of a stream that is not seekable.
+//! Inputs of readers: a file, a file on a server, or a copy of a stream that is not seekable.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::Format;
+use super::source::Source;
 use super::values::text_of;
-use crate::{Error, Result};
+use super::{Format, vpc};
+use crate::{Error, Result, address};
 
 /// The number of first bytes that decide the format: all in front of the triangles of a binary STL
 /// file.
@@ -19,14 +20,24 @@ pub const MOST_COPIED: u64 = 1 << 32;
 /// An open, seekable file of known length and format.
 #[derive(Debug)]
 pub struct Input {
-    pub(super) file: File,
+    pub(super) source: Source,
     /// Length in bytes.
     pub(super) length: u64,
-    /// The path, for errors. Files that the input refers to are looked up beside it.
+    /// The path, for errors; an address without its secrets. Files that the input refers to are
+    /// looked up beside it.
     pub(super) path: PathBuf,
     pub(super) format: Format,
     /// Whether the file is a copy of a stream, which cannot be read again.
     copied: bool,
+}
+
+/// An input in a file of this system.
+pub(super) struct Local {
+    pub file: File,
+    /// Length in bytes.
+    pub length: u64,
+    /// The path, as in [`Input`].
+    pub path: PathBuf,
 }
 
 /// Copies of streams that were inspected but not read yet, with the paths that will open them.
@@ -37,12 +48,15 @@ fn looked_at() -> MutexGuard<'static, Vec<(PathBuf, Input)>> {
 }
 
 impl Input {
-    /// Opens the file at `path`, or standard input for `-`, and determines its format.
+    /// Opens the file at `path`, or standard input for `-`, and determines its format. A path that
+    /// begins with `http://` or `https://` is the address of a file on a server.
     ///
     /// The format is `format` if given, else that of the file's extension (upper or lower case),
     /// else that of its first bytes. The first bytes overrule the extensions of text: a PLY file
     /// may be called `.txt`. Pipes are copied to an unnamed temporary file, which is
-    /// deleted with the input. Devices are refused.
+    /// deleted with the input. So are files on servers, except LAS and PLY files of servers that
+    /// send ranges of bytes: the readers of these ask for the ranges that they need. Devices are
+    /// refused.
     ///
     /// # Errors
     ///
@@ -55,8 +69,12 @@ impl Input {
         }
         drop(looked_at);
         let standard = path == Path::new("-");
-        let called = if standard { Path::new("standard input") } else { path };
-        let of_name = if standard { None } else { Format::of_name(path) };
+        let shown = address::shown(path);
+        let called = if standard { Path::new("standard input") } else { &*shown };
+        if vpc::is_one(called) {
+            return Err(Error::malformed(called, "it is a virtual point cloud, and one file is needed: name a tile"));
+        }
+        let of_name = if standard { None } else { Format::of_name(called) };
         // Text of any kind may have the extension of a table.
         let (certain, likely) = match of_name {
             Some(Format::Xyz) => (format, of_name),
@@ -66,10 +84,22 @@ impl Input {
         opened.into_input(called, certain, likely)
     }
 
+    /// Whether the input is a copy of a stream.
+    pub(crate) fn is_copy(&self) -> bool {
+        self.copied
+    }
+
+    /// The input as a file of this system. A file on a server is copied.
+    pub(super) fn local(self) -> Result<Local> {
+        let Self { source, length, path, .. } = self;
+        let file = source.into_file().map_err(|error| Error::read(&path, error))?;
+        Ok(Local { file, length, path })
+    }
+
     /// Rewinds the file. If it is a copy of a stream, it is stored for the next call that opens
     /// `path`, because the stream itself is consumed; otherwise it is closed.
-    pub(super) fn keep(mut self, path: &Path) -> io::Result<()> {
-        self.file.rewind()?;
+    pub(crate) fn keep(mut self, path: &Path) -> io::Result<()> {
+        self.source.rewind()?;
         if self.copied {
             looked_at().push((path.to_owned(), self));
         }
@@ -111,10 +141,17 @@ const MOST_TEXT: u64 = 1 << 28;
 ///
 /// [`Error::Read`] for a device, for more than 256 MiB, and where the system cannot read.
 pub(crate) fn text(path: &Path) -> Result<String> {
+    let start = || match address::of(path) {
+        Some(address) => remote_start(address, MOST_TEXT + 1),
+        None => {
+            check_kind(&std::fs::metadata(path)?)?;
+            let mut bytes = Vec::new();
+            File::open(path)?.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        }
+    };
     let read = || {
-        check_kind(&std::fs::metadata(path)?)?;
-        let mut bytes = Vec::new();
-        File::open(path)?.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
+        let bytes = start()?;
         if bytes.len() as u64 > MOST_TEXT {
             return Err(io::Error::new(
                 io::ErrorKind::FileTooLarge,
@@ -137,12 +174,31 @@ pub(crate) fn standard_input() -> io::Result<File> {
 enum Opened {
     File(File, u64),
     Stream(Box<dyn Read>),
+    #[cfg(feature = "http")]
+    Remote(super::remote::Remote),
+}
+
+#[cfg(feature = "http")]
+use super::remote::start_of as remote_start;
+
+#[cfg(not(feature = "http"))]
+fn remote_start(_: &str, _: u64) -> io::Result<Vec<u8>> {
+    Err(without_http())
+}
+
+/// The error for an address in a build that cannot ask servers.
+#[cfg(not(feature = "http"))]
+fn without_http() -> io::Error {
+    io::Error::new(io::ErrorKind::Unsupported, "this build reads no remote files: build with '--features http'")
 }
 
 impl Opened {
     fn of(path: &Path, standard: bool) -> io::Result<Self> {
         if standard {
             return Self::standard();
+        }
+        if let Some(address) = address::of(path) {
+            return Self::remote(address);
         }
         // A device is not even opened, because that may have side effects.
         let there = std::fs::metadata(path)?;
@@ -154,6 +210,21 @@ impl Opened {
             return Ok(Self::File(file, metadata.len()));
         }
         Ok(Self::Stream(Box::new(file)))
+    }
+
+    #[cfg(feature = "http")]
+    fn remote(address: &str) -> io::Result<Self> {
+        use super::remote::{self, Patience, Remote};
+        Ok(match Remote::open(address, Patience::of_environment()?)? {
+            remote::Opened::Ranges(remote) => Self::Remote(remote),
+            remote::Opened::Whole(_, Some(length)) if length > MOST_COPIED => return Err(remote::too_long()),
+            remote::Opened::Whole(bytes, _) => Self::Stream(bytes),
+        })
+    }
+
+    #[cfg(not(feature = "http"))]
+    fn remote(_: &str) -> io::Result<Self> {
+        Err(without_http())
     }
 
     #[cfg(unix)]
@@ -180,8 +251,7 @@ impl Opened {
             let likely = likely.filter(|_| Format::unread(path, start).is_none());
             Format::of_start(start).or(likely).ok_or_else(|| unknown(path, start))
         };
-        let copied = matches!(self, Self::Stream(_));
-        let (file, length, format) = match self {
+        let (source, length, format, copied) = match self {
             Self::File(mut file, length) => {
                 let format = match named {
                     Some(format) => format,
@@ -191,7 +261,20 @@ impl Opened {
                         detected(&start)?
                     }
                 };
-                (file, length, format)
+                (Source::File(file), length, format, false)
+            }
+            #[cfg(feature = "http")]
+            Self::Remote(remote) => {
+                remote.read_at(0, START, &mut start).map_err(failed)?;
+                let format = named.map_or_else(|| detected(&start), Ok)?;
+                let length = remote.length();
+                if format.is_read_in_part() {
+                    (Source::Remote(remote), length, format, false)
+                } else if let Some(what) = format.fault_of_start(&start) {
+                    return Err(Error::malformed(path, what));
+                } else {
+                    (Source::File(remote.copied().map_err(failed)?), length, format, true)
+                }
             }
             Self::Stream(mut stream) => {
                 // The format is checked before copying, as a stream of other data may have no end.
@@ -200,11 +283,11 @@ impl Opened {
                 if let Some(what) = format.fault_of_start(&start) {
                     return Err(Error::malformed(path, what));
                 }
-                let (file, length) = self::copied(&start, stream, MOST_COPIED).map_err(failed)?;
-                (file, length, format)
+                let (file, length) = copied(&start, stream, MOST_COPIED).map_err(failed)?;
+                (Source::File(file), length, format, true)
             }
         };
-        Ok(Input { file, length, path: path.to_owned(), format, copied })
+        Ok(Input { source, length, path: path.to_owned(), format, copied })
     }
 }
 
@@ -222,7 +305,7 @@ fn unknown(path: &Path, start: &[u8]) -> Error {
 
 /// Copies a stream to a temporary file: the bytes `start`, which are already read, and the `rest`;
 /// at most `most` bytes in all. Returns the file and its length.
-fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
+pub(super) fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
     let no_room = |error: io::Error| {
         let folder = std::env::temp_dir();
         io::Error::new(

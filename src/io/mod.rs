@@ -39,6 +39,9 @@ pub mod ply;
 pub mod png;
 pub mod points;
 mod polygon;
+#[cfg(feature = "http")]
+pub mod remote;
+pub mod source;
 pub mod stl;
 pub mod text;
 pub mod texture;
@@ -46,6 +49,7 @@ pub(crate) mod textures;
 mod tree;
 pub(crate) mod triangles;
 mod values;
+pub mod vpc;
 pub mod write_behind;
 
 pub use about::About;

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use crate::io::about::About;
 use crate::io::fault::{self, Fault};
+use crate::io::input::Local;
 use crate::io::ply::Table;
 use crate::io::text::{Blocks, Separator, content, in_line, no_number, number};
 use crate::io::triangles::give_faces;
@@ -30,7 +31,7 @@ use crate::{Progress, Result};
 /// [`Error::Malformed`](crate::Error::Malformed) if a line does not fit its place, a polygon names
 /// a vertex that does not exist, or the file ends before what it promises.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let in_file = |fault: Fault| fault.of(&path);
     let decoded = encoding::decoded(BufReader::with_capacity(1 << 18, file), length);
     let (reader, length) = decoded.map_err(Fault::Io).map_err(in_file)?;

@@ -58,7 +58,7 @@ impl GeoKeys {
         let input = Input::open(path, format)?;
         let failed = |error| Error::read(path, error);
         let keys = match input.format {
-            Format::Las => las::geo_keys(input.file.try_clone().map_err(failed)?, input.length, &input.path)?,
+            Format::Las => las::geo_keys(input.source.try_clone().map_err(failed)?, input.length, &input.path)?,
             _ => None,
         };
         input.keep(path).map_err(failed)?;

@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use crate::io::about::{About, Attribute, Role};
 use crate::io::closed::distinct;
 use crate::io::fault::{self, Fault, reserve};
+use crate::io::input::Local;
 use crate::io::triangles::give_faces;
 use crate::io::values::{line_end, parse_number, shown};
 use crate::io::{Input, Paint, Points, ReadOptions, dimensions};
@@ -37,7 +38,7 @@ const LONGEST_WORD: usize = 1 << 10;
 /// [`Error::Malformed`](crate::Error::Malformed) if the file ends early, or if a word of a text is
 /// not the one that is needed.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let mut reader = BufReader::with_capacity(1 << 18, file);
     progress.begin(&format!("reading {}", fault::name(&path)), length);
     let read = soup(&mut reader, length, progress).and_then(|(soup, is_text)| {

@@ -1,6 +1,6 @@
 //! The camera: intrinsics in pixels and a rigid pose in world units.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{BVec2, DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::lens::Lens;
@@ -301,22 +301,35 @@ impl Camera {
     /// `at` is its centre in camera space. The test is against the planes through the eye and the
     /// edges of the image, so it also works for a ball that reaches the plane of the eye.
     pub(crate) fn is_beside_image(&self, at: DVec3, radius: f64, margin: DVec2) -> bool {
+        self.beside(at, radius, margin).iter().any(|sides| sides.any())
+    }
+
+    /// Whether a convex body, given by its corners in camera space, lies entirely beyond one edge
+    /// of the image, by more than `margin` pixels.
+    pub(crate) fn is_body_beside_image(&self, corners: &[DVec3], margin: DVec2) -> bool {
+        let sides = corners.iter().map(|corner| self.beside(*corner, 0.0, margin));
+        sides.reduce(|[a, b], [c, d]| [a & c, b & d]).is_some_and(|all| all.iter().any(|sides| sides.any()))
+    }
+
+    /// Whether a ball lies beyond the left and top edges, and beyond the right and bottom ones.
+    fn beside(&self, at: DVec3, radius: f64, margin: DVec2) -> [BVec2; 2] {
         // The edges of a lens's image are no planes.
         if self.optics.is_some() {
-            return false;
+            return [BVec2::FALSE; 2];
         }
         let (focal, principal) = (DVec2::new(self.fx, self.fy), DVec2::new(self.cx, self.cy));
         let size = DVec2::new(self.width.into(), self.height.into());
         let (before, after) = (principal + margin, size + margin - principal);
         let along = focal * at.truncate();
-        let out = match self.projection {
+        match self.projection {
             Projection::Pinhole => {
                 let reach = |edge: DVec2| (focal * focal + edge * edge).map(f64::sqrt) * radius;
-                (along + before * at.z).cmplt(-reach(before)) | (along - after * at.z).cmpgt(reach(after))
+                [(along + before * at.z).cmplt(-reach(before)), (along - after * at.z).cmpgt(reach(after))]
             }
-            Projection::Orthographic => (along + before).cmplt(-focal * radius) | (along - after).cmpgt(focal * radius),
-        };
-        out.any()
+            Projection::Orthographic => {
+                [(along + before).cmplt(-focal * radius), (along - after).cmpgt(focal * radius)]
+            }
+        }
     }
 }
 

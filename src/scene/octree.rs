@@ -103,12 +103,18 @@ impl PointOctree {
         (0..self.nodes.len()).filter(|&node| self.nodes[node].level < levels).collect()
     }
 
-    /// The sorted indices of the nodes that a picture needs.
+    /// Whether all points, and those around them that matter, lie outside the picture. False if
+    /// their bounding box is unknown.
+    fn is_beside(&self, camera: &Camera) -> bool {
+        !self.bounds.is_empty() && is_box_beside(&self.bounds, camera)
+    }
+
+    /// The sorted indices of the nodes that a picture needs; none if [`is_box_beside`] the picture.
     ///
     /// They are the nodes in view for which every ancestor is coarse enough to be refined: a disk
     /// with the ancestor's spacing as its radius has an image of at least `size` square pixels.
     fn taken(&self, camera: &Camera, size: f64) -> Vec<usize> {
-        let mut open: Vec<usize> = self.find(0, [0; 3]).into_iter().collect();
+        let mut open: Vec<usize> = self.find(0, [0; 3]).into_iter().filter(|_| !self.is_beside(camera)).collect();
         let mut taken = Vec::new();
         while let Some(index) = open.pop() {
             let node = &self.nodes[index];
@@ -141,6 +147,27 @@ impl PointOctree {
         taken.sort_unstable();
         taken
     }
+}
+
+/// Whether the points of an octree with this bounding box, world coordinates, are left out of a
+/// picture. They and what matters around them lie outside of it.
+///
+/// The test knows no more than the box, so a file is left out before it is opened. Programs that
+/// write COPC choose the spacing in the root so that 128 points lie along an edge of its cube.
+pub fn is_box_beside(bounds: &Bounds, camera: &Camera) -> bool {
+    const ALONG_EDGE: f64 = 128.0;
+    let reach = NEIGHBOURHOOD / ALONG_EDGE * bounds.extent().max_element();
+    let half = 0.5 * bounds.extent() + reach;
+    let in_camera = |place: DVec3| camera.rotation * (place - camera.eye);
+    let corners: [DVec3; 8] = std::array::from_fn(|at| {
+        let signs = [at & 1, at >> 1 & 1, at >> 2 & 1].map(|upper| 2.0 * upper as f64 - 1.0);
+        in_camera(bounds.center() + half * DVec3::from_array(signs))
+    });
+    let deepest = match camera.depth_is_distance() {
+        false => corners.iter().map(|corner| camera.depth(*corner)).fold(f64::NEG_INFINITY, f64::max),
+        true => camera.depth(in_camera(bounds.center())) + half.length(),
+    };
+    deepest < camera.near || camera.is_body_beside_image(&corners, DVec2::ONE)
 }
 
 /// The nodes of each octree that a picture with this `detail` needs.
@@ -263,6 +290,29 @@ mod tests {
         let away = self::camera(DVec3::new(0.0, 0.0, 9.0), lens);
         let turned = Camera { rotation: glam::DMat3::from_rotation_y(PI) * away.rotation, ..away };
         assert!(octree.taken(&turned, 0.0).is_empty());
+    }
+
+    #[test]
+    fn a_box_is_beside_the_image_if_all_of_it_is() {
+        let side = |x: f64| Bounds { min: DVec3::new(x, -1.0, -1.0), max: DVec3::new(x + 2.0, 1.0, 1.0) };
+        let (narrow, wide) = (Lens::OrthographicHeight(2.0), Lens::Fov(90.0));
+        let down = |lens| camera(DVec3::new(0.0, 0.0, 3.0), lens);
+        // The parallel view sees x from -1 to 1. Points up to 3/128 of the edge beyond it matter.
+        for (x, beside) in [(-1.0, false), (0.99, false), (1.04, false), (1.06, true), (-3.04, false), (-3.06, true)] {
+            assert_eq!(is_box_beside(&side(x), &down(narrow)), beside, "{x}");
+        }
+        // At the far side of the box the pinhole sees x up to 4. A ball around this box would reach
+        // into the view.
+        for (x, beside) in [(3.9, false), (4.2, true)] {
+            assert_eq!(is_box_beside(&side(x), &down(wide)), beside, "{x}");
+        }
+        // A box around the camera, and one behind it, where pixel coordinates change their signs.
+        let at = |z: f64| Bounds { min: DVec3::new(-1.0, -1.0, z - 1.0), max: DVec3::new(1.0, 1.0, z + 1.0) };
+        assert!(!is_box_beside(&at(3.0), &down(wide)) && is_box_beside(&at(4.2), &down(wide)));
+        // An octree whose points lie beside the image is not looked at, although its cube is seen.
+        let octree = PointOctree { bounds: side(1.06), ..full(3, 10) };
+        assert!(octree.taken(&down(narrow), 0.0).is_empty());
+        assert!(!PointOctree { bounds: side(0.9), ..octree }.taken(&down(narrow), 0.0).is_empty());
     }
 
     #[test]

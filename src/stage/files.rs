@@ -1,14 +1,16 @@
 //! The files of a scene. A folder stands for the files in it, and parts that cannot be read are
 //! left out with a note.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use crate::address;
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
 use crate::io::place::GeoKeys;
 use crate::io::ply::{Levels, Rows};
-use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions};
+use crate::io::vpc::{self, Tile};
+use crate::io::{self, ColorRules, Format, Input, Mesh, Points, ReadOptions, Up};
 use crate::options::{FormatOptions, InputOptions};
 use crate::progress::Progress;
 
@@ -22,11 +24,15 @@ pub struct Files {
     options: InputOptions,
     /// Paths that were found in folders.
     of_folders: BTreeSet<PathBuf>,
+    /// The tiles of virtual point clouds, by their path.
+    tiles: BTreeMap<PathBuf, Tile>,
 }
 
 impl Files {
-    /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name.
-    /// Nothing is read yet.
+    /// Lists the files at `paths`, where each folder stands for its readable files, sorted by name,
+    /// and each virtual point cloud (`.vpc`) for its tiles. Nothing else is read yet.
+    ///
+    /// A path that begins with `http://` or `https://` is the address of a file on a server.
     ///
     /// A file of a folder is readable if its extension is a format's name; `.txt` and `.csv` files
     /// also have to start as a table. Names with a leading dot are skipped, as they are files that
@@ -35,11 +41,19 @@ impl Files {
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file.
+    /// [`Error::Read`] if a folder cannot be listed, [`Error::Usage`] if it has no readable file,
+    /// and the errors of [`vpc::read`].
     pub fn new(paths: impl IntoIterator<Item = impl Into<PathBuf>>, options: &InputOptions) -> Result<Self> {
         let mut files = Self { options: options.clone(), ..Self::default() };
         for path in paths {
             let path = path.into();
+            if vpc::is_one(&path) && !path.is_dir() {
+                for tile in vpc::read(&path)? {
+                    files.paths.push(tile.path.clone());
+                    files.tiles.insert(tile.path.clone(), tile);
+                }
+                continue;
+            }
             if !path.is_dir() {
                 files.paths.push(path);
                 continue;
@@ -61,15 +75,19 @@ impl Files {
     }
 
     /// Returns the keys of the coordinate system of the files; None if they name none, or if some
-    /// of them name others.
+    /// of them name others. Of the tiles of virtual point clouds only the first is looked at.
     ///
     /// # Errors
     ///
     /// [`Error::Read`] and [`Error::Malformed`] for files whose header cannot be read.
     pub fn geo_keys(&self) -> Result<Option<GeoKeys>> {
         let of_file = |path: &PathBuf| GeoKeys::of_file(path, self.options.file.input_format);
-        let keys = self.each(|path| of_file(&path.to_owned()), || None)?.0;
-        let mut keys = keys.into_iter().flatten();
+        let mut tiles = self.paths.iter().filter(|path| self.is_tile(path));
+        let first_tile = tiles.next();
+        let looked_at = |path: &Path| !self.is_tile(path) || first_tile.is_some_and(|first| first == path);
+        let open = |path: &Path| if looked_at(path) { of_file(&path.to_owned()).map(Some) } else { Ok(None) };
+        let keys = self.each(open, || None)?.0;
+        let mut keys = keys.into_iter().flatten().flatten();
         let first = keys.next();
         Ok(first.filter(|first| keys.all(|other| other == *first)))
     }
@@ -120,16 +138,46 @@ impl Files {
         Ok((all, (count > 0).then_some(sentence)))
     }
 
-    /// Opens a regular file. Returns None for standard input and other paths in which no position
-    /// can be sought.
-    fn seekable(&self, path: &Path) -> Result<Option<Input>> {
+    /// Whether the path is that of a tile of a virtual point cloud. It may be on a disk that is not
+    /// there as long as no picture shows it.
+    pub(super) fn is_tile(&self, path: &Path) -> bool {
+        self.tiles.contains_key(path)
+    }
+
+    /// The tile at each path; None if a path is not that of a tile of a virtual point cloud.
+    pub(super) fn tiles(&self) -> Option<Vec<&Tile>> {
+        self.paths.iter().map(|path| self.tiles.get(path)).collect()
+    }
+
+    /// Opens a regular file, or a remote one that is read in part. Returns None for standard input
+    /// and other paths in which no position can be sought.
+    pub(super) fn seekable(&self, path: &Path) -> Result<Option<Input>> {
+        if address::is_remote(path) {
+            let input = Input::open(path, self.options.file.input_format)?;
+            if !input.is_copy() {
+                return Ok(Some(input));
+            }
+            // The copy is what the next call that opens the path gets.
+            return input.keep(path).map(|()| None).map_err(|error| Error::read(path, error));
+        }
         let is_file = path.is_file() && path != Path::new("-");
         is_file.then(|| Input::open(path, self.options.file.input_format)).transpose()
     }
 
     /// Opens the files as octrees if all of them are COPC. Otherwise returns None.
     pub(super) fn octrees(&self, progress: &dyn Progress) -> Result<Option<Vec<Copc>>> {
-        let (files, left_out) = self.each(|path| self.seekable(path)?.map_or(Ok(None), Copc::open), || None)?;
+        let open = |path: &Path| {
+            let input = self.seekable(path)?;
+            if input.is_none() && address::is_remote(path) && Format::is_las(path) {
+                let path = address::shown(path);
+                progress.note(&format!(
+                    "{}: its server sends no ranges of bytes, so the whole file is copied and read",
+                    path.display()
+                ));
+            }
+            input.map_or(Ok(None), Copc::open)
+        };
+        let (files, left_out) = self.each(open, || None)?;
         let files: Option<Vec<Copc>> = files.into_iter().collect();
         left_out.iter().filter(|_| files.is_some()).for_each(|line| progress.note(line));
         Ok(files)
@@ -138,6 +186,9 @@ impl Files {
     /// Opens the only file if it is a regular file with levels of detail. Otherwise returns None.
     pub(super) fn levels(&self) -> Result<Option<Levels>> {
         let [path] = &self.paths[..] else { return Ok(None) };
+        if self.options.file.input_format.is_none() && Format::is_las(path) {
+            return Ok(None);
+        }
         self.seekable(path)?.map_or(Ok(None), Levels::open)
     }
 
@@ -154,7 +205,7 @@ impl Files {
             rows.ok_or_else(|| {
                 Error::Usage(format!(
                     "--memory needs binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, which {} is not: make surfels of it first (epsplat surfels), or leave --memory out",
-                    path.display()
+                    address::shown(path).display()
                 ))
             })
         };
@@ -164,18 +215,21 @@ impl Files {
         Ok(files)
     }
 
-    /// Reads the points of the given nodes of each octree.
+    /// Reads the points of the given nodes of each octree, none where there is no octree.
     ///
     /// The first points read with `rules` decide how colours are interpreted, so that later calls
     /// with the same rules agree.
     pub(super) fn nodes<'a>(
         &self,
-        octrees: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
+        octrees: impl Iterator<Item = (Option<&'a mut Copc>, &'a Vec<usize>)>,
         (rules, column): (&mut ColorRules, Option<String>),
         progress: &dyn Progress,
     ) -> Result<Vec<Points>> {
         let options = self.options.with_column(column);
-        let read = |(file, nodes): (&mut Copc, &Vec<usize>)| file.read_raw(nodes, &options, progress);
+        let read = |(file, nodes): (Option<&mut Copc>, &Vec<usize>)| match file {
+            Some(file) => file.read_raw(nodes, &options, progress),
+            None => Ok(Points { up: Some(Up::Z), ..Points::default() }),
+        };
         let mut points = octrees.map(read).collect::<Result<Vec<_>>>()?;
         rules.settle(&mut points);
         Ok(points)

@@ -28,6 +28,7 @@ mod picture;
 mod refined;
 mod renderer;
 mod settings;
+mod tiles;
 mod tree;
 mod turntable;
 mod view;
@@ -52,6 +53,7 @@ pub use self::visible::Visible;
 
 use self::coloring::Coloring;
 use self::whole::{Making, Whole};
+use crate::address;
 use crate::error::{Error, Result};
 use crate::io::Points;
 use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
@@ -123,7 +125,8 @@ impl Scene {
     ///
     /// [`Error::Read`] for a missing file.
     pub fn of_files(files: Files, options: &SceneOptions) -> Result<Self> {
-        for path in files.paths().iter().filter(|path| path.as_os_str() != "-") {
+        let here = |path: &&PathBuf| path.as_os_str() != "-" && !address::is_remote(path) && !files.is_tile(path);
+        for path in files.paths().iter().filter(here) {
             path.metadata().map_err(|error| Error::read(path, error))?;
         }
         Ok(Self(Arc::new(Inputs { files, options: options.clone(), ..Inputs::default() })))

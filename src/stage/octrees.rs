@@ -3,6 +3,7 @@
 use super::Request;
 use super::coloring::Coloring;
 use super::in_part::{Part, ReadReport};
+use super::tiles::Tiles;
 use super::whole::scene_of;
 use crate::error::{Error, Result};
 use crate::io::las::Copc;
@@ -16,21 +17,26 @@ use crate::surfels::{self, borders};
 
 /// COPC files, together one scene, and a coarse overview of it.
 pub(super) struct Octrees {
-    files: Vec<Copc>,
+    /// The files. Tiles of a virtual point cloud are None until a picture shows them.
+    files: Vec<Option<Copc>>,
+    /// The octree of each file. Those of tiles that are not open have a bounding box and no nodes.
     octrees: Vec<PointOctree>,
     /// How colour values are interpreted, as decided by the coarsest nodes.
     rules: ColorRules,
     /// The values at the ends of the colour map, as decided by the coarsest nodes.
     ends: Option<[f64; 2]>,
-    /// Surfels of the coarsest nodes, from which the camera is framed.
+    /// Surfels of the coarsest nodes, or the corners of tiles, from which the camera is framed.
     pub overview: Scene,
+    /// The tiles, if files are opened only for pictures that show them.
+    tiles: Option<Tiles>,
 }
 
 impl Octrees {
     /// Opens the inputs if they can be read in part, that is, if all of them are COPC files.
     ///
-    /// Returns None if an option needs all points: `--outliers`, `--surfel-size`, `--triangles` or
-    /// `--color-by density`.
+    /// Tiles of virtual point clouds are opened when a picture shows them. Returns None if an
+    /// option needs all points: `--outliers`, `--surfel-size`, `--triangles` or `--color-by
+    /// density`.
     ///
     /// # Errors
     ///
@@ -43,26 +49,60 @@ impl Octrees {
         if request.files().paths().is_empty() || all {
             return Ok(None);
         }
-        let Some(mut files) = request.files().octrees(progress)? else { return Ok(None) };
-        if request.options.levels.lod_fade == Some(Switch(true)) {
-            return Err(Error::Usage(
-                "the nodes of COPC files cannot fade into each other: set --lod-fade to off".into(),
-            ));
+        if let Some(tiles) = Tiles::of(request.files()) {
+            check_fade(request)?;
+            let overview = tiles.overview(request, progress)?;
+            let (octrees, files) = (tiles.octrees(), tiles.octrees().iter().map(|_| None).collect());
+            let rules = ColorRules::default();
+            return Ok(Some(Self { files, octrees, rules, ends: None, overview, tiles: Some(tiles) }));
         }
+        let Some(files) = request.files().octrees(progress)? else { return Ok(None) };
+        check_fade(request)?;
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
-        let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
-        let mut rules = ColorRules::default();
-        let mut points = read(request, (&mut files, &mut rules), &nodes, progress)?;
+        let files = files.into_iter().map(Some).collect();
+        let (rules, overview) = (ColorRules::default(), Scene::default());
+        let mut made = Self { files, octrees, rules, ends: None, overview, tiles: None };
+        let all: Vec<usize> = (0..made.files.len()).collect();
+        let points = made.coarsest(request, &all, progress)?;
         // A filter may leave points of finer nodes alone, so the files are read whole.
         if are_empty(&points) {
             return Ok(None);
         }
-        let mut coloring = Coloring::of(&request.scene.options.colors, None);
-        coloring.settle(&mut points)?;
-        let ends = coloring.ends();
-        let built = surfels::build_within(points, Vec::new(), &request.surfels().limits.limits(), progress);
-        let (overview, _) = built.map_err(|error| request.files().named(error))?;
-        Ok(Some(Self { files, octrees, rules, ends, overview }))
+        made.overview = overview_of(request, points, progress)?;
+        Ok(Some(made))
+    }
+
+    /// Reads the coarsest nodes of the files with these indices. The first ones that are read
+    /// decide what colours mean in all nodes.
+    fn coarsest(&mut self, request: &Request<'_>, of: &[usize], progress: &dyn Progress) -> Result<Vec<Points>> {
+        let mut nodes = vec![Vec::new(); self.files.len()];
+        of.iter().for_each(|&index| nodes[index] = self.octrees[index].overview());
+        let mut points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        let mut coloring = Coloring::of(&request.scene.options.colors, self.ends);
+        if !are_empty(&points) {
+            coloring.settle(&mut points)?;
+            self.ends = coloring.ends();
+        }
+        Ok(points)
+    }
+
+    /// Opens the tiles that a picture of `camera` shows. A tile is opened once.
+    fn open(&mut self, request: &Request<'_>, camera: &Camera, progress: &dyn Progress) -> Result<()> {
+        let Some(tiles) = &self.tiles else { return Ok(()) };
+        let opened = tiles.seen(&self.files, camera);
+        if opened.is_empty() {
+            return Ok(());
+        }
+        let is_first = self.files.iter().all(Option::is_none);
+        for (index, file) in opened.iter().copied().zip(tiles.open(&opened, request, progress)?) {
+            self.octrees[index] = file.octree.clone();
+            self.files[index] = Some(file);
+        }
+        let left_out = self.files.iter().filter(|file| file.is_none()).count();
+        if is_first && left_out > 0 {
+            progress.note(&tiles.note(left_out));
+        }
+        self.coarsest(request, &opened, progress).map(drop)
     }
 
     /// Reads the nodes that the picture of `camera` needs, or the overview's if they have no point.
@@ -73,6 +113,7 @@ impl Octrees {
         settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Part> {
+        self.open(request, camera, progress)?;
         let mut nodes = taken(&self.octrees, camera, settings.detail);
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
@@ -83,6 +124,9 @@ impl Octrees {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
             points = read(request, (&mut self.files, &mut self.rules), &nodes, progress)?;
         }
+        // Tiles that a flight has passed would fill the memory.
+        let passed = self.files.iter().zip(&nodes).filter(|(_, nodes)| nodes.is_empty());
+        passed.filter_map(|(file, _)| file.as_ref()).for_each(Copc::forget);
         let key = Coloring::of(&request.scene.options.colors, self.ends).settle(&mut points)?;
         let mut made = scene_of(request, points, progress)?;
         self.end(&mut made.0, &nodes);
@@ -103,7 +147,8 @@ impl Octrees {
     /// no bounding box.
     fn end(&self, scene: &mut Scene, nodes: &[Vec<usize>]) {
         let Some(bounds) = self.bounds() else { return };
-        let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
+        let read = self.octrees.iter().zip(nodes).filter(|(_, nodes)| !nodes.is_empty());
+        let thinned = read.map(|(octree, nodes)| Thinned::new(octree, nodes));
         let thinned: Vec<Thinned> = thinned.collect();
         // Where files overlap, their points are interleaved, so the largest fraction is used.
         let part = |place| thinned.iter().filter_map(|octree| octree.part_of_size(place)).reduce(f64::max);
@@ -111,14 +156,29 @@ impl Octrees {
     }
 }
 
+/// Fails if levels of detail are to fade into each other.
+fn check_fade(request: &Request<'_>) -> Result<()> {
+    if request.options.levels.lod_fade == Some(Switch(true)) {
+        return Err(Error::Usage("the nodes of COPC files cannot fade into each other: set --lod-fade to off".into()));
+    }
+    Ok(())
+}
+
+/// The surfels of the coarsest nodes.
+fn overview_of(request: &Request<'_>, points: Vec<Points>, progress: &dyn Progress) -> Result<Scene> {
+    let built = surfels::build_within(points, Vec::new(), &request.surfels().limits.limits(), progress);
+    built.map(|(overview, _)| overview).map_err(|error| request.files().named(error))
+}
+
 fn are_empty(inputs: &[Points]) -> bool {
     inputs.iter().all(|points| points.positions.is_empty())
 }
 
-/// Counts these nodes, their points and bytes, and the totals of the files.
-fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> ReadReport {
+/// Counts these nodes, their points and bytes, and the totals of the open files.
+fn read_of(files: &[Option<Copc>], nodes: &[Vec<usize>]) -> ReadReport {
     let mut sum = ReadReport { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
-    for (file, taken) in files.iter().zip(nodes) {
+    let open = files.iter().zip(nodes).filter_map(|(file, taken)| Some((file.as_ref()?, taken)));
+    for (file, taken) in open {
         let all = [file.octree.nodes.len() as u64, file.count(), file.bytes()];
         let taken = [taken.len() as u64, file.octree.points(taken), file.bytes_read(taken)];
         for (at, [nodes, points, bytes]) in [taken, all].into_iter().enumerate() {
@@ -130,13 +190,13 @@ fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> ReadReport {
     sum
 }
 
-/// Reads the points of these nodes of each file.
+/// Reads the points of these nodes of each file; none of a tile that is not open.
 fn read(
     request: &Request<'_>,
-    (files, rules): (&mut [Copc], &mut ColorRules),
+    (files, rules): (&mut [Option<Copc>], &mut ColorRules),
     nodes: &[Vec<usize>],
     progress: &dyn Progress,
 ) -> Result<Vec<Points>> {
     let column = request.scene.options.colors.column();
-    request.files().nodes(files.iter_mut().zip(nodes), (rules, column), progress)
+    request.files().nodes(files.iter_mut().map(Option::as_mut).zip(nodes), (rules, column), progress)
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::Request;
 use super::coloring::by_normals;
 use super::meshes::Meshes;
+use crate::address;
 use crate::error::{Error, Result};
 use crate::io::{ColorBy, Points, Texture};
 use crate::options::{MeshAs, RenderOptions, Suggested};
@@ -132,7 +133,7 @@ fn uncolored(request: &Request<'_>, inputs: Vec<Points>, progress: &dyn Progress
             let unnamed = Path::new("the scene");
             return Err(Error::malformed(paths.clone().next().map_or(unnamed, PathBuf::as_path), what));
         }
-        let mut names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        let mut names = paths.map(|path| address::shown(path).display().to_string()).collect::<Vec<_>>().join(", ");
         if names.is_empty() {
             names = "the scene".to_owned();
         }

@@ -5,6 +5,8 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::common::server::Server;
+
 /// The commands in the ```sh blocks of a page, with continuation lines joined.
 fn commands(page: &str) -> Vec<String> {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(page)).unwrap();
@@ -41,6 +43,15 @@ fn line(command: &str) -> Option<String> {
     Some(format!("{binary} {arguments}"))
 }
 
+/// A server with the files that pages name at `https://example.org/`.
+fn example() -> Server {
+    let copc = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/simple.copc.laz")).unwrap();
+    let bounds = r#""properties": {"proj:bbox": [600000, 800000, 0, 700000, 900000, 1000]}"#;
+    let feature = format!(r#"{{"assets": {{"data": {{"href": "./simple.copc.laz"}}}}, {bounds}}}"#);
+    let vpc = format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#);
+    Server::new([("simple.copc.laz".to_owned(), copc), ("city.vpc".to_owned(), vpc.into_bytes())])
+}
+
 /// Runs a page's commands in order, in a new folder with links to the data and the studies; returns
 /// that folder.
 fn run(page: &str, least: usize) -> tempfile::TempDir {
@@ -49,10 +60,11 @@ fn run(page: &str, least: usize) -> tempfile::TempDir {
     for name in ["data", "benches"] {
         std::os::unix::fs::symlink(root.join(name), folder.path().join(name)).unwrap();
     }
-    let commands = commands(page);
+    let (commands, server) = (commands(page), example());
     let lines: Vec<String> = commands.iter().filter_map(|command| line(command)).collect();
     assert!(lines.len() >= least, "{page} lost its commands: {commands:?}");
     for line in lines {
+        let line = line.replace("https://example.org/", &server.address(""));
         let output = Command::new("sh").arg("-c").arg(&line).current_dir(folder.path()).output().unwrap();
         assert!(output.status.success(), "{page}: {line}: {}", String::from_utf8_lossy(&output.stderr));
     }

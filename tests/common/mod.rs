@@ -6,6 +6,7 @@
 pub mod any_options;
 pub mod any_scene;
 pub mod command;
+pub mod copc_made;
 pub mod enclosure;
 pub mod evaluated;
 pub mod gaussians;
@@ -16,6 +17,7 @@ pub mod modules;
 pub mod network;
 mod random;
 pub mod scenes;
+pub mod server;
 pub mod solids;
 pub mod variants;
 

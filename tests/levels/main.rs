@@ -8,3 +8,5 @@ mod fades;
 mod lod;
 mod octrees;
 mod parts;
+#[cfg(feature = "http")]
+mod tiles;

@@ -3,6 +3,9 @@
 
 mod attributes;
 mod copc;
+#[cfg(feature = "http")]
+#[path = "../common/copc_made.rs"]
+mod copc_made;
 mod e57;
 #[cfg(feature = "e57")]
 #[path = "../common/e57_page.rs"]
@@ -29,6 +32,11 @@ mod ply_damage;
 #[path = "../common/random.rs"]
 mod random;
 mod ranges;
+#[cfg(feature = "http")]
+mod remote;
+#[cfg(feature = "http")]
+#[path = "../common/server.rs"]
+mod server;
 mod stl;
 mod text;
 mod text_colors;

@@ -42,6 +42,7 @@ use super::super::outputs::Source;
     epsplat render scan.laz -o ortho.tif --pixel-size 0.5\n  \
     epsplat render scan.laz -o height.tif --pixel-size 0.5 --aov height\n  \
     epsplat render scan.laz -o views --cameras transforms.json\n  \
+    epsplat render https://example.org/city.copc.laz -o city.png --lod 4px\n  \
     epsplat render scan.laz -o depth.png --aov depth --depth-scale 100\n  \
     epsplat render scan.laz -o depth-1.part --part 1/4\n  \
     epsplat render scan.laz -o - --turntable 90 --format raw --size 640x480 |\n    \

@@ -18,6 +18,7 @@ use ::gltf::json::validation::Checked;
 use crate::io::about::{About, Attribute, Role};
 use crate::io::beside::Beside;
 use crate::io::fault::{self, Fault, reserve};
+use crate::io::input::Local;
 use crate::io::triangles::{Triangles, give_faces};
 use crate::io::values::shown;
 use crate::io::{Input, Paint, Points, ReadOptions, Up, dimensions};
@@ -60,7 +61,7 @@ const MOST_SHARED_PER_BYTE: u64 = 4;
 /// needs an extension that is not read, such as one that compresses geometry; also if its nodes
 /// repeat meshes beyond the limit for a file of its size.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { mut file, length, path, .. } = input;
+    let Local { mut file, length, path } = input.local()?;
     progress.begin(&format!("reading {}", fault::name(&path)), length);
     let read = bytes_of(&mut file, length).and_then(|bytes| {
         progress.advance(length);

@@ -8,6 +8,7 @@
 use super::arithmetic::Integers;
 use super::dimensions::Layer;
 use super::extra::Field;
+use super::layers::check_layers;
 use super::shown::Shown;
 use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
@@ -305,31 +306,6 @@ pub(super) fn chunk_table(
         chunks.push(Chunk { points: scheme.chunk.map_or(held, u64::from), bytes });
     }
     Ok(chunks)
-}
-
-/// Checks that the layers of each chunk lie within it. Also limits each chunk's number of points to
-/// that in its head, because the last chunk may be shorter.
-fn check_layers(
-    file: &mut (impl Read + Seek),
-    mut at: u64,
-    scheme: &Scheme,
-    chunks: &mut [Chunk],
-) -> Result<(), Fault> {
-    let mut start = vec![0; scheme.start() as usize];
-    for (index, chunk) in chunks.iter_mut().enumerate() {
-        if chunk.bytes > 0 || chunk.points > 0 {
-            file.seek(SeekFrom::Start(at))?;
-            let whole = file.read_exact(&mut start).is_ok();
-            let Some(count) = scheme.points_in(&start, chunk.bytes).filter(|_| whole) else {
-                return malformed(format!("the layers of its chunk {} do not fit in it", index + 1));
-            };
-            if count > 0 {
-                chunk.points = chunk.points.min(count);
-            }
-        }
-        at += chunk.bytes;
-    }
-    Ok(())
 }
 
 fn read_u64(file: &mut impl Read) -> Result<u64, Fault> {

@@ -7,6 +7,7 @@ use super::layers::Layers;
 use super::shown::Shown;
 use super::{Looks, early, header, of_las, shape_of};
 use crate::io::fault::{self, Fault, surviving};
+use crate::io::source::Source;
 use crate::io::{ColorRules, Format, Input, degrees};
 use crate::scene::Bounds;
 use crate::scene::octree::{MOST_LEVELS, OctreeNode, PointOctree};
@@ -14,7 +15,6 @@ use crate::{Error, Result};
 use glam::DVec3;
 use las::{Transform, Vector, raw};
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ const ENTRY: u64 = 32;
 /// The octree is checked when the file is opened: no node occurs twice, each has a parent, and its
 /// chunk lies within the file.
 pub struct Copc {
-    pub(super) file: File,
+    pub(super) source: Source,
     pub(super) path: PathBuf,
     /// The nodes of the file.
     pub octree: PointOctree,
@@ -84,13 +84,15 @@ impl Copc {
     /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the file says that it is
     /// COPC but is invalid.
     pub fn open(input: Input) -> Result<Option<Self>> {
-        let Input { file, length, path, format, .. } = input;
+        let Input { source, length, path, format, .. } = input;
+        let again = source.try_clone().map_err(|error| Error::read(&path, error))?;
         let opened = surviving(|| {
-            if format != Format::Las || !says_copc(&file)? {
+            if format != Format::Las || !says_copc(&source)? {
                 return Ok(None);
             }
-            opened(file, path.clone(), length).map(Some).map_err(early)
+            opened(source, path.clone(), length).map(Some).map_err(early)
         });
+        again.check().map_err(|error| Error::read(&path, error))?;
         opened.map_err(|fault| fault.of(&path))
     }
 
@@ -109,6 +111,11 @@ impl Copc {
         self.count
     }
 
+    /// Frees the memory of bytes that were received from a server and may be read again.
+    pub fn forget(&self) {
+        self.source.forget();
+    }
+
     /// Adds the path of the file to an error.
     pub(super) fn fault(&self, fault: Fault) -> Error {
         fault.of(&self.path)
@@ -116,9 +123,9 @@ impl Copc {
 }
 
 /// Whether the first record of a file is that of COPC.
-fn says_copc(file: &File) -> Result<bool, Fault> {
+fn says_copc(source: &Source) -> Result<bool, Fault> {
     let mut start = Vec::new();
-    file.take(INFO).read_to_end(&mut start)?;
+    source.read_at(0, INFO, &mut start)?;
     let record = start.get(RECORD as usize..);
     let named = record
         .and_then(|record| record.get(2..20))
@@ -126,7 +133,7 @@ fn says_copc(file: &File) -> Result<bool, Fault> {
     Ok(named && start.starts_with(b"LASF"))
 }
 
-fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
+fn opened(mut file: Source, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     file.rewind()?;
     let mut file = BufReader::new(Shown::new(file)?);
     let legacy = file.get_ref().legacy;
@@ -174,7 +181,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     notes.extend(degrees::hint(&name, [min.to_array(), max.to_array()], found.geographic));
     let octree = PointOctree { center, half, spacing, nodes, bounds };
     Ok(Copc {
-        file: file.into_inner().into_file(),
+        source: file.into_inner().into_source(),
         path,
         octree,
         layers: vec![None; chunks.len()],
@@ -195,7 +202,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
 /// Reads the entries of all pages of the octree, starting at the root page. Keys are level and
 /// position.
 fn entries(
-    file: &mut (impl Read + Seek),
+    file: &mut BufReader<Shown>,
     root: [u64; 2],
     length: u64,
 ) -> Result<BTreeMap<(u32, [u32; 3]), Entry>, Fault> {
@@ -212,6 +219,7 @@ fn entries(
             ));
         };
         left = rest;
+        file.get_ref().source().expect(std::iter::once(offset..offset + bytes))?;
         file.seek(SeekFrom::Start(offset))?;
         for _ in 0..bytes / ENTRY {
             let mut entry = [0; ENTRY as usize];

@@ -10,9 +10,9 @@ use crate::Result as Outcome;
 use crate::io::about::{About, Attribute, Role};
 use crate::io::fault::{Fault, surviving};
 use crate::io::place::GeoKeys;
+use crate::io::source::Source;
 use las::point::Format;
 use las::raw::{Header, Vlr};
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -96,7 +96,7 @@ pub(super) fn look(
 /// # Errors
 ///
 /// As [`read`](super::read).
-pub(in crate::io) fn geo_keys(file: File, length: u64, path: &Path) -> Outcome<Option<GeoKeys>> {
+pub(in crate::io) fn geo_keys(file: Source, length: u64, path: &Path) -> Outcome<Option<GeoKeys>> {
     let found = surviving(|| {
         let mut file = BufReader::new(Shown::new(file)?);
         let legacy = file.get_ref().legacy;

@@ -14,6 +14,7 @@ mod system;
 
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{self, Fault, reserve, surviving};
+use crate::io::source::Source;
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up, degrees};
 use crate::{Error, Progress, Result};
@@ -24,7 +25,6 @@ use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, Transform, Vector, raw};
 use shown::Shown;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Seek};
 use std::ops::Range;
 use std::path::Path;
@@ -54,9 +54,10 @@ const BLOCK: u64 = 1 << 25;
 /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the file is not LAS, ends
 /// early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
-    let again = file.try_clone().map_err(|error| Error::read(&path, error))?;
-    match whole((file, length), &path, options, progress) {
+    let Input { source, length, path, .. } = input;
+    let clone = || source.try_clone().map_err(|error| Error::read(&path, error));
+    let (first, again) = (clone()?, clone()?);
+    let points = match whole((first, length), &path, options, progress) {
         Err(Fault::Malformed(what)) if !options.strict => {
             let points = deep(|| rest::read((again, length), &path, options, progress));
             // The first attempt has found the cause.
@@ -66,13 +67,14 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
             })
         }
         points => points,
-    }
-    .map_err(|fault| fault.of(&path))
+    };
+    source.check().map_err(|error| Error::read(&path, error))?;
+    points.map_err(|fault| fault.of(&path))
 }
 
 /// Reads all points of an intact file.
 fn whole(
-    (file, length): (File, u64),
+    (file, length): (Source, u64),
     path: &Path,
     options: &ReadOptions,
     progress: &dyn Progress,

@@ -13,7 +13,7 @@ use las::{PointData, PointDataBuilder};
 use laz::LazVlr;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor};
 use rayon::prelude::*;
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::io::Cursor;
 
 /// Limits of a batch of nodes: bytes that are read, and bytes of decoded records. A node that
 /// exceeds a limit is a batch of its own.
@@ -89,9 +89,14 @@ impl Copc {
         kept.wants = self.dimensions.collector(&options.wanted)?;
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
+            let ranges = |&node: &usize| {
+                let offset = self.chunks[node].offset;
+                self.layers[node].iter().flat_map(move |layers| layers.ranges(offset))
+            };
+            self.source.expect(together.iter().flat_map(ranges))?;
             let compressed = |&node: &usize| {
                 let layers = self.layers[node].as_ref();
-                layers.map_or_else(|| Ok(Vec::new()), |layers| layers.read(&self.file, self.chunks[node].offset))
+                layers.map_or_else(|| Ok(Vec::new()), |layers| layers.read(&self.source, self.chunks[node].offset))
             };
             let compressed = together.iter().map(compressed).collect::<Result<Vec<_>, _>>()?;
             let decode = |(&node, bytes): (&usize, Vec<u8>)| surviving(|| self.decode(node, &bytes, &vlr));
@@ -153,6 +158,8 @@ impl Copc {
         (unread, strict): (&mut Unread, bool),
         progress: &dyn Progress,
     ) -> Result<(), Fault> {
+        let unknown = nodes.iter().filter(|node| self.layers[**node].is_none()).map(|&node| self.chunks[node]);
+        self.source.expect(unknown.map(|chunk| chunk.offset..chunk.offset + self.scheme.start().min(chunk.bytes)))?;
         for node in std::mem::take(nodes) {
             if self.layers[node].is_none() {
                 match self.layers_of(node) {
@@ -178,9 +185,7 @@ impl Copc {
             ));
         }
         let mut start = Vec::new();
-        let mut file = &self.file;
-        file.seek(SeekFrom::Start(chunk.offset))?;
-        file.take(self.scheme.start()).read_to_end(&mut start)?;
+        self.source.read_at(chunk.offset, self.scheme.start(), &mut start)?;
         match self.scheme.points_in(&start, chunk.bytes) {
             Some(count) if count == points => Ok(Layers::of(start, &self.scheme)),
             Some(count) => {

@@ -5,13 +5,13 @@ use super::shown::Shown;
 use super::{Kept, described, early, header, of_las, shape_of};
 use crate::Progress;
 use crate::io::fault::{self, Fault, Unread, reserve, surviving};
+use crate::io::source::Source;
 use crate::io::{Points, ReadOptions};
 use las::{PointData, PointDataBuilder, raw};
 use laz::LazVlr;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
 use rayon::prelude::*;
-use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
+use std::io::{BufReader, Cursor, Seek};
 use std::path::Path;
 
 /// A chunk, and where it is in the file.
@@ -29,7 +29,7 @@ struct Place {
 /// Reads the points of all chunks that can be decoded, of a file whose chunk table is intact. Fails
 /// if no chunk can be decoded, or if all can: then the damage is elsewhere.
 pub(super) fn read(
-    (mut file, length): (File, u64),
+    (mut file, length): (Source, u64),
     path: &Path,
     options: &ReadOptions,
     progress: &dyn Progress,
@@ -49,13 +49,14 @@ pub(super) fn read(
     let found = header::look(&mut shown, (&header, legacy), (length, &name)).map_err(early)?;
     let vlr = LazVlr::from_buffer(&laszip).map_err(|error| of_las(error.into()))?;
     let builder = PointDataBuilder::new().with_format(format).with_transforms(transforms);
-    let (mut file, mut unread, mut read) = (shown.into_inner().into_file(), Unread::default(), Vec::new());
+    let (file, mut unread, mut read) = (shown.into_inner().into_source(), Unread::default(), Vec::new());
     let normals = found.normals.clone();
     let mut kept = Kept::of(None, normals.as_ref());
     kept.wants = found.dimensions.collector(&options.wanted)?;
     progress.begin(&format!("reading {name}, chunk by chunk"), promised(&header));
     for together in places.chunks(rayon::current_num_threads()) {
-        let bytes: Vec<Result<Vec<u8>, Fault>> = together.iter().map(|place| bytes_of(&mut file, place)).collect();
+        file.expect(together.iter().map(|place| place.offset..place.offset + place.bytes))?;
+        let bytes: Vec<Result<Vec<u8>, Fault>> = together.iter().map(|place| bytes_of(&file, place)).collect();
         let decode = |(place, bytes): (&Place, Result<Vec<u8>, Fault>)| {
             let records = surviving(|| decoded(place, &bytes?, &scheme, &vlr))?;
             builder.clone().build_from_bytes(records).map_err(of_las)
@@ -98,11 +99,10 @@ fn places(table: &[Chunk], mut offset: u64, promised: u64) -> Result<Vec<Place>,
     if first == promised { Ok(places) } else { malformed("its chunks hold fewer points than its header promises") }
 }
 
-fn bytes_of(file: &mut File, place: &Place) -> Result<Vec<u8>, Fault> {
+fn bytes_of(file: &Source, place: &Place) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     reserve(&mut bytes, place.bytes)?;
-    file.seek(SeekFrom::Start(place.offset))?;
-    file.take(place.bytes).read_to_end(&mut bytes)?;
+    file.read_at(place.offset, place.bytes, &mut bytes)?;
     Ok(bytes)
 }
 

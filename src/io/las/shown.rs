@@ -2,7 +2,7 @@
 //! shown as similar headers that it knows.
 
 use crate::io::fault::Fault;
-use std::fs::File;
+use crate::io::source::Source;
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Offsets in the header, bytes: the version, the point format, and the point counts of LAS 1.0 to
@@ -19,7 +19,7 @@ const LEGACY_COUNTS_SIZE: usize = 24;
 /// A file in which a few bytes are replaced when they are read.
 #[derive(Debug)]
 pub(super) struct Shown {
-    file: File,
+    file: Source,
     at: u64,
     /// The replacement bytes, and their offsets.
     others: Vec<(u64, Vec<u8>)>,
@@ -34,7 +34,7 @@ impl Shown {
     /// are shown as 0: version 1.5 abolished them. They are also shown as 0 in LAS 1.4 with a point
     /// format of 6 or above, where they have no meaning, if the count of LAS 1.4 is not 0. Versions
     /// other than 1.0 to 1.5 are refused.
-    pub(super) fn new(mut file: File) -> Result<Self, Fault> {
+    pub(super) fn new(mut file: Source) -> Result<Self, Fault> {
         let mut start = Vec::new();
         (&mut file).take(COUNTS_END).read_to_end(&mut start)?;
         file.rewind()?;
@@ -62,8 +62,13 @@ impl Shown {
         Ok(shown)
     }
 
+    /// The file, whose bytes are not replaced.
+    pub(super) fn source(&self) -> &Source {
+        &self.file
+    }
+
     /// The unmodified file.
-    pub(super) fn into_file(self) -> File {
+    pub(super) fn into_source(self) -> Source {
         self.file
     }
 

@@ -10,6 +10,7 @@ use crate::io::about::About;
 use crate::io::closed::is_closed;
 use crate::io::encoding;
 use crate::io::fault::{self, Fault};
+use crate::io::input::Local;
 use crate::io::points::Faces;
 use crate::io::triangles::Triangles;
 use crate::io::{Input, Mesh, Paint, Points, RawColors, ReadOptions, Up, settle_colors};
@@ -92,7 +93,7 @@ pub(super) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
 
 /// Reads the lines of a file and passes them to `make`.
 fn read_with<T>(input: Input, strict: bool, progress: &dyn Progress, make: impl Fn(Lines) -> Result<T>) -> Result<T> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let in_file = |fault: Fault| fault.of(&path);
     let (reader, length) =
         encoding::decoded(BufReader::with_capacity(1 << 18, file), length).map_err(Fault::Io).map_err(in_file)?;

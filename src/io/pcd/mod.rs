@@ -9,6 +9,7 @@ use std::io::BufReader;
 
 use crate::io::about::About;
 use crate::io::fault::{self, Fault};
+use crate::io::input::Local;
 use crate::io::{Input, Points, ReadOptions};
 use crate::{Progress, Result};
 use header::{Data, Header};
@@ -37,7 +38,7 @@ use points::Columns;
 /// missing, the file holds fewer points than its header says, a number in text is invalid, or
 /// compressed data cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = header::read(&mut reader).map_err(in_file)?;

@@ -6,10 +6,10 @@ use super::vertex::{Layout, is_tree};
 use super::whole;
 use crate::Result;
 use crate::io::fault::Fault;
+use crate::io::source::Source;
 use crate::io::{Format, Input, Points, Tree, TreeRow};
 use crate::scene::{Colors, Hierarchy, Up, Whole};
 use rayon::prelude::*;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ const LARGEST: f64 = 1e30;
 /// and points are checked as they are read.
 pub struct Levels {
     /// Every reader seeks before it reads.
-    file: Mutex<File>,
+    file: Mutex<Source>,
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
@@ -67,7 +67,7 @@ impl Levels {
     /// [`Error::Malformed`](crate::Error::Malformed) if the header is malformed or a number of the
     /// element `scene` is invalid.
     pub fn open(input: Input) -> Result<Option<Self>> {
-        let Input { file, length, path, format, .. } = input;
+        let Input { source: file, length, path, format, .. } = input;
         if format != Format::Ply {
             return Ok(None);
         }
@@ -147,7 +147,9 @@ impl Levels {
         let bytes = |range: &Range<u32>| u64::from(range.end - range.start) * size;
         let pieces = numbers.iter().map(|range| (start + u64::from(range.start) * size, bytes(range)));
         rows.resize(numbers.iter().map(bytes).sum::<u64>() as usize, 0);
-        read_pieces(&mut self.file.lock().unwrap_or_else(PoisonError::into_inner), pieces, rows)
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.expect(pieces.clone().map(|(start, bytes)| start..start + bytes))
+            .and_then(|()| read_pieces(&mut *file, pieces, rows))
             .map_err(|error| Fault::Io(error).of(&self.path))
     }
 
@@ -168,7 +170,7 @@ impl Levels {
     }
 }
 
-fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault> {
+fn opened(file: Source, length: u64, path: &Path) -> Result<Option<Levels>, Fault> {
     let mut file = BufReader::new(file);
     let header = header::read(&mut file)?;
     let comments = &header.comments;
@@ -219,7 +221,11 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
 }
 
 /// Reads pieces of a file, given as offset and size, into consecutive parts of `into`.
-fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
+fn read_pieces(
+    file: &mut (impl Read + Seek),
+    pieces: impl Iterator<Item = (u64, u64)>,
+    mut into: &mut [u8],
+) -> io::Result<()> {
     let mut together: Vec<(u64, u64)> = Vec::new();
     let mut span = Vec::new();
     let mut read = |together: &mut Vec<(u64, u64)>| {

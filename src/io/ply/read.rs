@@ -9,6 +9,7 @@ use crate::io::about::{About, Attribute, Role};
 use crate::io::beside::Beside;
 use crate::io::dimensions::of_positions;
 use crate::io::fault::{self, Fault};
+use crate::io::input::Local;
 use crate::io::input::check_regular;
 use crate::io::textures::Images;
 use crate::io::triangles::{corners, give_faces};
@@ -233,7 +234,7 @@ fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
 /// Reads the vertices, the triangles and the names of textures, and checks the vertex indices of
 /// triangles. Colours of vertices stay as they are in the file.
 fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut header = header::read(&mut reader).map_err(in_file)?;

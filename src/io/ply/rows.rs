@@ -57,10 +57,8 @@ impl Rows {
     /// [`Error::Read`] if the system cannot read, [`Error::Malformed`] if the header is not a PLY
     /// header or promises more vertices than the file holds.
     pub fn open(input: Input, ignore_alpha: bool) -> Result<Option<Self>> {
-        let Input { file, length, path, format, .. } = input;
-        if format != Format::Ply {
-            return Ok(None);
-        }
+        let Input { mut source, length, path, format, .. } = input;
+        let Some(file) = source.file().filter(|_| format == Format::Ply) else { return Ok(None) };
         let mut reader = BufReader::new(file);
         let mut opened = || {
             let header = header::read(&mut reader)?;

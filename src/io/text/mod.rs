@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use crate::io::about::About;
 use crate::io::encoding;
 use crate::io::fault::{self, Fault};
+use crate::io::input::Local;
 use crate::io::ply::Table;
 use crate::io::{Format, Input, Points, ReadOptions, Up, Wanted};
 use crate::{Progress, Result};
@@ -115,7 +116,7 @@ fn read_with(
     rows: fn(Text<'_>) -> Result<Points, Fault>,
     (options, progress): (&ReadOptions, &dyn Progress),
 ) -> Result<Points> {
-    let Input { file, length, path, .. } = input;
+    let Local { file, length, path } = input.local()?;
     let in_file = |fault: Fault| fault.of(&path);
     let decoded = encoding::decoded(BufReader::with_capacity(1 << 18, file), length);
     let (reader, length) = decoded.map_err(Fault::Io).map_err(in_file)?;

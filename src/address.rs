@@ -20,7 +20,7 @@ pub(crate) fn of(path: &Path) -> Option<&str> {
 ///
 /// An address loses its user, password, query and fragment: a query may be a signature that gives
 /// access.
-pub(crate) fn shown(path: &Path) -> Cow<'_, Path> {
+pub fn shown(path: &Path) -> Cow<'_, Path> {
     let Some((scheme, rest)) = of(path).and_then(|address| address.split_once("://")) else { return path.into() };
     let plain = rest.split(['?', '#']).next().unwrap_or_default();
     let (host, file) = plain.split_at(plain.find('/').unwrap_or(plain.len()));

@@ -188,7 +188,7 @@ fn tell_triangles(arguments: &Arguments, triangles: PathBuf) -> Result<()> {
         Some(path) => write_json(path, &TrianglesAlone { points: 0, triangles }),
         None => print(&format!(
             "{}\n  points    none: `epsplat render` draws only the triangles of {}\n",
-            arguments.input.display(),
+            epsplat::io::shown(&arguments.input).display(),
             triangles.display()
         )),
     }
@@ -199,7 +199,7 @@ fn supplied_by(arguments: &Arguments) -> String {
     let Arguments { input, reading, .. } = arguments;
     // The folder of a pipe is no place for the output.
     let output = if input.is_file() { input.with_extension("surfels.ply") } else { PathBuf::from("surfels.ply") };
-    format!("epsplat surfels {}{} -o {}", input.display(), reading.arguments(), output.display())
+    format!("epsplat surfels {}{} -o {}", epsplat::io::shown(input).display(), reading.arguments(), output.display())
 }
 
 fn colors(points: &Points) -> &'static str {
@@ -218,7 +218,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let mut text = String::new();
     let vector = |v: [f64; 3]| v.map(|c| c.to_string()).join(", ");
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "{}", input.display());
+    let _ = writeln!(text, "{}", epsplat::io::shown(input).display());
     let _ = writeln!(text, "  points    {}", info.points);
     told(&mut text, &info.file);
     held(&mut text, info);

@@ -177,7 +177,8 @@ impl Written {
         let by_node = || node.and_then(|node| self.nodes.get(&node).or(self.streams.get(&node))).map(PathBuf::as_path);
         let by_place = if standard { None } else { self.find(read) };
         let Some(output) = by_place.or_else(by_node) else { return Ok(()) };
-        let read = if standard { "that is standard input".into() } else { read.display().to_string() };
+        let read =
+            if standard { "that is standard input".into() } else { epsplat::io::shown(read).display().to_string() };
         Err(Error::Usage(format!(
             "{} would overwrite the input {read}: choose another name for the output",
             output.display()

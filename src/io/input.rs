@@ -324,7 +324,7 @@ pub(super) fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(Fi
         })?;
     if length > most {
         let most = if most < 1 << 20 { format!("{most} bytes") } else { format!("{} MiB", most >> 20) };
-        let what = format!("it is longer than {most}, the limit for a pipe: name a file instead");
+        let what = format!("it is longer than {most}, the limit for a copy: name a file instead");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
     }
     file.rewind()?;

@@ -52,6 +52,7 @@ mod values;
 pub mod vpc;
 pub mod write_behind;
 
+pub use crate::address::shown;
 pub use about::About;
 pub use classes::{ClassOpacities, class_color, class_name};
 pub use color_range::{ColorRules, RawColors, settle_colors};

@@ -9,6 +9,10 @@ use super::input::text;
 use crate::scene::Bounds;
 use crate::{Error, Result, address};
 
+/// Longest file, bytes: that of 65,536 tiles with a kilobyte each. Decoded JSON takes up to 30
+/// times as much memory.
+const MOST_TEXT: usize = 1 << 26;
+
 /// Most tiles of a cloud.
 const MOST_TILES: usize = 1 << 20;
 
@@ -60,9 +64,19 @@ pub fn read(path: &Path) -> Result<Vec<Tile>> {
     tiles(&text(path)?, path).map_err(|what| Error::malformed(path, what))
 }
 
+/// Text of a file for a message: without control characters, and not too long.
+fn short(text: &str) -> String {
+    const MOST: usize = 160;
+    let shown: String = text.chars().take(MOST).flat_map(char::escape_debug).collect();
+    if text.chars().count() > MOST { format!("{shown}...") } else { shown }
+}
+
 fn tiles(text: &str, path: &Path) -> Result<Vec<Tile>, String> {
+    if text.len() > MOST_TEXT {
+        return Err(format!("it is longer than {} MiB: divide it into several", MOST_TEXT >> 20));
+    }
     let collection: Collection = serde_json::from_str(text)
-        .map_err(|error| format!("it is not a virtual point cloud in JSON (line {}): {error}", error.line()))?;
+        .map_err(|error| format!("it is not a virtual point cloud in JSON: {}", short(&error.to_string())))?;
     if collection.kind.as_deref() != Some("FeatureCollection") {
         return Err("it is not a virtual point cloud: its type is not FeatureCollection".into());
     }
@@ -75,7 +89,7 @@ fn tiles(text: &str, path: &Path) -> Result<Vec<Tile>, String> {
     }
     let tile = |(number, feature): (usize, &Feature)| {
         let name = match &feature.id {
-            serde_json::Value::String(id) => format!("tile {} ({})", number + 1, id.escape_debug()),
+            serde_json::Value::String(id) => format!("tile {} ({})", number + 1, short(id)),
             _ => format!("tile {}", number + 1),
         };
         feature.tile(path).map_err(|what| format!("{name} {what}"))
@@ -132,9 +146,15 @@ fn located(path: &Path, href: &str) -> Result<PathBuf, String> {
     }
     let local = href.strip_prefix("file://").unwrap_or(href);
     if local.contains("://") {
-        return Err(format!("has an address that is not read, {}: use https", local.escape_debug()));
+        // The rest of an address may hold a password.
+        let scheme = local.split("://").next().unwrap_or_default();
+        return Err(format!("has an address that is not read ({}): use https", short(scheme)));
     }
-    let local = Path::new(local.strip_prefix("./").unwrap_or(local));
+    let local = local.strip_prefix("./").unwrap_or(local);
+    if local == "-" {
+        return Err("is standard input, which is no tile".into());
+    }
+    let local = Path::new(local);
     Ok(path.parent().unwrap_or(Path::new("")).join(local))
 }
 
@@ -181,7 +201,7 @@ mod tests {
     fn damage_is_one_sentence() {
         let whole = collection(FEATURE);
         for (text, said) in [
-            (whole[..whole.len() - 9].to_owned(), "it is not a virtual point cloud in JSON (line 2)"),
+            (whole[..whole.len() - 9].to_owned(), "at line 2"),
             (String::new(), "it is not a virtual point cloud in JSON"),
             ("[]".into(), "it is not a virtual point cloud in JSON"),
             ("{}".into(), "its type is not FeatureCollection"),

@@ -17,9 +17,12 @@ use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, render};
-use crate::scene::{self, Bounds, Camera, ColorKey, KernelFaults, Maps, Share};
+use crate::scene::{self, Bounds, Camera, KernelFaults, Maps, Share};
 #[cfg(feature = "parts")]
-use crate::{plan::check, scene::Detail};
+use crate::{
+    plan::check,
+    scene::{ColorKey, Detail},
+};
 
 /// Renders views of a scene with the same options. Surfels, buffers and compiled kernels are kept
 /// from one view to the next.

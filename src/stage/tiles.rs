@@ -77,7 +77,12 @@ impl Tiles {
     /// The indices of the tiles that a picture of `camera` shows and that are not among the open
     /// `files`. If it shows none and none is open, the first tile.
     pub fn seen(&self, files: &[Option<Copc>], camera: &Camera) -> Vec<usize> {
-        let shown = |index: &usize| files[*index].is_none() && !is_box_beside(&self.0[*index].1, camera);
+        let stated = |index: usize| {
+            let Bounds { min, max } = self.0[index].1;
+            let tolerance = tolerance(&self.0[index].1);
+            Bounds { min: min - tolerance, max: max + tolerance }
+        };
+        let shown = |index: &usize| files[*index].is_none() && !is_box_beside(&stated(*index), camera);
         let seen: Vec<usize> = (0..self.0.len()).filter(shown).collect();
         if seen.is_empty() && files.iter().all(Option::is_none) { vec![0] } else { seen }
     }
@@ -107,7 +112,9 @@ impl Tiles {
             }
         };
         std::thread::scope(|scope| {
-            (1..indices.len().min(TOGETHER)).for_each(|_| drop(scope.spawn(work)));
+            // Where the system refuses a thread, the others do its work.
+            let spawned = |_| drop(std::thread::Builder::new().spawn_scoped(scope, work));
+            (1..indices.len().min(TOGETHER)).for_each(spawned);
             work();
         });
         progress.end();
@@ -129,8 +136,7 @@ impl Tiles {
             )));
         }
         let own = file.octree.bounds;
-        let largest = own.min.abs().max(own.max.abs()).max_element();
-        let tolerance = DVec3::splat((ROUNDED * largest).max(DECIMALS.min(OF_TILE * bounds.extent().max_element())));
+        let tolerance = tolerance(bounds);
         let within = own.min.cmpge(bounds.min - tolerance).all() && own.max.cmple(bounds.max + tolerance).all();
         if !own.is_empty() && !within {
             return Err(wrong(format!(
@@ -145,10 +151,17 @@ impl Tiles {
     /// A note about the tiles that are not open, of which there are `closed`.
     pub fn note(&self, closed: usize) -> String {
         format!(
-            "{closed} of {} tiles lie outside the view and are not read: ranges that no option or file states are those of the first view's tiles",
+            "{closed} of {} tiles lie outside the view and are not read: ranges that no option or file states are those of the \
+             first view's tiles, unless --range gives numbers",
             self.0.len()
         )
     }
+}
+
+/// By how much a tile may exceed these bounds, which a file states.
+fn tolerance(bounds: &Bounds) -> DVec3 {
+    let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    DVec3::splat((ROUNDED * largest).max(DECIMALS.min(OF_TILE * bounds.extent().max_element())))
 }
 
 /// The octree of a file that is not open.

@@ -256,9 +256,10 @@ fn shapes_have_the_heights_of_the_paper() {
         Sources::default().with(&[Replacement::new("shape_flat.wgsl", std::fs::read_to_string(path).unwrap())])
     };
     type Height = fn(f64) -> f64;
+    type Row<'a> = (&'a str, PointShape, Option<&'a str>, Height, [f64; 3]);
     let cone: Height = |rho2| 1.0 - rho2.sqrt();
     let bowl: Height = |rho2| 1.0 - rho2;
-    let rows: [(&str, PointShape, Option<&str>, Height, [f64; 3]); 5] = [
+    let rows: [Row<'_>; 5] = [
         ("sphere", PointShape::Sphere, None, |rho2| (1.0 - rho2).sqrt(), [1.0, 0.0, f64::NAN]),
         ("cone", PointShape::Cone, None, cone, [1.0, 0.0, f64::NAN]),
         ("paraboloid", PointShape::Paraboloid, None, bowl, [1.0, 0.0, f64::NAN]),

@@ -5,7 +5,7 @@ use super::header::{self, Element, Encoding, Kind};
 use super::vertex::{Layout, is_tree};
 use super::whole;
 use crate::Result;
-use crate::io::fault::Fault;
+use crate::io::fault::{Fault, reserve};
 use crate::io::source::Source;
 use crate::io::{Format, Input, Points, Tree, TreeRow};
 use crate::scene::{Colors, Hierarchy, Up, Whole};
@@ -146,7 +146,10 @@ impl Levels {
         }
         let bytes = |range: &Range<u32>| u64::from(range.end - range.start) * size;
         let pieces = numbers.iter().map(|range| (start + u64::from(range.start) * size, bytes(range)));
-        rows.resize(numbers.iter().map(bytes).sum::<u64>() as usize, 0);
+        let all = numbers.iter().map(bytes).sum::<u64>();
+        rows.clear();
+        reserve(rows, all).map_err(|fault| fault.of(&self.path))?;
+        rows.resize(all as usize, 0);
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.expect(pieces.clone().map(|(start, bytes)| start..start + bytes))
             .and_then(|()| read_pieces(&mut *file, pieces, rows))

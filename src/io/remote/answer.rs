@@ -6,6 +6,9 @@ use std::ops::Range;
 use ureq::Body;
 use ureq::http::{HeaderMap, Response, StatusCode, header};
 
+/// Longest file, bytes: 8 PiB. Sums of positions in shorter ones are exact.
+const MOST_LENGTH: u64 = 1 << 53;
+
 /// Which version of a file a server has, as its answers say.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Version {
@@ -83,6 +86,9 @@ pub(super) fn checked(
             bytes(asked)
         )));
     };
+    if length > MOST_LENGTH {
+        return Err(error(format!("the server says that the file has {length} bytes, which no file has")));
+    }
     let version = Version::of(headers, length);
     if known.is_some_and(|known| known.differs(&version)) {
         return Err(error("the file on the server changed while it was read: start again"));

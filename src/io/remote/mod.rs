@@ -154,11 +154,15 @@ impl Remote {
     /// Receives ranges that will be read soon, several at the same time: as many of the first ones
     /// as are kept for sure.
     pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> io::Result<()> {
-        let within = |range: Range<u64>| range.start..range.end.min(self.length());
+        // A range that exceeds the limit is cut, so that a claimed length takes no memory.
+        let within = |range: Range<u64>| {
+            let most = range.start.saturating_add(2 * MOST_EXPECTED);
+            range.start..range.end.min(self.length()).min(most)
+        };
         let missing = self.shared.cache().missing(ranges.into_iter().map(within));
         let mut sum = 0;
         let kept = |range: &Range<u64>| {
-            sum += range.end - range.start;
+            sum += range.end.saturating_sub(range.start);
             sum <= MOST_EXPECTED
         };
         self.shared.receive(joined(missing).into_iter().take_while(kept).collect())
@@ -227,7 +231,8 @@ impl Shared {
             }
         };
         std::thread::scope(|scope| {
-            (1..threads).for_each(|_| drop(scope.spawn(work)));
+            // Where the system refuses a thread, the others do its work.
+            (1..threads).for_each(|_| drop(std::thread::Builder::new().spawn_scoped(scope, work)));
             work();
         });
         self.check()

@@ -11,6 +11,8 @@ use ureq::{Agent, Body, Proxy};
 
 use super::answer::{self, Version, body_length, check_plain, checked, error, refusal, says_empty};
 use super::{CONNECTIONS, Patience};
+use crate::address;
+use crate::io::input::MOST_COPIED;
 
 /// Number of times that a range is asked for if connections are lost or the server is busy.
 const TRIES: u32 = 4;
@@ -18,6 +20,9 @@ const TRIES: u32 = 4;
 /// The pause behind the first failure, as a part of the longest stall: 0.25 s of 30 s. Each further
 /// one is four times as long.
 const FIRST_PAUSE: u32 = 120;
+
+/// Most redirects of a request.
+const REDIRECTS: u32 = 10;
 
 /// Slowest server that is waited for, bytes per second, counted over an answer. It ends an answer
 /// of single bytes, none of which stalls.
@@ -61,7 +66,8 @@ impl Server {
     pub fn first(&self, most: u64) -> io::Result<First> {
         let asked = 0..most;
         self.trying(|server| {
-            let answer = server.answer(&asked)?;
+            // The whole file may come.
+            let answer = server.answer(&asked, server.longest(MOST_COPIED))?;
             match answer.status() {
                 StatusCode::PARTIAL_CONTENT => {
                     let (version, range) = checked(&answer, &asked, None)?;
@@ -89,7 +95,7 @@ impl Server {
         self.trying(|server| {
             // The bytes that arrived before a connection was lost are kept.
             let rest = range.start + bytes.len() as u64..range.end;
-            let answer = server.answer(&rest)?;
+            let answer = server.answer(&rest, server.longest(rest.end - rest.start))?;
             match answer.status() {
                 StatusCode::PARTIAL_CONTENT => {
                     checked(&answer, &rest, Some(version))?;
@@ -120,7 +126,7 @@ impl Server {
                 Err(Failure::Passing(error, asked)) => (error, asked),
             };
             let wait = asked.unwrap_or(pause);
-            if tries == TRIES || start.elapsed() + wait >= self.patience.stall {
+            if tries == TRIES || start.elapsed().saturating_add(wait) >= self.patience.stall {
                 let times = if tries > 1 { format!(", {tries} times") } else { String::new() };
                 return Err(io::Error::new(failed.kind(), format!("{failed}{times}")));
             }
@@ -130,11 +136,29 @@ impl Server {
         Err(error("the server was not asked"))
     }
 
-    /// Sends a request for these bytes, and returns the answer when its headers are there.
-    fn answer(&self, range: &Range<u64>) -> Result<Response<Body>, Failure> {
+    /// Sends a request for these bytes, and returns the answer when its headers are there. The
+    /// bodies of redirects are not read, as they may have no end.
+    fn answer(&self, range: &Range<u64>, longest: Duration) -> Result<Response<Body>, Failure> {
         let words = format!("bytes={}-{}", range.start, range.end - 1);
-        let request = self.agent.get(&self.address).header(header::RANGE, words);
-        request.call().map_err(|failed| sorted(failed, self.patience))
+        let mut address = self.address.clone();
+        for _ in 0..=REDIRECTS {
+            let request = self.agent.get(&address).header(header::RANGE, &words);
+            let request = request.config().timeout_global(Some(longest)).build();
+            let answer = request.call().map_err(|failed| sorted(failed, self.patience))?;
+            let place = match answer.status().as_u16() {
+                301 | 302 | 303 | 307 | 308 => answer::text(answer.headers(), header::LOCATION),
+                _ => return Ok(answer),
+            };
+            let place = place.ok_or_else(|| error("the server redirects to nowhere"))?;
+            address = address::resolved(&address, &place);
+        }
+        Err(Failure::Final(error("the server redirects in a circle")))
+    }
+
+    /// The longest time for an answer of this many bytes.
+    fn longest(&self, size: u64) -> Duration {
+        let Patience { connect, stall } = self.patience;
+        connect.saturating_add(stall).saturating_add(Duration::from_secs_f64(size as f64 / SLOWEST))
     }
 
     /// Appends the body of an answer, which has this many bytes.
@@ -148,7 +172,9 @@ impl Server {
         }
         let ended = || error(format!("the server ended the connection after {received} of {size} bytes"));
         match read {
+            // All bytes may be there although the connection was lost behind them.
             Ok(_) if received == size => Ok(()),
+            Err(failed) if received == size && lost(failed.kind()) => Ok(()),
             Ok(_) => Err(Failure::Passing(ended(), None)),
             Err(failed) if lost(failed.kind()) => Err(Failure::Passing(ended(), None)),
             Err(failed) => Err(Failure::Final(failed)),
@@ -201,11 +227,13 @@ fn agent(kind: Kind, patience: Patience) -> io::Result<Agent> {
         return Ok(agent.clone());
     }
     // An address without encryption may redirect to one with it.
-    let roots = if kind.is_encrypted { root_certs()? } else { root_certs().unwrap_or(RootCerts::WebPki) };
+    let roots = root_certs()?;
     let config = Agent::config_builder()
         .tls_config(TlsConfig::builder().root_certs(roots).build())
         .http_status_as_error(false)
         .https_only(kind.is_encrypted)
+        .max_redirects(0)
+        .max_redirects_will_error(false)
         .proxy(Proxy::try_from_env().filter(|_| !kind.is_here))
         .user_agent(concat!("epsplat/", env!("CARGO_PKG_VERSION")))
         .accept_encoding("identity")
@@ -252,6 +280,7 @@ fn sorted(failed: ureq::Error, patience: Patience) -> Failure {
         ureq::Error::Timeout(Timeout::Resolve | Timeout::Connect) => {
             late(format!("there is no connection to the server within {}", seconds(patience.connect)))
         }
+        ureq::Error::Timeout(Timeout::Global) => late("the server sends too slowly".into()),
         ureq::Error::Timeout(_) => late(format!("the server sent nothing for {}", seconds(patience.stall))),
         ureq::Error::HostNotFound => Failure::Final(error("its server is not known: check the address")),
         ureq::Error::TooManyRedirects => Failure::Final(error("the server redirects in a circle")),

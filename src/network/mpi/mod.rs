@@ -82,7 +82,7 @@ impl Mpi {
             rest = after;
             taken.to_vec()
         };
-        Ok(got.iter().map(|length| taken(length)).collect())
+        Ok(got.iter().map(&mut taken).collect())
     }
 }
 

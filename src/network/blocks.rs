@@ -1,9 +1,9 @@
 //! Blocks of pixels, each of which one process owns: it reduces their values and resolves them.
 //!
-//! A block is a run of pixels in a row of samples, at most 64 of these, so that a word tells which of
-//! them have values. The blocks of an image are dealt to the processes in turn, row by row, so
-//! that each owns a like number anywhere in the image. All samples of a pixel have one owner, in every
-//! render of the image.
+//! A block is a run of pixels in a row of samples, at most 64 of these, so that a word tells which
+//! of them have values. The blocks of an image are dealt to the processes in turn, row by row, so
+//! that each owns a like number anywhere in the image. All samples of a pixel have one owner, in
+//! every render of the image.
 
 use std::ops::Range;
 

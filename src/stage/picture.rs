@@ -46,7 +46,7 @@ impl Picture {
         Ok(Self { frame, ..self })
     }
 
-    /// Combines a rendered frame with its view and counts, and with the reason if the frame is empty.
+    /// Combines a rendered frame with its view and counts, and with the reason if it is empty.
     pub(super) fn of(
         scene: &Scene,
         settings: &Settings,

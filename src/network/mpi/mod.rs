@@ -16,8 +16,10 @@ use crate::error::{Error, Result};
 /// integers.
 const MOST_AT_ONCE: usize = 1 << 30;
 
-/// A process of an MPI job. Only the thread that joined calls its functions. Dropping it ends the job with exit code 1 and all of its processes,
-/// unless [`Mpi::finish`] was called: a process that leaves alone would let the others wait.
+/// A process of an MPI job. Only the thread that joined calls its functions.
+///
+/// Dropping it ends all processes of the job with exit code 1, unless [`Mpi::finish`] was called: a
+/// process that leaves alone would let the others wait.
 pub struct Mpi {
     library: Library,
     rank: usize,

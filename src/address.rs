@@ -32,6 +32,7 @@ pub fn shown(path: &Path) -> Cow<'_, Path> {
 ///
 /// The user and password of `base` hold for the same server only, and its query is left out.
 pub(crate) fn resolved(base: &str, reference: &str) -> String {
+    let reference = &encoded(reference)[..];
     if is_remote(Path::new(reference)) {
         return reference.to_owned();
     }
@@ -54,6 +55,14 @@ pub(crate) fn resolved(base: &str, reference: &str) -> String {
     format!("{scheme}://{host}/{}{query}", parts.join("/"))
 }
 
+/// A reference in which characters that no address has, such as spaces, are encoded. Encoded ones
+/// stay as they are.
+fn encoded(reference: &str) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_graphic() && !b"\"<>\\^`{|}".contains(&byte);
+    let of = |byte: u8| if is_plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") };
+    reference.bytes().map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,6 +75,12 @@ mod tests {
         for path in ["", "-", "a.laz", "http://", "http:/a", "file:///a", "s3://a/b", "a/http://b"] {
             assert!(!is_remote(Path::new(path)), "{path}");
         }
+    }
+
+    #[test]
+    fn references_are_encoded() {
+        assert_eq!(resolved("https://host/a/b.vpc", "./tile 1é.laz?k=%20"), "https://host/a/tile%201%C3%A9.laz?k=%20");
+        assert_eq!(resolved("https://host/a", "http://other/a b"), "http://other/a%20b");
     }
 
     #[test]

@@ -139,23 +139,31 @@ fn located(path: &Path, href: &str) -> Result<PathBuf, String> {
         if href.starts_with("file:") {
             return Err("is a file of the server, which cannot be read from here".into());
         }
+        other_scheme(href)?;
         return Ok(address::resolved(base, href).into());
     }
     if address::is_remote(Path::new(href)) {
-        return Ok(href.into());
+        return Ok(address::resolved(href, href).into());
     }
     let local = href.strip_prefix("file://").unwrap_or(href);
-    if local.contains("://") {
-        // The rest of an address may hold a password.
-        let scheme = local.split("://").next().unwrap_or_default();
-        return Err(format!("has an address that is not read ({}): use https", short(scheme)));
-    }
+    other_scheme(local)?;
     let local = local.strip_prefix("./").unwrap_or(local);
     if local == "-" {
         return Err("is standard input, which is no tile".into());
     }
     let local = Path::new(local);
     Ok(path.parent().unwrap_or(Path::new("")).join(local))
+}
+
+/// Fails for an address that is not read.
+fn other_scheme(href: &str) -> Result<(), String> {
+    match href.split_once("://") {
+        // The rest of an address may hold a password.
+        Some((scheme, _)) if !address::is_remote(Path::new(href)) => {
+            Err(format!("has an address that is not read ({}): use https", short(scheme)))
+        }
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

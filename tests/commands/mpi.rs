@@ -196,7 +196,7 @@ fn a_process_that_fails_ends_the_job_with_one_sentence() {
             (&[&autzen, "--lod", "4px"], 2, "--lod"),
             (&[&autzen, "--lod", "4"], 2, "--lod"),
             (&[&autzen, "--pixel-size", "5"], 2, "--pixel-size"),
-            (&[&autzen, "--backend", "reference"], 2, "adapter"),
+            (&[&autzen, "--backend", "reference"], 2, "--backend"),
         ];
         for (arguments, code, word) in cases {
             let image = folder.path("a.tif");

@@ -59,7 +59,8 @@ def test_progress_reaches_tqdm(sphere):
     shown = out.getvalue()
     for what in ["finding neighbours", "rendering rows"]:
         assert what in shown
-    assert "48/48" in shown and "5000/5000" in shown
+    # Each pixel has four samples, in two rows.
+    assert "96/96" in shown and "5000/5000" in shown
 
 
 def test_an_exception_of_a_callback_stops_the_call(reference):

@@ -21,12 +21,14 @@ fn launchers() -> Vec<&'static str> {
     found
 }
 
-/// Open MPI takes more processes than cores, a container's only user, and a machine without ssh.
-const ENVIRONMENT: [(&str, &str); 5] = [
+/// Open MPI takes more processes than cores, a container's only user, and a machine without ssh. It
+/// copies messages by shared memory alone, as containers may forbid to read another process.
+const ENVIRONMENT: [(&str, &str); 6] = [
     ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
     ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
     ("OMPI_MCA_rmaps_base_oversubscribe", "true"),
     ("OMPI_MCA_plm_rsh_agent", "sh"),
+    ("OMPI_MCA_btl_vader_single_copy_mechanism", "none"),
     ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
 ];
 

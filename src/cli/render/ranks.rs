@@ -7,15 +7,13 @@ use std::time::Instant;
 use epsplat::low_level::network::mpi::{Job, Mpi};
 use epsplat::low_level::network::{Network, Wire, exchanged, together};
 use epsplat::options::DeviceOptions;
-use epsplat::{
-    Error, Files, Picture, Progress, Ranked, ReadReport, Renderer, Report, Result, Scene, Share, View, ViewReport,
-};
+use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, Share, View};
 use serde::Serialize;
 
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
 use super::output::{note_overflows, summary};
-use super::{Arguments, Target, dealt};
+use super::{Arguments, Outcome, Target, dealt};
 
 /// Draws with the processes of a job.
 pub(super) fn run(arguments: &Arguments, mpi: Mpi) -> Result<()> {
@@ -73,19 +71,13 @@ struct OfRank {
 
 /// The JSON report of a picture.
 #[derive(Serialize)]
-struct Outcome<'a> {
+struct OfJob<'a> {
     #[serde(flatten)]
-    report: &'a Report,
-    view: ViewReport,
-    /// Numbers of nodes, points and bytes that a process read; None if the inputs were read whole.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    read: Option<ReadReport>,
+    picture: Outcome<'a>,
     /// The name and version of the MPI library.
     mpi: &'a str,
     /// The processes, in order.
     ranks: Vec<serde_json::Value>,
-    /// A hash of the colour's and of each map's bits ([`Frame::hashes`](epsplat::Frame::hashes)).
-    bits: BTreeMap<&'static str, String>,
 }
 
 /// Draws one picture together.
@@ -152,8 +144,8 @@ fn write(
     target.write(&arguments.output, &frame)?;
     match &arguments.file.json {
         Some(path) => {
-            let bits = frame.hashes();
-            write_json(path, &Outcome { report: &report, view, read, mpi: mpi.version(), ranks, bits })
+            let picture = Outcome { report: &report, view, read, bits: frame.hashes() };
+            write_json(path, &OfJob { picture, mpi: mpi.version(), ranks })
         }
         None => {
             note(&format!("{}; {} processes", summary(&report, &arguments.output), mpi.size()));

@@ -58,6 +58,12 @@ impl Frame {
         frame
     }
 
+    /// Creates a frame of zeros without rows, whose pixels the caller overwrites. Pixels that stay
+    /// zeros take no memory.
+    pub(crate) fn sparse(camera: &Camera, maps: Maps) -> Self {
+        Self { height: 0, ..Self::new(camera, maps) }
+    }
+
     /// Creates an image of linear RGB and straight alpha, without maps.
     pub fn of_colors(width: u32, height: u32, color: Vec<[f32; 4]>) -> Self {
         Self { width, height, color, maps: BTreeMap::new() }

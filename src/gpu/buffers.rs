@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::progress::Progress;
 
 /// Bytes copied per submission, in either direction; bounds the staging memory.
-const PIECE: u64 = 32 << 20;
+pub(super) const PIECE: u64 = 32 << 20;
 
 /// Bytes per piece if the host writes a mapped buffer directly. Two pieces are in host memory at a
 /// time, and the allocator reuses their memory for the next ones.
@@ -35,20 +35,28 @@ impl<T: Pod> Buffer<T> {
     /// Creates a storage buffer that the host can map and read directly, if the device supports
     /// that ([`Readback`]).
     pub(crate) fn readable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
-        Self::open(gpu, what, len, wgpu::BufferUsages::MAP_READ)
+        Self::open(gpu, what, len, (wgpu::BufferUsages::MAP_READ, wgpu::BufferUsages::empty()))
     }
 
     /// Creates a storage buffer that the host can map and write directly, if the device supports
     /// that ([`write`](Self::write)).
     pub(crate) fn writable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
-        Self::open(gpu, what, len, wgpu::BufferUsages::MAP_WRITE)
+        Self::open(gpu, what, len, (wgpu::BufferUsages::MAP_WRITE, wgpu::BufferUsages::empty()))
     }
 
-    /// Creates a storage buffer, which has the usages `maps` if the device can map storage buffers.
-    fn open(gpu: &Gpu, what: &str, len: u64, maps: wgpu::BufferUsages) -> Result<Self> {
+    /// Creates a storage buffer that the host can map, read and write directly, if the device
+    /// supports that. It can also hold the arguments of indirect dispatches.
+    pub(crate) fn exchanged(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
+        let maps = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE;
+        Self::open(gpu, what, len, (maps, wgpu::BufferUsages::INDIRECT))
+    }
+
+    /// Creates a storage buffer of these `others` usages, which also has the usages `maps` if the
+    /// device can map storage buffers.
+    fn open(gpu: &Gpu, what: &str, len: u64, (maps, others): (wgpu::BufferUsages, wgpu::BufferUsages)) -> Result<Self> {
         let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
         let maps = if lies_open { maps } else { wgpu::BufferUsages::empty() };
-        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | maps, gpu.buffer_limit())
+        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | others | maps, gpu.buffer_limit())
     }
 
     /// Creates a storage buffer that can also hold the arguments of indirect dispatches.

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::render::exchange::Rows;
+use crate::render::exchange::{Rows, Runs, push};
 use crate::scene::Samples;
 
 /// Most samples of a block.
@@ -53,6 +53,28 @@ impl Blocks {
         })
     }
 
+    /// Whether each block of `rows` has a sample of `runs`.
+    pub fn used(self, rows: &Rows, runs: &Runs) -> Vec<bool> {
+        let mut used = vec![false; rows.rows as usize * self.across()];
+        for run in runs {
+            let mut at = run.start;
+            while at < run.end {
+                let block = at / self.width * self.across() + at % self.width / self.block;
+                used[block] = true;
+                at = self.samples(block as u32).end;
+            }
+        }
+        used
+    }
+
+    /// The samples of the blocks that are used.
+    pub fn runs(self, used: &[bool]) -> Runs {
+        let mut runs = Runs::new();
+        let blocks = used.iter().enumerate().filter(|(_, used)| **used);
+        blocks.for_each(|(block, _)| push(&mut runs, self.samples(block as u32)));
+        runs
+    }
+
     /// The samples of a block, counted from the first of its rows.
     pub fn samples(self, block: u32) -> Range<usize> {
         let (row, column) = (block as usize / self.across(), block as usize % self.across());
@@ -67,8 +89,13 @@ pub fn mask(samples: Range<usize>, has: impl Fn(usize) -> bool) -> u64 {
 }
 
 /// The samples of a block whose bits are set.
-pub fn marked(samples: Range<usize>, mask: u64) -> impl Iterator<Item = usize> {
-    samples.enumerate().filter(move |(bit, _)| mask >> bit & 1 == 1).map(|(_, sample)| sample)
+pub fn marked(samples: Range<usize>, mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = mask.trailing_zeros() as usize;
+        // Clears the lowest bit.
+        mask &= mask.wrapping_sub(1);
+        (bit < samples.len()).then_some(samples.start + bit)
+    })
 }
 
 #[cfg(test)]
@@ -102,6 +129,16 @@ mod tests {
                     }
                 }
                 assert!(seen.iter().all(|seen| *seen));
+                // Runs grow to the blocks that they touch.
+                let run = 1..rows.samples().len().div_ceil(2);
+                let grown = blocks.runs(&blocks.used(&rows, &vec![run.clone()]));
+                let touched = |block: u32| {
+                    let samples = blocks.samples(block);
+                    samples.start < run.end && run.start < samples.end && !run.is_empty()
+                };
+                let expected = blocks.of(&rows).filter(|(block, _)| touched(*block));
+                let expected: Vec<_> = expected.flat_map(|(block, _)| blocks.samples(block)).collect();
+                assert_eq!(grown.into_iter().flatten().collect::<Vec<_>>(), expected);
             }
             let owned = |of: usize| owner.iter().filter(|own| **own == Some(of)).count();
             let most = (0..owners).map(owned).max().unwrap_or(0);

@@ -12,9 +12,33 @@
 //!
 //! All integers are little-endian.
 
-use std::ops::Range;
-
 use super::blocks::{Blocks, marked, mask};
+
+/// A number of a sample.
+pub trait Number: bytemuck::Pod + Default + PartialEq + Send + Sync {
+    fn long(self) -> u64;
+    fn of(long: u64) -> Self;
+}
+
+impl Number for u32 {
+    fn long(self) -> u64 {
+        self.into()
+    }
+
+    fn of(long: u64) -> Self {
+        long as Self
+    }
+}
+
+impl Number for u64 {
+    fn long(self) -> u64 {
+        self
+    }
+
+    fn of(long: u64) -> Self {
+        long
+    }
+}
 
 /// Samples with values, in the order in which they are packed.
 pub struct Packed {
@@ -31,27 +55,30 @@ const DAMAGED: &str = "a process sent values of pixels that are damaged";
 impl Packed {
     /// Packs the values of `blocks` among `all`, `channels` for each sample. Samples of zeros are
     /// left out.
-    pub fn of(layout: Blocks, blocks: &[u32], all: &[u64], channels: usize) -> Self {
+    pub fn of<T: Number>(layout: Blocks, blocks: &[u32], all: &[T], channels: usize) -> Self {
         let of_sample = |sample: usize| &all[sample * channels..(sample + 1) * channels];
-        let has = |sample: usize| of_sample(sample).iter().any(|number| *number != 0);
-        let any = |samples: Range<usize>| {
-            all[samples.start * channels..samples.end * channels].iter().any(|number| *number != 0)
-        };
-        let used = blocks.iter().filter(|block| any(layout.samples(**block)));
-        let masks = used.map(|block| (*block, mask(layout.samples(*block), has)));
+        let has = |sample: usize| of_sample(sample).iter().any(|number| *number != T::default());
+        let masks = blocks.iter().map(|block| (*block, mask(layout.samples(*block), has)));
         let blocks: Vec<(u32, u64)> = masks.filter(|(_, mask)| *mask != 0).collect();
-        let mut largest = vec![0; channels];
-        let samples = || blocks.iter().flat_map(|(block, mask)| marked(layout.samples(*block), *mask));
-        for sample in samples() {
-            largest.iter_mut().zip(of_sample(sample)).for_each(|(largest, number)| *largest |= number);
+        let count: usize = blocks.iter().map(|(_, mask)| mask.count_ones() as usize).sum();
+        let mut values = Vec::with_capacity(count * channels);
+        for (block, mask) in &blocks {
+            marked(layout.samples(*block), *mask).for_each(|sample| values.extend_from_slice(of_sample(sample)));
+        }
+        let mut largest = vec![0u64; channels];
+        for sample in values.chunks_exact(channels.max(1)) {
+            largest.iter_mut().zip(sample).for_each(|(largest, number)| *largest |= number.long());
         }
         let widths: Vec<u8> = largest.iter().map(|bits| (64 - bits.leading_zeros()).div_ceil(8) as u8).collect();
-        let mut numbers = Vec::new();
-        for sample in samples() {
-            for (number, width) in of_sample(sample).iter().zip(&widths) {
-                numbers.extend_from_slice(&number.to_le_bytes()[..usize::from(*width)]);
-            }
+        let size = count * widths.iter().map(|width| usize::from(*width)).sum::<usize>();
+        // Each number is written whole, and the next one overwrites the bytes above its width.
+        let mut numbers = vec![0; size + 8];
+        let mut at = 0;
+        for (number, width) in values.iter().zip(widths.iter().cycle()) {
+            numbers[at..at + 8].copy_from_slice(&number.long().to_le_bytes());
+            at += usize::from(*width);
         }
+        numbers.truncate(size);
         Self { blocks, widths, numbers }
     }
 
@@ -93,7 +120,7 @@ impl Packed {
     }
 
     /// Number of samples with values.
-    fn samples(&self) -> usize {
+    pub fn samples(&self) -> usize {
         self.blocks.iter().map(|(_, mask)| mask.count_ones() as usize).sum()
     }
 
@@ -102,32 +129,49 @@ impl Packed {
         self.blocks.iter().flat_map(move |(block, mask)| marked(layout.samples(*block), *mask))
     }
 
+    /// The numbers of the blocks with values.
+    pub fn blocks(&self) -> impl Iterator<Item = u32> {
+        self.blocks.iter().map(|(block, _)| *block)
+    }
+
     /// Adds the values to `all` by `reduce`.
     ///
     /// # Errors
     /// A sentence if `all` has other samples or channels.
-    pub fn reduce(
+    pub fn reduce<T: Number>(
         &self,
         layout: Blocks,
-        (all, channels): (&mut [u64], usize),
-        reduce: fn(u64, u64) -> u64,
+        (all, channels): (&mut [T], usize),
+        reduce: fn(T, T) -> T,
     ) -> Result<(), &'static str> {
         if self.widths.len() != channels {
             return if self.blocks.is_empty() { Ok(()) } else { Err(DAMAGED) };
         }
-        let mut rest = &self.numbers[..];
-        for sample in self.places(layout) {
-            for (channel, width) in self.widths.iter().enumerate() {
-                let (bytes, after) = rest.split_at(usize::from(*width));
-                rest = after;
-                let mut number = [0; 8];
-                number[..bytes.len()].copy_from_slice(bytes);
-                let own = all.get_mut(sample * channels + channel).ok_or(DAMAGED)?;
-                *own = reduce(*own, u64::from_le_bytes(number));
+        // Each number is read with the bytes of the next ones, which its width masks.
+        let mut bytes = &self.numbers[..];
+        let masks: Vec<(usize, u64)> = self.widths.iter().map(|width| (usize::from(*width), low(*width))).collect();
+        for (block, mask) in &self.blocks {
+            for sample in marked(layout.samples(*block), *mask) {
+                let own = all.get_mut(sample * channels..(sample + 1) * channels).ok_or(DAMAGED)?;
+                for (own, (width, mask)) in own.iter_mut().zip(&masks) {
+                    let number = bytes.first_chunk().map_or_else(|| last(bytes), |eight| u64::from_le_bytes(*eight));
+                    *own = reduce(*own, T::of(number & mask));
+                    bytes = &bytes[*width..];
+                }
             }
         }
         Ok(())
     }
+}
+
+/// The bits of the lowest `width` bytes.
+fn low(width: u8) -> u64 {
+    u64::MAX.checked_shr(64 - 8 * u32::from(width)).unwrap_or(0)
+}
+
+/// The number of fewer than eight bytes.
+fn last(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
 
 #[cfg(test)]

@@ -17,12 +17,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::blocks::Blocks;
-use super::packed::Packed;
+use super::blocks::{Blocks, marked, mask};
+use super::packed::{Number, Packed};
 use super::{Network, exchanged, gathered};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::render::exchange::{Exchange, Rows, Then};
+use crate::render::exchange::{Exchange, Rows, Runs, Then, push};
 use crate::scene::Samples;
 
 /// The bytes that a process sent to others for one picture.
@@ -94,46 +94,53 @@ impl<'a> Reduction<'a> {
         outcome
     }
 
-    /// The samples of `rows` with values, packed for each owner; nothing for this process.
-    fn packed(&self, rows: &Rows, all: &[u64], channels: usize) -> Vec<Packed> {
+    /// The samples of the `used` blocks with values, packed for each owner; nothing for this
+    /// process.
+    fn packed<T: Number>(&self, rows: &Rows, used: &[bool], (all, channels): (&[T], usize)) -> Vec<Packed> {
         let blocks = self.blocks(rows);
         let mut owned = vec![Vec::new(); self.network.size()];
         for (block, owner) in blocks.of(rows) {
-            if owner != self.network.rank() {
+            if used[block as usize] && owner != self.network.rank() {
                 owned[owner].push(block);
             }
         }
         owned.par_iter().map(|own| Packed::of(blocks, own, all, channels)).collect()
     }
 
-    /// Reduces what others sent for the pixels of this process, and notes which have values.
-    fn reduced(
+    /// Reduces what others sent for the pixels of this process, and notes which have values, and
+    /// which blocks are `used` now.
+    fn reduced<T: Number>(
         &self,
         rows: &Rows,
-        received: &[Packed],
-        (all, channels): (&mut [u64], usize),
-        reduce: fn(u64, u64) -> u64,
+        (received, used): (&[Packed], &mut [bool]),
+        (all, channels): (&mut [T], usize),
+        reduce: fn(T, T) -> T,
     ) -> Result<()> {
         let blocks = self.blocks(rows);
         for packed in received {
             packed.reduce(blocks, (&mut *all, channels), reduce).map_err(|what| Error::Usage(what.into()))?;
+            packed.blocks().for_each(|block| used[block as usize] = true);
         }
         let (width, samples) = (rows.width as usize, self.samples(rows));
+        let [across, down] = [samples.across, samples.down].map(|of| of.max(1) as usize);
         let mut state = self.state();
-        let own = blocks.of(rows).filter(|(_, owner)| *owner == self.network.rank());
-        let own = own.map(|(block, _)| blocks.samples(block));
-        let any = |samples: &Range<usize>| {
-            all[samples.start * channels..samples.end * channels].iter().any(|number| *number != 0)
-        };
-        for sample in own.filter(any).flatten() {
-            if any(&(sample..sample + 1)) {
-                let row = (rows.first as usize + sample / width) / samples.down as usize;
-                let pixel = row * self.width + sample % width / samples.across as usize;
-                let word = pixel / 64;
-                if state.covered.len() <= word {
-                    state.covered.resize(word + 1, 0);
-                }
-                state.covered[word] |= 1 << (pixel % 64);
+        let own = blocks.of(rows).filter(|(block, owner)| used[*block as usize] && *owner == self.network.rank());
+        for (block, _) in own {
+            let own = blocks.samples(block);
+            let has = |sample: usize| {
+                all[sample * channels..(sample + 1) * channels].iter().any(|number| *number != T::default())
+            };
+            let mask = mask(own.clone(), has);
+            let row = (rows.first as usize + own.start / width) / down;
+            // A block begins with a pixel.
+            let first = row * self.width + own.start % width / across;
+            let end = first + own.len().div_ceil(across);
+            if state.covered.len() * 64 < end {
+                state.covered.resize(end.div_ceil(64), 0);
+            }
+            for bit in marked(0..own.len(), mask) {
+                let pixel = first + if across == 1 { bit } else { bit / across };
+                state.covered[pixel / 64] |= 1 << (pixel % 64);
             }
         }
         Ok(())
@@ -183,50 +190,71 @@ impl Exchange for Reduction<'_> {
         }
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
+    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
         self.timed(|| {
             let blocks = self.blocks(rows);
-            let mut all: Vec<u64> = words.iter().map(|word| u64::from(*word)).collect();
-            let asked = self.packed(rows, &all, 1);
+            let mut used = blocks.used(rows, runs);
+            let asked = self.packed(rows, &used, (&*words, 1));
             let received = self.sent(asked.iter().map(Packed::bytes).collect(), |wire| &mut wire.nearest_bytes)?;
             let received = read(&received)?;
-            self.reduced(rows, &received, (&mut all, 1), u64::max)?;
+            self.reduced(rows, (&received, &mut used), (&mut *words, 1), u32::max)?;
             let answer = |packed: &Packed| {
-                packed.places(blocks).flat_map(|sample| (all[sample] as u32).to_le_bytes()).collect::<Vec<u8>>()
+                let mut answer = Vec::with_capacity(packed.samples());
+                answer.extend(packed.places(blocks).map(|sample| words[sample]));
+                bytemuck::cast_slice(&answer).to_vec()
             };
             let answers = self.sent(received.iter().map(answer).collect(), |wire| &mut wire.nearest_bytes)?;
             for (asked, answer) in asked.iter().zip(&answers) {
                 for (sample, word) in asked.places(blocks).zip(bytemuck::pod_collect_to_vec::<u8, u32>(answer)) {
-                    all[sample] = word.into();
+                    words[sample] = word;
                 }
             }
-            words.iter_mut().zip(all).for_each(|(word, reduced)| *word = reduced as u32);
+            *runs = blocks.runs(&used);
             Ok(Then::Go)
         })
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+    fn sums(&self, rows: &Rows, sums: &mut [u64], runs: &mut Runs) -> Result<Then> {
         self.timed(|| {
             let channels = sums.len() / rows.samples().len().max(1);
             if channels == 0 {
                 return Ok(Then::Go);
             }
-            let packed = self.packed(rows, sums, channels);
-            let received = self.sent(packed.iter().map(Packed::bytes).collect(), |wire| &mut wire.sums_bytes)?;
-            self.reduced(rows, &read(&received)?, (sums, channels), u64::wrapping_add)?;
             let blocks = self.blocks(rows);
-            for (block, _) in blocks.of(rows).filter(|(_, owner)| *owner != self.network.rank()) {
+            let mut used = blocks.used(rows, runs);
+            let packed = self.packed(rows, &used, (&*sums, channels));
+            let received = self.sent(packed.iter().map(Packed::bytes).collect(), |wire| &mut wire.sums_bytes)?;
+            self.reduced(rows, (&read(&received)?, &mut used), (&mut *sums, channels), u64::wrapping_add)?;
+            let others = |(block, owner): &(u32, usize)| used[*block as usize] && *owner != self.network.rank();
+            for (block, _) in blocks.of(rows).filter(others) {
                 let samples = blocks.samples(block);
                 sums[samples.start * channels..samples.end * channels].fill(0);
             }
+            *runs = blocks.runs(&used);
             Ok(Then::Go)
         })
+    }
+
+    fn shows_all(&self) -> bool {
+        // A pixel that one render covers and another does not has the background of the latter.
+        self.network.rank() == 0 || self.samples.len() > 1
+    }
+
+    fn shown(&self, pixels: Range<usize>) -> Runs {
+        let mut runs = Runs::new();
+        let state = self.state();
+        let (first, end) = (pixels.start / 64, pixels.end.div_ceil(64).min(state.covered.len()));
+        for word in (first..end).filter(|word| state.covered[*word] != 0) {
+            let own = (word * 64).max(pixels.start)..(word * 64 + 64).min(pixels.end);
+            push(&mut runs, own.start - pixels.start..own.end - pixels.start);
+        }
+        runs
     }
 }
 
 /// Some pixels of a frame as bytes.
 mod pixels {
-    use super::Frame;
+    use super::{Frame, marked};
     use crate::scene::Map;
 
     /// Words of a pixel: its colour, and its values of each map.
@@ -236,8 +264,11 @@ mod pixels {
 
     /// The pixels of `frame` that are set in `covered`: their numbers, then their values.
     pub fn bytes(frame: &Frame, covered: &[u64]) -> Vec<u8> {
-        let is_set = |pixel: &usize| covered.get(pixel / 64).is_some_and(|word| word >> (pixel % 64) & 1 == 1);
-        let pixels: Vec<usize> = (0..frame.color.len()).filter(is_set).collect();
+        let count = covered.iter().map(|word| word.count_ones() as usize).sum();
+        let mut pixels = Vec::with_capacity(count);
+        for (word, mask) in covered.iter().enumerate() {
+            pixels.extend(marked(64 * word..64 * word + 64, *mask));
+        }
         let mut values = Vec::with_capacity(1 + pixels.len() * (1 + words(frame)));
         values.push(pixels.len() as u32);
         values.extend(pixels.iter().map(|pixel| *pixel as u32));

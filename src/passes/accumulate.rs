@@ -49,7 +49,7 @@
 //! 24 fraction bits, terms of weights below 2^-17 round to 0. A pixel with no larger weights shows
 //! its nearest depth.
 
-use rayon::prelude::*;
+use std::borrow::Cow;
 
 use super::attributes;
 use super::footprint::footprint;
@@ -130,34 +130,35 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     ]
 }
 
-/// The sums of `fixed` as one number each, from the `words` in which a device stores them.
-pub fn canonical(needs: &SceneNeeds, words: &[u32]) -> Vec<u64> {
+/// Makes `sums` of the words in which a device stores those of `fixed`: one number of each two
+/// words.
+pub fn canonical(needs: &SceneNeeds, stored: &[u32], sums: &mut [u64]) {
     let long = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
     if fixed_file(needs) != PAIRS {
-        return words.as_chunks().0.par_iter().map(|&[low, high]| long(low, high)).collect();
+        sums.iter_mut().zip(stored.as_chunks().0).for_each(|(sum, &[low, high])| *sum = long(low, high));
+        return;
     }
     // Subtracts from the high half what the low half carried into it
     // (accumulator_fixed_pairs.wgsl).
-    let pair = |&[low, high, from_low, from_high]: &[u32; 4]| {
-        [long(low, from_low), long(high, from_high).wrapping_sub(from_low.into())]
-    };
-    let pairs: Vec<[u64; 2]> = words.as_chunks().0.par_iter().map(pair).collect();
-    pairs.into_flattened()
+    for (pair, &[low, high, from_low, from_high]) in sums.as_chunks_mut().0.iter_mut().zip(stored.as_chunks().0) {
+        *pair = [long(low, from_low), long(high, from_high).wrapping_sub(from_low.into())];
+    }
 }
 
 /// The words in which a device stores `sums`: the inverse of [`canonical`].
-pub fn kept(needs: &SceneNeeds, sums: &[u64]) -> Vec<u32> {
+pub fn kept<'a>(needs: &SceneNeeds, sums: &'a [u64]) -> Cow<'a, [u32]> {
     let [low, high] = [|long: u64| long as u32, |long: u64| (long >> 32) as u32];
-    if fixed_file(needs) != PAIRS {
-        let pairs: Vec<[u32; 2]> = sums.par_iter().map(|&sum| [low(sum), high(sum)]).collect();
-        return pairs.into_flattened();
+    if fixed_file(needs) == PAIRS {
+        let pair = |&[first, second]: &[u64; 2]| {
+            let carried = second.wrapping_add(first >> 32);
+            [low(first), low(carried), high(first), high(carried)]
+        };
+        return sums.as_chunks().0.iter().flat_map(pair).collect();
     }
-    let pair = |&[first, second]: &[u64; 2]| {
-        let carried = second.wrapping_add(first >> 32);
-        [low(first), low(carried), high(first), high(carried)]
-    };
-    let quads: Vec<[u32; 4]> = sums.as_chunks().0.par_iter().map(pair).collect();
-    quads.into_flattened()
+    match cfg!(target_endian = "little") {
+        true => Cow::Borrowed(bytemuck::cast_slice(sums)),
+        false => sums.iter().flat_map(|&sum| [low(sum), high(sum)]).collect(),
+    }
 }
 
 /// The sums of one pixel, in f64: weights, and weights times attributes.

@@ -302,6 +302,21 @@ const WORDS_OF_SURFACES: usize = 2 * SURFACES;
 /// height, because only the caller knows when rows are complete.
 pub fn unpack(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
+    let colors = bytes.par_chunks_exact(record).with_min_len(1 << 14);
+    let first = frame.extend(colors.map(|bytes| bytemuck::pod_read_unaligned(&bytes[..16])));
+    put_maps(layout, bytes, frame, first);
+}
+
+/// Overwrites pixels of `frame`, from pixel `first` on, by the resolved ones in `bytes`.
+pub fn put(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame, first: usize) {
+    let pixels = bytes.chunks_exact(layout.image_words as usize * 4);
+    let colors = frame.color[first..].iter_mut().zip(pixels);
+    colors.for_each(|(color, bytes)| *color = bytemuck::pod_read_unaligned(&bytes[..16]));
+    put_maps(layout, bytes, frame, first);
+}
+
+fn put_maps(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame, first: usize) {
+    let record = layout.image_words as usize * 4;
     // Copies N words of each pixel, from `word` on.
     fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
         let at = word as usize * 4;
@@ -309,8 +324,6 @@ pub fn unpack(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame) {
             *value = bytemuck::pod_read_unaligned(&bytes[at..at + 4 * N]);
         });
     }
-    let colors = bytes.par_chunks_exact(record).with_min_len(1 << 14);
-    let first = frame.extend(colors.map(|bytes| bytemuck::pod_read_unaligned(&bytes[..16])));
     for (row, word) in MAPS.iter().zip(layout.map_words).filter(|(row, _)| row.image_word.is_some()) {
         let width = row.map.width();
         let Some(map) = frame.map_mut(row.map) else { continue };

@@ -41,7 +41,7 @@ impl Source for ShareOfScene {
     fn facts(&self) -> Facts {
         let count = self.scene.surfels.len();
         match self.share {
-            Some(share) => Facts { share: Some(share.range(count).len() as u64), ..Facts::of(&self.scene) },
+            Some(share) => Facts { share: Some(share.len(count) as u64), ..Facts::of(&self.scene) },
             None => Facts { share: Some(count as u64), ..facts_of_all(&self.scene) },
         }
     }

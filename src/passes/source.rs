@@ -184,7 +184,10 @@ pub(super) fn pages_of<'a>(
     (ordered, share): (Option<&Facts>, Option<Share>),
 ) -> Vec<Box<dyn Page + 'a>> {
     let count = scene.surfels.len();
-    let given = || share.map_or(0..count, |share| share.range(count)).map(|index| index as u32).collect();
+    let given = || match share {
+        Some(share) => share.pieces(count).flatten().map(|index| index as u32).collect(),
+        None => (0..count as u32).collect(),
+    };
     let mut order = ordered.map_or_else(given, |facts| order(scene, &facts.core, share));
     let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(scene).into());
     if let Some(copies) = &copies {

@@ -16,6 +16,8 @@
 //! A frame without an exchange is the same steps without these calls. An exchange only ever gets
 //! values of complete bands: a try whose buffers were too small is repeated before it is called.
 
+use std::ops::Range;
+
 use super::count::Capacities;
 use super::run::Run;
 use crate::error::Result;
@@ -44,7 +46,7 @@ impl Rows {
     }
 
     /// The range of these samples among those of the whole render, row by row.
-    pub fn samples(&self) -> std::ops::Range<usize> {
+    pub fn samples(&self) -> Range<usize> {
         let [first, rows, width] = [self.first, self.rows, self.width].map(|n| n as usize);
         first * width..(first + rows) * width
     }
@@ -92,18 +94,56 @@ pub trait Exchange: Sync {
 
     /// Replaces the nearest depths of `rows`, one word for each sample, by those of all processes.
     /// A depth is stored as bits(+inf) - bits(depth), so the nearest is the greatest word, and 0 is
-    /// nothing.
+    /// nothing. `runs` are the samples that may have other values than 0, before and after.
     ///
     /// # Errors
     /// Any error of the exchange.
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then>;
+    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then>;
 
     /// Replaces the sums of `rows`, [`PixelLayout::channels`](crate::plan::PixelLayout::channels)
-    /// for each sample, by those of all processes, added.
+    /// for each sample, by those of all processes, added. `runs` are the samples that may have
+    /// other values than 0, before and after; runs of zeros that it had before are kept.
     ///
     /// # Errors
     /// Any error of the exchange.
-    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then>;
+    fn sums(&self, rows: &Rows, sums: &mut [u64], runs: &mut Runs) -> Result<Then>;
+
+    /// Whether the process needs all pixels as they are shown.
+    fn shows_all(&self) -> bool {
+        true
+    }
+
+    /// The ones among these pixels of the picture that the process needs as they are shown, counted
+    /// from the first one, unless it [needs all](Self::shows_all).
+    fn shown(&self, pixels: Range<usize>) -> Runs {
+        std::iter::once(0..pixels.len()).collect()
+    }
+}
+
+/// Runs of samples or pixels, ascending and apart.
+pub type Runs = Vec<Range<usize>>;
+
+/// Samples by which runs begin and end, so that few runs hold a sparse image.
+const GRAIN: usize = 64;
+
+/// The runs of [`GRAIN`] samples in which a word is not 0.
+fn covered(words: &[u32]) -> Runs {
+    let mut runs = Runs::new();
+    for (number, words) in words.chunks(GRAIN).enumerate() {
+        if words.iter().fold(0, |bits, word| bits | word) != 0 {
+            let first = number * GRAIN;
+            push(&mut runs, first..first + words.len());
+        }
+    }
+    runs
+}
+
+/// Appends a run, which ascends, to the last one if they touch.
+pub fn push(runs: &mut Runs, next: Range<usize>) {
+    match runs.last_mut() {
+        Some(last) if last.end >= next.start => last.end = last.end.max(next.end),
+        _ => runs.push(next),
+    }
 }
 
 /// An exchange, and the render of the frame that it is called for.
@@ -142,25 +182,13 @@ impl Run<'_> {
                 if !exchange.agree(&rows, self.is_complete(band)?)? {
                     return Ok(Onward::Retry);
                 }
-                let mut words = self.words("nearest", of.pixels)?;
-                let then = exchange.nearest(&rows, &mut words)?;
-                if then == Then::Go {
-                    self.put("nearest", &words, of.pixels)?;
-                }
-                then
+                self.exchange_nearest(exchange, &rows)?
             }
             Exchanged::Sums => {
                 if !exchange.agree(&rows, self.is_complete(band)?)? {
                     return Ok(Onward::Retry);
                 }
-                let stored = self.words("sums", of.pixels * u64::from(self.plan.sum_words))?;
-                let mut sums = accumulate::canonical(&self.plan.needs, &stored);
-                let then = exchange.sums(&rows, &mut sums)?;
-                if then == Then::Go {
-                    let stored = accumulate::kept(&self.plan.needs, &sums);
-                    self.put("sums", &stored, of.pixels * u64::from(self.plan.sum_words))?;
-                }
-                then
+                self.exchange_sums(exchange, &rows)?
             }
         };
         Ok(if then == Then::Go { Onward::Next } else { Onward::EndBand })
@@ -177,6 +205,47 @@ impl Run<'_> {
             self.learn();
         }
         Ok(complete)
+    }
+
+    /// Exchanges nearest depths, and notes where this process has some.
+    fn exchange_nearest(&mut self, exchange: &dyn Exchange, rows: &Rows) -> Result<Then> {
+        let samples = rows.samples().len();
+        self.covered = std::iter::once(0..samples).collect();
+        let mut words = vec![0; samples];
+        let Some(buffer) = self.store.buffer("nearest") else { return Ok(Then::Go) };
+        let all = 0..samples as u64;
+        buffer.visit_runs(self.gpu, std::slice::from_ref(&all), |_, own| words.copy_from_slice(own))?;
+        self.covered = covered(&words);
+        let mut runs = self.covered.clone();
+        let then = exchange.nearest(rows, &mut words, &mut runs)?;
+        if then == Then::Go {
+            buffer.write_runs(self.gpu, &of_words(&runs, 1), |run| words[places(&run)].into())?;
+        }
+        Ok(then)
+    }
+
+    /// Exchanges sums. Only the samples in which this process has a nearest depth have any.
+    fn exchange_sums(&self, exchange: &dyn Exchange, rows: &Rows) -> Result<Then> {
+        let Self { gpu, plan, .. } = *self;
+        let (Some(buffer), words) = (self.store.buffer("sums"), u64::from(plan.sum_words)) else {
+            return exchange.sums(rows, &mut [], &mut Runs::new());
+        };
+        let channels = words as usize / 2;
+        // Memory of zeros is taken where it is written.
+        let mut sums = vec![0u64; rows.samples().len() * channels];
+        let mut runs = self.covered.clone();
+        let of_run = |run: &Range<u64>| places(&(run.start / words..run.end / words));
+        let of_sums = |samples: Range<usize>| samples.start * channels..samples.end * channels;
+        buffer.visit_runs(gpu, &of_words(&runs, words), |run, stored| {
+            accumulate::canonical(&plan.needs, stored, &mut sums[of_sums(of_run(&run))]);
+        })?;
+        let then = exchange.sums(rows, &mut sums, &mut runs)?;
+        if then == Then::Go {
+            buffer.write_runs(gpu, &of_words(&runs, words), |run| {
+                accumulate::kept(&plan.needs, &sums[of_sums(of_run(&run))])
+            })?;
+        }
+        Ok(then)
     }
 
     /// The first words of a buffer; none if the frame does not have it.
@@ -227,6 +296,16 @@ impl Run<'_> {
         }
         self.put("triangle_pixels", &words, words.len() as u64)
     }
+}
+
+/// The words of runs of samples, `each` for each sample.
+fn of_words(runs: &Runs, each: u64) -> Vec<Range<u64>> {
+    runs.iter().map(|run| run.start as u64 * each..run.end as u64 * each).collect()
+}
+
+/// A range as places in memory.
+fn places(range: &Range<u64>) -> Range<usize> {
+    range.start as usize..range.end as usize
 }
 
 /// The side of the tiles that know whether triangles show in them, pixels

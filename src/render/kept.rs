@@ -78,7 +78,10 @@ impl Kept {
             store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
             run.among = among;
-            let mut frame = Frame::empty(image, self.options.maps);
+            let mut frame = match among.is_some_and(|among| !among.exchange.shows_all()) {
+                true => Frame::sparse(image, self.options.maps),
+                false => Frame::empty(image, self.options.maps),
+            };
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;

@@ -214,7 +214,10 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let reduction = Reduction::new(network, camera.width, samples);
         let drawn = self.check_together().and_then(|()| self.rendered(camera, Some(&reduction), progress));
         let (frame, report) = together(network, drawn)?;
+        let start = Instant::now();
         let frame = together(network, reduction.gathered(frame))?;
+        let total_ms = report.total_ms + start.elapsed().as_secs_f64() * 1e3;
+        let report = Report { total_ms, ..report };
         Ok((frame.map(|frame| self.filtered(frame, camera)), report, reduction.wire()))
     }
 

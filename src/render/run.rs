@@ -2,7 +2,7 @@
 //! device counted.
 
 use super::count::{Capacities, lacks};
-use super::exchange::{Among, Onward, is_of_triangles};
+use super::exchange::{Among, Exchange, Onward, Runs, is_of_triangles};
 use super::kernels::Kernels;
 use super::record::Recording;
 use super::store::Store;
@@ -53,6 +53,8 @@ pub struct Run<'a> {
     pub(super) recording: Option<Recording<'a>>,
     /// The exchange with other processes that draw the frame.
     pub(super) among: Option<Among<'a>>,
+    /// The samples of the present band in which this process has nearest depths, for an exchange.
+    pub(super) covered: Runs,
     /// Whether an exchange ended the present band, so that it has no image.
     ended: bool,
     /// Whether large splats are drawn by tiles.
@@ -79,6 +81,7 @@ impl<'a> Run<'a> {
             timing: Timing::new(gpu),
             recording: None,
             among: None,
+            covered: Runs::new(),
             ended: false,
             by_tiles: plan.large_by_tiles,
             tally: Tally { drawn: 0, cut: None, complete: true },
@@ -280,7 +283,30 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Reads back the pixels of `band` that this process needs, into a frame of zeros.
+    fn read_shown(&mut self, band: usize, frame: &mut Frame, exchange: &dyn Exchange) -> Result<()> {
+        self.timing.flush(self.gpu)?;
+        let Some(image) = self.store.buffer("image") else { return self.end_band(band) };
+        let (layout, words) = (&self.plan.pixel, u64::from(self.plan.pixel.image_words));
+        let first = self.first_pixel(band);
+        let shown = exchange.shown(first..first + self.plan.image_pixels(band) as usize);
+        let runs: Vec<_> = shown.iter().map(|run| run.start as u64 * words..run.end as u64 * words).collect();
+        image.visit_runs(self.gpu, &runs, |run, pixels| {
+            resolve::put(layout, bytemuck::cast_slice(pixels), frame, first + (run.start / words) as usize);
+        })?;
+        frame.height += self.plan.bands[band].rows / self.plan.needs.samples.down;
+        self.end_band(band)
+    }
+
+    /// The first pixel of a band in the picture.
+    fn first_pixel(&self, band: usize) -> usize {
+        (0..band).map(|band| self.plan.image_pixels(band) as usize).sum()
+    }
+
     fn read_back(&mut self, band: usize, frame: &mut Frame) -> Result<()> {
+        if let Some(among) = self.among.filter(|among| !among.exchange.shows_all()) {
+            return self.read_shown(band, frame, among.exchange);
+        }
         let Some((image, readback)) = self.store.image() else { return self.end_band(band) };
         let (layout, pixels) = (&self.plan.pixel, self.plan.image_pixels(band));
         let bytes = pixels * u64::from(layout.image_words) * 4;

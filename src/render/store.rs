@@ -250,7 +250,7 @@ impl Store {
         };
         self.bands = plan.bands.iter().map(uniform).collect::<Result<_>>()?;
         let nearest = match plan.needs.surface.raster() {
-            None => Buffer::indirect(gpu, "nearest depths", most(&visibility::nearest_words))?,
+            None => Buffer::exchanged(gpu, "nearest depths", most(&visibility::nearest_words))?,
             Some(raster) => {
                 self.targets = Some(Targets::new(gpu, raster, plan)?);
                 Buffer::indirect(gpu, "covered tiles", most(&covered::words))?
@@ -280,7 +280,7 @@ impl Store {
         }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);
-            self.frame.insert("sums", Buffer::storage(gpu, "weighted sums", words)?);
+            self.frame.insert("sums", Buffer::exchanged(gpu, "weighted sums", words)?);
         }
         let record = u64::from(plan.pixel.image_words);
         let words = record * (0..plan.bands.len()).map(|band| plan.image_pixels(band)).max().unwrap_or(0);

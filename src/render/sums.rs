@@ -75,7 +75,9 @@ impl Sums {
         };
         self.nearest.extend(words("nearest", pixels)?);
         let kept = words("sums", pixels * u64::from(plan.sum_words))?;
-        self.sums.extend(accumulate::canonical(&plan.needs, &kept));
+        let first = self.sums.len();
+        self.sums.resize(first + kept.len() / 2, 0);
+        accumulate::canonical(&plan.needs, &kept, &mut self.sums[first..]);
         Ok(())
     }
 
@@ -86,7 +88,7 @@ impl Sums {
         let channels = self.pixel.channels as usize;
         let sums = &self.sums[pixels.start * channels..pixels.end * channels];
         let kept = accumulate::kept(&plan.needs, sums);
-        for (name, words) in [("nearest", &self.nearest[pixels]), ("sums", &kept)] {
+        for (name, words) in [("nearest", &self.nearest[pixels]), ("sums", &*kept)] {
             if let Some(buffer) = store.buffer(name) {
                 buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
             }

@@ -18,6 +18,17 @@ pub(super) const FILL_OF_DISKS: f64 = 0.98;
 /// depth over its distance.
 const ROUNDS: usize = 4;
 
+/// The processes that hold the other shares of a scene, for numbers that depend on all surfels.
+pub trait Others: Sync {
+    /// Replaces each number by the largest one of all processes, which call this in the same order.
+    fn largest(&self, own: &mut [f64]);
+}
+
+/// There are no other processes.
+impl Others for () {
+    fn largest(&self, _: &mut [f64]) {}
+}
+
 impl Camera {
     /// A camera that frames the scene's body: centred, and as large as fits in the image.
     ///
@@ -26,7 +37,7 @@ impl Camera {
     /// cuts no disk: larger disks move the camera farther away. An orthographic lens keeps its
     /// scale, so it may show less.
     pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Ok(Self::framed(size, lens, scene, near, (None, None, Of::Disks))?.0)
+        Ok(Self::framed(size, lens, (scene, &()), near, (None, None, Of::Disks))?.0)
     }
 
     /// As [`Camera::framing`], from a side and with an up direction if they are given; also returns
@@ -46,26 +57,37 @@ impl Camera {
         near: f64,
         (side, up): (Option<Side>, Option<DVec3>),
     ) -> Result<(Self, DVec3)> {
-        Self::framed(size, lens, scene, near, (side, up, Of::Disks))
+        Self::framing_among(size, lens, (scene, &()), near, (side, up))
+    }
+
+    /// As [`Camera::framing_from`], for a scene of which `others` hold the other shares.
+    pub(crate) fn framing_among(
+        size: (u32, u32),
+        lens: Lens,
+        (scene, others): (&Scene, &dyn Others),
+        near: f64,
+        (side, up): (Option<Side>, Option<DVec3>),
+    ) -> Result<(Self, DVec3)> {
+        Self::framed(size, lens, (scene, others), near, (side, up, Of::Disks))
     }
 
     /// The default view by the surfels' centres alone, for studies in which the view must not
     /// depend on the radius.
     #[cfg(feature = "bench")]
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Ok(Self::framed(size, lens, scene, near, (None, None, Of::Centers))?.0)
+        Ok(Self::framed(size, lens, (scene, &()), near, (None, None, Of::Centers))?.0)
     }
 
     fn framed(
         (width, height): (u32, u32),
         lens: Lens,
-        scene: &Scene,
+        (scene, others): (&Scene, &dyn Others),
         near: f64,
         (side, up, of): (Option<Side>, Option<DVec3>, Of),
     ) -> Result<(Self, DVec3)> {
         let (pinhole, image) = image((width, height), lens)?;
         let (forward, up) = directions(side, up, scene)?;
-        let framing = Framing::new(scene, pinhole, image, (forward, unit(up, "up")?));
+        let framing = Framing::new((scene, others), pinhole, image, (forward, unit(up, "up")?));
         let mut eye = framing.eye(FILL, Of::Centers);
         if of == Of::Disks && framing.cuts(eye) {
             eye = framing.eye(FILL_OF_DISKS, Of::Disks);
@@ -78,20 +100,20 @@ impl Camera {
 }
 
 /// Returns the height of an orthographic image that shows the whole scene from a side, world units;
-/// side and up are those of [`Camera::framing_from`].
+/// side and up are those of [`Camera::framing_from`]. `others` hold the other shares of the scene.
 ///
 /// # Errors
 ///
 /// As [`Camera::framing_from`].
 pub fn fitted_height(
     (width, height): (u32, u32),
-    scene: &Scene,
+    (scene, others): (&Scene, &dyn Others),
     (side, up): (Option<Side>, Option<DVec3>),
 ) -> Result<f64> {
     check_size(width, height)?;
     let (forward, up) = directions(side, up, scene)?;
     let image = [[0.0, 0.5, 0.5]; 2];
-    let framing = Framing::new(scene, false, image, (forward, unit(up, "up")?));
+    let framing = Framing::new((scene, others), false, image, (forward, unit(up, "up")?));
     let [right, left, bottom, top] = framing.reach(framing.eye(FILL, Of::Centers), Of::Disks);
     let across = right.max(left) * f64::from(height) / f64::from(width);
     let reach = across.max(bottom).max(top);
@@ -138,6 +160,7 @@ pub(super) enum Of {
 /// The scene in the axes of the camera.
 pub(super) struct Framing<'a> {
     scene: &'a Scene,
+    others: &'a dyn Others,
     pub(super) pinhole: bool,
     /// For the image's width and height each: the middle, half the size, and half the size less a
     /// border pixel, as X/Z (pinhole) or X (orthographic).
@@ -186,7 +209,12 @@ impl Disk {
 }
 
 impl<'a> Framing<'a> {
-    pub(super) fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], (forward, up): (DVec3, DVec3)) -> Self {
+    pub(super) fn new(
+        (scene, others): (&'a Scene, &'a dyn Others),
+        pinhole: bool,
+        image: [[f64; 3]; 2],
+        (forward, up): (DVec3, DVec3),
+    ) -> Self {
         let right = forward.cross(up).normalize();
         let (body, _) = scene.framed();
         // A scene whose points coincide has only the extent of its surfels.
@@ -202,10 +230,11 @@ impl<'a> Framing<'a> {
             false => (largest, 3.0 * largest),
         };
         let axes = [right, forward.cross(right), forward];
-        Self { scene, pinhole, image, axes, body, center: body.center(), radius, clearance }
+        Self { scene, others, pinhole, image, axes, body, center: body.center(), radius, clearance }
     }
 
-    /// The maximum of each component of `f` over all framed disks, in any order.
+    /// The maximum of each component of `f` over all framed disks, in any order, those of other
+    /// processes included.
     ///
     /// A disk much larger than the scene, for example that of a stray point, counts by its centre.
     pub(super) fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
@@ -222,7 +251,10 @@ impl<'a> Framing<'a> {
         };
         let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
         let none = || [f64::NEG_INFINITY; N];
-        (0..self.scene.places()).into_par_iter().map(|index| value(index).unwrap_or_else(none)).reduce(none, join)
+        let all = (0..self.scene.places()).into_par_iter().map(|index| value(index).unwrap_or_else(none));
+        let mut largest = all.reduce(none, join);
+        self.others.largest(&mut largest);
+        largest
     }
 
     /// The extents of the framed points toward the right, left, bottom and top, as X/Z or X, seen

@@ -10,9 +10,10 @@ use crate::error::{Error, Result};
 
 /// Share number `number` of `of` equal shares of a scene's surfels.
 ///
-/// A share is a part of the curve along which devices store surfels
-/// ([`order`](crate::passes::order)), so it lies together in space. No bit of a picture depends on
-/// how surfels are shared.
+/// A share is [`PIECES`] pieces of the curve along which devices store surfels
+/// ([`order`](crate::passes::order)). Each piece lies together in space, and the pieces lie
+/// everywhere in the scene, so that all shares have a like part of what is near and far, visible
+/// and hidden. No bit of a picture depends on how surfels are shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Share {
     /// Number of shares.
@@ -20,6 +21,9 @@ pub struct Share {
     /// Number of this share, from 1.
     number: u32,
 }
+
+/// Pieces of a share.
+pub const PIECES: u32 = 32;
 
 /// The most shares of a scene.
 pub const MOST_SHARES: u32 = 65_536;
@@ -49,10 +53,20 @@ impl Share {
         self.of
     }
 
-    /// The places of this share among `count` surfels. The shares cover all places without overlap.
-    pub fn range(self, count: usize) -> Range<usize> {
-        let end = |number: u32| (count as u128 * u128::from(number) / u128::from(self.of)) as usize;
-        end(self.number - 1)..end(self.number)
+    /// The places of this share among `count` surfels, in order. The shares cover all places
+    /// without overlap.
+    pub fn pieces(self, count: usize) -> impl Iterator<Item = Range<usize>> + Clone {
+        let all = u128::from(self.of) * u128::from(PIECES);
+        let end = move |piece: u128| (count as u128 * piece / all) as usize;
+        (0..PIECES).map(move |turn| {
+            let piece = u128::from(turn) * u128::from(self.of) + u128::from(self.number - 1);
+            end(piece)..end(piece + 1)
+        })
+    }
+
+    /// The number of surfels of this share among `count`.
+    pub fn len(self, count: usize) -> usize {
+        self.pieces(count).map(|piece| piece.len()).sum()
     }
 }
 
@@ -80,12 +94,16 @@ mod tests {
 
     #[test]
     fn shares_cover_everything_once() {
-        for (count, of) in [(0, 3), (1, 1), (2, 5), (10, 3), (1_000_003, 64), (usize::MAX, MOST_SHARES)] {
+        for (count, of) in [(0, 3), (1, 1), (2, 5), (10, 3), (1_000_003, 64), (usize::MAX, 1000)] {
+            let shares = (1..=of).map(|number| Share::new(number, of).unwrap());
+            let least = count / of as usize;
+            assert!(shares.clone().all(|share| share.len(count).abs_diff(least) <= PIECES as usize + 1), "{of}");
+            let mut pieces: Vec<_> = shares.flat_map(|share| share.pieces(count)).collect();
+            pieces.sort_by_key(|piece| (piece.start, piece.end));
             let mut end = 0;
-            for number in 1..=of {
-                let range = Share::new(number, of).unwrap().range(count);
-                assert!(range.start == end && range.end >= end);
-                end = range.end;
+            for piece in pieces {
+                assert!(piece.start == end && piece.end >= end);
+                end = piece.end;
             }
             assert_eq!(end, count);
         }

@@ -41,7 +41,7 @@ impl Camera {
             (turn * forward, turn * top)
         };
         let looks = count.get().min(MOST_DIRECTIONS);
-        let framings = (0..looks).map(|step| Framing::new(scene, pinhole, image, turned(step, looks)));
+        let framings = (0..looks).map(|step| Framing::new((scene, &()), pinhole, image, turned(step, looks)));
         let distance = framings.map(|framing| framing.distance()).fold(0.0, f64::max);
         let center = scene.origin + scene.framed().0.center();
         let camera = |step: u32| {

@@ -155,6 +155,13 @@ impl Whole {
             && part.largest_shorter() <= self.largest_shorter
     }
 
+    /// Whether the default view depends on the median of all radii, because disks exceed the box of
+    /// their centres ([`Camera::framing`](super::Camera::framing)).
+    pub fn is_framed_by_radii(&self) -> bool {
+        let half = 0.5 * self.framed.extent().length();
+        half > 0.0 && f64::from(self.largest_radius) > half
+    }
+
     /// Whether f32 coordinates about this origin are precise enough: the body reaches at most 4
     /// times its longest edge from it.
     pub fn is_near(&self) -> bool {

@@ -66,7 +66,7 @@ impl Guess {
             }
         }
         let settings = request.for_scene(settings.clone(), &scene, &())?;
-        let camera = view.camera(&scene, &Extent::default())?.0;
+        let camera = view.camera(&scene, &Extent::default(), &())?.0;
         render::warm(&scene, self.count as u64, &camera, &settings, backend)
     }
 }

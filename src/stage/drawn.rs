@@ -36,8 +36,8 @@ pub(super) fn whole(
     (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let shared = request.share.filter(|(_, view)| settings.detail.is_finest() && !view.is_framed());
-    let shared = shared.map_or(Ok(None), |(share, _)| tree::share_of(request, share, progress))?;
+    let shared = request.share.filter(|_| settings.detail.is_finest());
+    let shared = shared.map_or(Ok(None), |(share, view)| tree::share_of(request, (share, view), progress))?;
     let mut whole = match shared {
         Some((scene, preparation)) => {
             Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-#[cfg(feature = "parts")]
-use super::ReadReport;
 use super::drawn::{Drawn, whole};
 use super::extent::Extent;
 use super::in_part::{Part, Parts};
 use super::{Files, Inputs, Picture, Request, Scene, View, ViewReport, lens, memory, overdraw, refined};
+#[cfg(feature = "parts")]
+use super::{ReadReport, machines::Drawing};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Replacement};
@@ -21,6 +21,7 @@ use crate::scene::{self, Bounds, Camera, KernelFaults, Maps, Share};
 #[cfg(feature = "parts")]
 use crate::{
     plan::check,
+    scene::framing::Others,
     scene::{ColorKey, Detail},
 };
 
@@ -40,6 +41,9 @@ pub struct Renderer {
     pub(super) extent: Extent,
     /// Whether only a share of the scene was read, for [`Renderer::frame_over`].
     has_share: bool,
+    /// What this process draws together with others, from the last such view.
+    #[cfg(feature = "parts")]
+    pub(super) ranked: Option<Drawing>,
 }
 
 /// The use of a renderer.
@@ -86,9 +90,8 @@ impl Renderer {
 
     /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`.
     ///
-    /// It reads only the share if the input is one file of `epsplat lod` and `view` has a position;
-    /// a view that is framed looks at all surfels. Else it reads everything, because the surfels of
-    /// a share may depend on points around it.
+    /// It reads only the share if the input is one file of `epsplat lod`. Else it reads everything,
+    /// because the surfels of a share may depend on points around it.
     ///
     /// # Errors
     ///
@@ -190,6 +193,8 @@ impl Renderer {
             frames: 1,
             extent: Extent::default(),
             has_share,
+            #[cfg(feature = "parts")]
+            ranked: None,
         })
     }
 
@@ -258,9 +263,13 @@ impl Renderer {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if the view and the scene give no camera.
+    /// [`Error::Usage`] if the view and the scene give no camera, or if the view shows the whole
+    /// scene, of which this renderer has a share.
     pub fn camera(&self, view: &View) -> Result<Camera> {
-        view.camera(self.scene(), &self.extent).map(|(camera, _)| camera)
+        if view.is_framed() {
+            self.check_whole()?;
+        }
+        view.camera(self.scene(), &self.extent, &()).map(|(camera, _)| camera)
     }
 
     /// Renders a view.
@@ -290,9 +299,16 @@ impl Renderer {
     }
 
     /// Returns the scene that a view shows, and how it is drawn. Notes are those of a frame.
+    /// `others` hold the other shares of the scene, if this renderer has one.
     #[cfg(feature = "parts")]
-    pub(super) fn scene_of(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
-        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
+    pub(super) fn scene_of(
+        &mut self,
+        view: &View,
+        others: &dyn Others,
+        progress: &dyn Progress,
+    ) -> Result<SceneOfView> {
+        let others = if self.has_share { others } else { &() };
+        let (camera, seen) = view.camera(self.scene(), &self.extent, others)?;
         let Self { inputs, options, device, views, settings, drawn, frames, .. } = self;
         let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
         match drawn {
@@ -331,7 +347,7 @@ impl Renderer {
         progress: &dyn Progress,
     ) -> Result<Picture> {
         self.check_whole()?;
-        let (camera, seen) = view.camera(self.scene(), &self.extent)?;
+        let (camera, seen) = view.camera(self.scene(), &self.extent, &())?;
         let other = view.as_pinhole();
         let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
         let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };

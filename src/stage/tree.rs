@@ -1,9 +1,9 @@
 //! A file that `epsplat lod` wrote: a picture reads only the nodes and surfels that its cut may
 //! reach.
 
-use super::Request;
 use super::in_part::{Part, ReadReport};
 use super::memory::Memory;
+use super::{Request, View};
 use crate::error::{Error, Result};
 use crate::io::ply::Levels;
 use crate::plan::Settings;
@@ -93,14 +93,22 @@ impl Tree {
 }
 
 /// Reads the `share` of a file of `epsplat lod`, with the facts that the file states about all of
-/// its surfels. Returns None if the input is no such file, or if an option needs all surfels.
-pub(super) fn share_of(request: &Request<'_>, share: Share, progress: &dyn Progress) -> Result<Option<Made>> {
+/// its surfels. Returns None if the input is no such file, or if an option or the view needs all
+/// surfels.
+pub(super) fn share_of(
+    request: &Request<'_>,
+    (share, view): (Share, &View),
+    progress: &dyn Progress,
+) -> Result<Option<Made>> {
     if asks_for_all(request).is_some() || request.surfels().radius_scale.is_some() {
         return Ok(None);
     }
     let Some(levels) = request.files().levels()? else { return Ok(None) };
-    let own = share.range(levels.whole.surfels as usize);
-    let scene = surfels(&levels, own.start as u32..own.end as u32, progress)?;
+    if view.is_framed() && levels.whole.is_framed_by_radii() {
+        return Ok(None);
+    }
+    let own = share.pieces(levels.whole.surfels as usize).map(|piece| piece.start as u32..piece.end as u32);
+    let scene = surfels(&levels, &own.collect::<Vec<_>>(), progress)?;
     let count = scene.surfels.len() as u64;
     Ok(Some((scene, Preparation { points: count, surfels: count, ..Preparation::default() })))
 }

@@ -14,7 +14,7 @@ use crate::options::parse::{up_argument, vector_argument};
 use crate::options::values::Ortho;
 use crate::progress::Progress;
 use crate::scene::camera::check_near;
-use crate::scene::framing::fitted_height;
+use crate::scene::framing::{Others, fitted_height};
 use crate::scene::lens::DEFAULT_FOV;
 use crate::scene::{Camera, Lens, Scene, Side, Up};
 
@@ -158,10 +158,11 @@ impl View {
         view.checked().map_err(|error| said_by(path.display(), error))
     }
 
-    /// Returns the camera of the view and the point that it looks at.
-    pub(super) fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
+    /// Returns the camera of the view and the point that it looks at. `others` hold the other
+    /// shares of the scene.
+    pub(super) fn camera(&self, scene: &Scene, extent: &Extent, others: &dyn Others) -> Result<(Camera, Seen)> {
         match &self.0 {
-            Kind::Given(given) => given.camera(scene, extent),
+            Kind::Given(given) => given.camera(scene, extent, others),
             Kind::Camera(camera) => Ok((camera.clone(), Seen::of_pose(camera, extent.middle(scene)))),
         }
     }
@@ -221,15 +222,15 @@ impl Given {
     }
 
     /// Returns the camera of the view and the point that it looks at.
-    fn camera(&self, scene: &Scene, extent: &Extent) -> Result<(Camera, Seen)> {
+    fn camera(&self, scene: &Scene, extent: &Extent, others: &dyn Others) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or_else(|| extent.near(scene));
         let (pose, up, by) = match &self.place {
             Place::Framed { side, up, fits } => {
                 let lens = match fits {
-                    true => Lens::OrthographicHeight(fitted_height(self.size, scene, (*side, *up))?),
+                    true => Lens::OrthographicHeight(fitted_height(self.size, (scene, others), (*side, *up))?),
                     false => self.lens,
                 };
-                let (camera, target) = Camera::framing_from(self.size, lens, scene, near, (*side, *up))?;
+                let (camera, target) = Camera::framing_among(self.size, lens, (scene, others), near, (*side, *up))?;
                 // Near the vertical, the printed view would else have another roll.
                 let up = match side {
                     Some(side) if side.is_steep() => Some(side.view(*up, scene.up)?.1),

@@ -80,10 +80,10 @@ pub fn part(
 /// # Errors
 ///
 /// As [`part`].
-pub fn surfels(levels: &Levels, numbers: Range<u32>, progress: &dyn Progress) -> Result<Scene> {
-    progress.begin("reading surfels", numbers.len() as u64);
+pub fn surfels(levels: &Levels, numbers: &[Range<u32>], progress: &dyn Progress) -> Result<Scene> {
+    progress.begin("reading surfels", numbers.iter().map(|own| own.len() as u64).sum());
     let nodes = (Hierarchy::default(), LevelFacts::default());
-    let scene = scene(levels, std::slice::from_ref(&numbers), nodes, progress);
+    let scene = scene(levels, numbers, nodes, progress);
     progress.end();
     Ok(Scene { hierarchy: None, ..scene? })
 }

@@ -20,7 +20,7 @@ use epsplat::low_level::network::{Reduction, Wire};
 use epsplat::low_level::passes::share::ShareOfScene;
 use epsplat::low_level::passes::source::{Page, Source};
 use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Settings, check};
-use epsplat::low_level::render::exchange::{Exchange, Rows, Then};
+use epsplat::low_level::render::exchange::{Exchange, Rows, Runs, Then};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Share, Triangles,
@@ -154,11 +154,11 @@ struct Floats<'a> {
 }
 
 impl Exchange for Floats<'_> {
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
-        self.of_depths.nearest(rows, words)
+    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
+        self.of_depths.nearest(rows, words, runs)
     }
 
-    fn sums(&self, _: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+    fn sums(&self, _: &Rows, sums: &mut [u64], _: &mut Runs) -> Result<Then> {
         self.parts.lock().unwrap().push(sums.iter().map(|sum| *sum as f32).collect());
         Ok(Then::Stop)
     }

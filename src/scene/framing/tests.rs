@@ -171,11 +171,11 @@ fn a_fitted_orthographic_view_shows_the_whole_scene_and_no_more() {
         ((1000, 100), "front", 1.0 / FILL),
     ] {
         let side = Some(name.parse::<Side>().unwrap());
-        let height = fitted_height(size, &scene, (side, None)).unwrap();
+        let height = fitted_height(size, (&scene, &()), (side, None)).unwrap();
         assert!((height - expected).abs() < 1e-9, "{size:?} {name}: {height} for {expected}");
     }
     // A single point has its radius alone.
     let one = Scene { surfels: vec![at(3.0, 3.0, 3.0)], ..Scene::default() };
-    let height = fitted_height((10, 10), &one, (Some(Side::Above), None)).unwrap();
+    let height = fitted_height((10, 10), (&one, &()), (Some(Side::Above), None)).unwrap();
     assert!((height - 1.0 / FILL).abs() < 1e-9, "{height}");
 }

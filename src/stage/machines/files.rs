@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::Part;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::part::{Section, Values};
 use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
-use crate::render::exchange::{Exchange, Rows, Then};
+use crate::render::exchange::{Exchange, Rows, Runs, Then};
 
 /// The sections that a process leaves. A frame that is tried again replaces them.
 #[derive(Default)]
@@ -67,12 +67,12 @@ impl Exchange for Depths<'_> {
         false
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
+    fn nearest(&self, rows: &Rows, words: &mut [u32], _: &mut Runs) -> Result<Then> {
         self.0.keep(Values::Nearest, rows, words);
         Ok(Then::Stop)
     }
 
-    fn sums(&self, _: &Rows, _: &mut Vec<u64>) -> Result<Then> {
+    fn sums(&self, _: &Rows, _: &mut [u64], _: &mut Runs) -> Result<Then> {
         Ok(Then::Stop)
     }
 }
@@ -98,15 +98,15 @@ impl Exchange for Sums<'_> {
         Ok(None)
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
-        *words = nearest(self.within, rows)?;
+    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
+        nearest(self.within, rows, words, runs)?;
         if self.common {
             self.kept.keep(Values::Nearest, rows, words);
         }
         Ok(Then::Go)
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+    fn sums(&self, rows: &Rows, sums: &mut [u64], _: &mut Runs) -> Result<Then> {
         self.kept.keep(Values::Sums, rows, sums);
         Ok(Then::Stop)
     }
@@ -125,18 +125,27 @@ impl Exchange for All<'_> {
         Ok(Some(words.into_iter().map(|word| word as u32).collect()))
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut Vec<u32>) -> Result<Then> {
-        *words = nearest(self.0, rows)?;
+    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
+        nearest(self.0, rows, words, runs)?;
         Ok(Then::Go)
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut Vec<u64>) -> Result<Then> {
+    fn sums(&self, rows: &Rows, sums: &mut [u64], runs: &mut Runs) -> Result<Then> {
         let each = sums.len().checked_div(rows.samples().len()).unwrap_or(0);
-        *sums = self.0.values(Values::Sums, rows, each)?;
+        replaced(sums, self.0.values(Values::Sums, rows, each)?, rows, runs);
         Ok(Then::Go)
     }
 }
 
-fn nearest(part: &Part, rows: &Rows) -> Result<Vec<u32>, Error> {
-    Ok(part.values(Values::Nearest, rows, 1)?.into_iter().map(|word| word as u32).collect())
+/// Takes the nearest depths of `rows` from a part.
+fn nearest(part: &Part, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<()> {
+    let all = part.values(Values::Nearest, rows, 1)?.into_iter().map(|word| word as u32);
+    replaced(words, all.collect(), rows, runs);
+    Ok(())
+}
+
+/// Replaces the values of all `rows`.
+fn replaced<T: Copy>(values: &mut [T], by: Vec<T>, rows: &Rows, runs: &mut Runs) {
+    values.copy_from_slice(&by);
+    *runs = std::iter::once(0..rows.samples().len()).collect();
 }

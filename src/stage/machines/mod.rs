@@ -19,6 +19,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub use self::merge::{Merged, merge};
+pub(super) use self::ranks::Drawing;
 pub use self::ranks::Ranked;
 
 use self::header::{Header, Holds};

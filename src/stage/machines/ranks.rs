@@ -1,5 +1,7 @@
 //! Draws a picture together with the other processes of a network: each draws a share of the scene.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use super::draw::{digest_of, subject};
 use super::header::{Subject, encoded};
 use crate::annotate::Marks;
@@ -10,7 +12,8 @@ use crate::passes::share::{ShareOfScene, facts_of_all};
 use crate::plan::{Facts, Settings, check};
 use crate::progress::Progress;
 use crate::render::{self, Backend, Report};
-use crate::scene::Share;
+use crate::scene::framing::Others;
+use crate::scene::{Scene, Share};
 use crate::stage::renderer::SceneOfView;
 use crate::stage::{Picture, Renderer, View};
 
@@ -25,6 +28,33 @@ pub struct Ranked {
     pub wire: Wire,
 }
 
+/// The share of a scene that this process draws, which is kept from view to view.
+pub(in crate::stage) struct Drawing {
+    scene: Arc<Scene>,
+    settings: Settings,
+    facts: Facts,
+    digest: u64,
+    renderer: render::Renderer<ShareOfScene, Backend>,
+}
+
+impl Drawing {
+    fn new(
+        of_view: &SceneOfView,
+        (facts, digest): (Facts, u64),
+        network: &dyn Network,
+        backend: Backend,
+    ) -> Result<Self> {
+        let SceneOfView { scene, settings, is_share, .. } = of_view;
+        let share = Share::new(network.rank() as u32 + 1, network.size() as u32)?;
+        let source = match is_share {
+            true => ShareOfScene::whole(scene.clone()),
+            false => ShareOfScene::new(scene.clone(), share),
+        };
+        let renderer = render::Renderer::new(source, settings, backend)?.among()?;
+        Ok(Self { scene: scene.clone(), settings: settings.clone(), facts, digest, renderer })
+    }
+}
+
 impl Renderer {
     /// Draws a view together with the other processes of a network, all of which call this with the
     /// same scene, options and view. The picture has the bits of [`Renderer::frame`].
@@ -34,34 +64,37 @@ impl Renderer {
     /// [`Error::Usage`] for pictures that processes cannot draw together, and the errors of
     /// [`Renderer::frame`].
     pub fn frame_over(&mut self, view: &View, network: &dyn Network, progress: &dyn Progress) -> Result<Ranked> {
-        let of_view = together(network, self.shared(view, progress))?;
+        let others = OverNetwork { network, failed: Mutex::default() };
+        let shared = self.shared(view, &others, progress);
+        let of_view = together(network, others.failed().map_or(shared, Err))?;
         let SceneOfView { scene, camera, settings, is_share, .. } = &of_view;
-        let of_all = match is_share {
-            true => (facts_of_all(scene), 0),
-            false => (Facts::of(scene), digest_of(scene)),
+        let kept = self.ranked.take().filter(|kept| Arc::ptr_eq(&kept.scene, scene) && kept.settings == *settings);
+        let (facts, digest) = match (&kept, is_share) {
+            (Some(kept), _) => (kept.facts.clone(), kept.digest),
+            (None, true) => (facts_of_all(scene), 0),
+            (None, false) => (Facts::of(scene), digest_of(scene)),
         };
-        let subject = subject(scene, of_all, camera, settings);
+        let subject = subject(scene, (facts.clone(), digest), camera, settings);
         together(network, check_same(network, &Subject { maps: self.maps(), ..subject }))?;
         let backend = together(network, common_backend(self.backend(), network))?;
-        let made = Share::new(network.rank() as u32 + 1, network.size() as u32).and_then(|share| {
-            let source = match is_share {
-                true => ShareOfScene::whole(scene.clone()),
-                false => ShareOfScene::new(scene.clone(), share),
-            };
-            render::Renderer::new(source, settings, backend)?.among()
-        });
-        let (frame, report, wire) = together(network, made)?.frame_over(camera, network, progress)?;
+        let made = match kept {
+            Some(kept) => Ok(kept),
+            None => Drawing::new(&of_view, (facts, digest), network, backend),
+        };
+        let mut kept = together(network, made)?;
+        let (frame, report, wire) = kept.renderer.frame_over(camera, network, progress)?;
+        self.ranked = Some(kept);
         let picture = frame.map(|frame| self.finished((frame, report.clone()), of_view)).transpose();
         Ok(Ranked { picture: together(network, picture)?, report, wire })
     }
 
     /// The scene of a view that processes can draw together.
-    fn shared(&mut self, view: &View, progress: &dyn Progress) -> Result<SceneOfView> {
+    fn shared(&mut self, view: &View, others: &dyn Others, progress: &dyn Progress) -> Result<SceneOfView> {
         if matches!(self.backend(), Backend::Reference) {
             let what = "processes draw together by adapters, and this one has none: `epsplat adapters`";
             return Err(Error::Usage(what.into()));
         }
-        let of_view = self.scene_of(view, progress)?;
+        let of_view = self.scene_of(view, others, progress)?;
         check::options_of_ranks(&of_view.settings, false)?;
         let marks = self.options.marks.marks();
         if marks != Marks::default() {
@@ -81,6 +114,47 @@ impl Renderer {
     }
 }
 
+/// The processes of a network, for the camera of a view. After an error no message is sent.
+struct OverNetwork<'a> {
+    network: &'a dyn Network,
+    failed: Mutex<Option<Error>>,
+}
+
+impl OverNetwork<'_> {
+    /// The first error.
+    fn failed(&self) -> Option<Error> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}
+
+impl Others for OverNetwork<'_> {
+    fn largest(&self, own: &mut [f64]) {
+        let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
+        if failed.is_some() {
+            return;
+        }
+        match gathered(self.network, bytemuck::cast_slice(own)) {
+            Ok(all) => {
+                let all: Vec<Vec<f64>> = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
+                match all.iter().position(|other| other.len() != own.len()) {
+                    Some(other) => *failed = Some(differs(other)),
+                    None => {
+                        all.iter().for_each(|all| own.iter_mut().zip(all).for_each(|(own, of)| *own = own.max(*of)))
+                    }
+                }
+            }
+            Err(error) => *failed = Some(error),
+        }
+    }
+}
+
+/// The error that a process has another scene, camera or options than process 0.
+fn differs(process: usize) -> Error {
+    Error::Usage(format!(
+        "process {process} has another scene, camera or options than process 0: give all processes the same inputs"
+    ))
+}
+
 /// Fails unless all processes draw the same picture of the same scene.
 fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
     // A header has no kernels, as files of parts carry none.
@@ -93,9 +167,7 @@ fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
     let all = gathered(network, &hash.to_le_bytes())?;
     match all.iter().position(|other| *other != all[0]) {
         None => Ok(()),
-        Some(other) => Err(Error::Usage(format!(
-            "process {other} has another scene, camera or options than process 0: give all processes the same inputs"
-        ))),
+        Some(other) => Err(differs(other)),
     }
 }
 

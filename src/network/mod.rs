@@ -6,6 +6,7 @@
 //! process that fails says so there, so that all of them end instead of waiting for it.
 
 mod blocks;
+mod listed;
 mod packed;
 mod reduction;
 

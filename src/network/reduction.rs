@@ -2,9 +2,10 @@
 //! pixel get to the process that owns it, which resolves it, and the picture gets to process 0.
 //!
 //! ```text
-//! nearest  to the owners, which answer     2 x 4 bytes for each covered pixel
-//! sums     to the owners                   the bytes of the sums
-//! picture  to process 0                    16 bytes a pixel, and 4 for each value of a map
+//! nearest    to the owners, which answer   2 x 4 bytes for each covered pixel
+//! sums       to the owners                 the bytes of the sums
+//! fragments  to the owners                 4 bytes each and those of its record, in place of sums
+//! picture    to process 0                  16 bytes a pixel, and 4 for each value of a map
 //! ```
 //!
 //! A process sends only the samples that its own surfels cover ([`packed`](super::packed)), so the
@@ -18,11 +19,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, marked, mask};
+use super::listed::{self, Listed};
 use super::packed::{Number, Packed};
 use super::{Network, exchanged, gathered};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::render::exchange::{Exchange, Rows, Runs, Then, push};
+use crate::plan::steps::Reduced;
+use crate::render::exchange::{Exchange, Lists, Numbers, Rows, Runs, Then, push};
 use crate::scene::Samples;
 
 /// The bytes that a process sent to others for one picture.
@@ -30,12 +33,25 @@ use crate::scene::Samples;
 pub struct Wire {
     /// Bytes of nearest depths, and of answers about them.
     pub nearest_bytes: u64,
-    /// Bytes of sums.
+    /// Bytes of sums, of moments and of colours of nearest fragments.
     pub sums_bytes: u64,
+    /// Bytes of fragments and of their numbers, where surfaces show through each other.
+    pub fragments_bytes: u64,
     /// Bytes of the finished picture.
     pub picture_bytes: u64,
     /// Milliseconds in exchanges: packing, sending and waiting for other processes.
     pub exchange_ms: f64,
+}
+
+impl Wire {
+    /// The bytes of such numbers.
+    fn bytes_of(&mut self, what: Reduced) -> &mut u64 {
+        match what {
+            Reduced::Nearest => &mut self.nearest_bytes,
+            Reduced::Counts => &mut self.fragments_bytes,
+            Reduced::Winners | Reduced::Moments | Reduced::Sums => &mut self.sums_bytes,
+        }
+    }
 }
 
 /// Reduces the values of one picture's pixels.
@@ -80,7 +96,7 @@ impl<'a> Reduction<'a> {
     }
 
     /// Sends bytes, and counts those for other processes by `count`.
-    fn sent(&self, to: Vec<Vec<u8>>, count: fn(&mut Wire) -> &mut u64) -> Result<Vec<Vec<u8>>> {
+    fn sent(&self, to: Vec<Vec<u8>>, count: impl FnOnce(&mut Wire) -> &mut u64) -> Result<Vec<Vec<u8>>> {
         let others = to.iter().enumerate().filter(|(to, _)| *to != self.network.rank());
         *count(&mut self.state().wire) += others.map(|(_, bytes)| bytes.len() as u64).sum::<u64>();
         exchanged(self.network, Ok(to))
@@ -146,6 +162,54 @@ impl<'a> Reduction<'a> {
         Ok(())
     }
 
+    /// Reduces numbers by `combine`, and answers with the results where all processes need them.
+    fn exchanged<T: Number>(
+        &self,
+        what: Reduced,
+        rows: &Rows,
+        (all, combine): (&mut [T], fn(T, T) -> T),
+        runs: &mut Runs,
+    ) -> Result<Then> {
+        let channels = all.len() / rows.samples().len().max(1);
+        if channels == 0 {
+            return Ok(Then::Go);
+        }
+        let blocks = self.blocks(rows);
+        let mut used = blocks.used(rows, runs);
+        let asked = self.packed(rows, &used, (&*all, channels));
+        let received = self.sent(asked.iter().map(Packed::bytes).collect(), |wire| wire.bytes_of(what))?;
+        let received = read(&received)?;
+        self.reduced(rows, (&received, &mut used), (&mut *all, channels), combine)?;
+        match what {
+            Reduced::Nearest | Reduced::Moments => {
+                let answer = |packed: &Packed| {
+                    let mut answer = Vec::with_capacity(packed.samples() * channels);
+                    let places = packed.places(blocks);
+                    places.for_each(|sample| answer.extend_from_slice(&all[sample * channels..][..channels]));
+                    bytemuck::cast_slice(&answer).to_vec()
+                };
+                let answers = self.sent(received.iter().map(answer).collect(), |wire| wire.bytes_of(what))?;
+                for (asked, answer) in asked.iter().zip(&answers) {
+                    let answer = bytemuck::pod_collect_to_vec::<u8, T>(answer);
+                    for (sample, numbers) in asked.places(blocks).zip(answer.chunks_exact(channels)) {
+                        all[sample * channels..][..channels].copy_from_slice(numbers);
+                    }
+                }
+            }
+            Reduced::Winners | Reduced::Sums => {
+                let others = |(block, owner): &(u32, usize)| used[*block as usize] && *owner != self.network.rank();
+                for (block, _) in blocks.of(rows).filter(others) {
+                    let samples = blocks.samples(block);
+                    all[samples.start * channels..samples.end * channels].fill(T::default());
+                }
+            }
+            // A process gives out places for its own fragments.
+            Reduced::Counts => {}
+        }
+        *runs = blocks.runs(&used);
+        Ok(Then::Go)
+    }
+
     /// Brings the pixels of all processes together. Returns the picture in process 0, and none in
     /// the others.
     ///
@@ -170,6 +234,24 @@ impl<'a> Reduction<'a> {
     }
 }
 
+/// How two numbers of 32 bits reduce to one.
+fn short_of(what: Reduced) -> fn(u32, u32) -> u32 {
+    match what {
+        Reduced::Nearest | Reduced::Winners => u32::max,
+        // Numbers of fragments saturate (`wgsl/lists/fragments.wgsl`).
+        Reduced::Counts => u32::saturating_add,
+        Reduced::Moments | Reduced::Sums => u32::wrapping_add,
+    }
+}
+
+/// How two numbers of 64 bits reduce to one.
+fn long_of(what: Reduced) -> fn(u64, u64) -> u64 {
+    match what {
+        Reduced::Nearest | Reduced::Winners => u64::max,
+        Reduced::Counts | Reduced::Moments | Reduced::Sums => u64::wrapping_add,
+    }
+}
+
 /// Reads what each process sent.
 fn read(received: &[Vec<u8>]) -> Result<Vec<Packed>> {
     received.iter().map(|bytes| Packed::read(bytes)).collect::<Result<_, _>>().map_err(|what| Error::Usage(what.into()))
@@ -190,48 +272,37 @@ impl Exchange for Reduction<'_> {
         }
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
-        self.timed(|| {
-            let blocks = self.blocks(rows);
-            let mut used = blocks.used(rows, runs);
-            let asked = self.packed(rows, &used, (&*words, 1));
-            let received = self.sent(asked.iter().map(Packed::bytes).collect(), |wire| &mut wire.nearest_bytes)?;
-            let received = read(&received)?;
-            self.reduced(rows, (&received, &mut used), (&mut *words, 1), u32::max)?;
-            let answer = |packed: &Packed| {
-                let mut answer = Vec::with_capacity(packed.samples());
-                answer.extend(packed.places(blocks).map(|sample| words[sample]));
-                bytemuck::cast_slice(&answer).to_vec()
-            };
-            let answers = self.sent(received.iter().map(answer).collect(), |wire| &mut wire.nearest_bytes)?;
-            for (asked, answer) in asked.iter().zip(&answers) {
-                for (sample, word) in asked.places(blocks).zip(bytemuck::pod_collect_to_vec::<u8, u32>(answer)) {
-                    words[sample] = word;
-                }
-            }
-            *runs = blocks.runs(&used);
-            Ok(Then::Go)
+    fn reduce(&self, what: Reduced, rows: &Rows, numbers: Numbers<'_>, runs: &mut Runs) -> Result<Then> {
+        self.timed(|| match numbers {
+            Numbers::Short(all) => self.exchanged(what, rows, (all, short_of(what)), runs),
+            Numbers::Long(all) => self.exchanged(what, rows, (all, long_of(what)), runs),
         })
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut [u64], runs: &mut Runs) -> Result<Then> {
+    fn greatest(&self, own: &mut [u64]) -> Result<()> {
+        let all = self.timed(|| gathered(self.network, bytemuck::cast_slice(own)))?;
+        for bytes in all {
+            let others = bytemuck::pod_collect_to_vec::<u8, u64>(&bytes);
+            own.iter_mut().zip(others).for_each(|(own, other)| *own = other.max(*own));
+        }
+        Ok(())
+    }
+
+    fn fragments(&self, rows: &Rows, lists: &mut Lists) -> Result<()> {
         self.timed(|| {
-            let channels = sums.len() / rows.samples().len().max(1);
-            if channels == 0 {
-                return Ok(Then::Go);
-            }
             let blocks = self.blocks(rows);
-            let mut used = blocks.used(rows, runs);
-            let packed = self.packed(rows, &used, (&*sums, channels));
-            let received = self.sent(packed.iter().map(Packed::bytes).collect(), |wire| &mut wire.sums_bytes)?;
-            self.reduced(rows, (&read(&received)?, &mut used), (&mut *sums, channels), u64::wrapping_add)?;
-            let others = |(block, owner): &(u32, usize)| used[*block as usize] && *owner != self.network.rank();
-            for (block, _) in blocks.of(rows).filter(others) {
-                let samples = blocks.samples(block);
-                sums[samples.start * channels..samples.end * channels].fill(0);
+            let mut to = vec![Listed::default(); self.network.size()];
+            for (block, owner) in blocks.of(rows).filter(|(_, owner)| *owner != self.network.rank()) {
+                for sample in blocks.samples(block) {
+                    to[owner].add(lists, sample);
+                    lists.clear(sample);
+                }
             }
-            *runs = blocks.runs(&used);
-            Ok(Then::Go)
+            let received = self.sent(to.iter().map(Listed::bytes).collect(), |wire| &mut wire.fragments_bytes)?;
+            for bytes in received {
+                listed::put(&bytes, lists).ok_or_else(|| Error::Usage("a process sent damaged fragments".into()))?;
+            }
+            Ok(())
         })
     }
 

@@ -130,34 +130,40 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     ]
 }
 
-/// Makes `sums` of the words in which a device stores those of `fixed`: one number of each two
-/// words.
-pub fn canonical(needs: &SceneNeeds, stored: &[u32], sums: &mut [u64]) {
+/// Whether a device adds two sums of `fixed` at once for these needs; other numbers of 64 bits are
+/// stored one by one.
+fn in_pairs(needs: Option<&SceneNeeds>) -> bool {
+    needs.is_some_and(|needs| fixed_file(needs) == PAIRS)
+}
+
+/// Makes `numbers` of the words in which a device stores them, two for each: the low word first, or
+/// the sums of `fixed` in a render with `needs`.
+pub fn canonical(needs: Option<&SceneNeeds>, stored: &[u32], numbers: &mut [u64]) {
     let long = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
-    if fixed_file(needs) != PAIRS {
-        sums.iter_mut().zip(stored.as_chunks().0).for_each(|(sum, &[low, high])| *sum = long(low, high));
+    if !in_pairs(needs) {
+        numbers.iter_mut().zip(stored.as_chunks().0).for_each(|(number, &[low, high])| *number = long(low, high));
         return;
     }
     // Subtracts from the high half what the low half carried into it
     // (accumulator_fixed_pairs.wgsl).
-    for (pair, &[low, high, from_low, from_high]) in sums.as_chunks_mut().0.iter_mut().zip(stored.as_chunks().0) {
+    for (pair, &[low, high, from_low, from_high]) in numbers.as_chunks_mut().0.iter_mut().zip(stored.as_chunks().0) {
         *pair = [long(low, from_low), long(high, from_high).wrapping_sub(from_low.into())];
     }
 }
 
-/// The words in which a device stores `sums`: the inverse of [`canonical`].
-pub fn kept<'a>(needs: &SceneNeeds, sums: &'a [u64]) -> Cow<'a, [u32]> {
+/// The words in which a device stores `numbers`: the inverse of [`canonical`].
+pub fn kept<'a>(needs: Option<&SceneNeeds>, numbers: &'a [u64]) -> Cow<'a, [u32]> {
     let [low, high] = [|long: u64| long as u32, |long: u64| (long >> 32) as u32];
-    if fixed_file(needs) == PAIRS {
+    if in_pairs(needs) {
         let pair = |&[first, second]: &[u64; 2]| {
             let carried = second.wrapping_add(first >> 32);
             [low(first), low(carried), high(first), high(carried)]
         };
-        return sums.as_chunks().0.iter().flat_map(pair).collect();
+        return numbers.as_chunks().0.iter().flat_map(pair).collect();
     }
     match cfg!(target_endian = "little") {
-        true => Cow::Borrowed(bytemuck::cast_slice(sums)),
-        false => sums.iter().flat_map(|&sum| [low(sum), high(sum)]).collect(),
+        true => Cow::Borrowed(bytemuck::cast_slice(numbers)),
+        false => numbers.iter().flat_map(|&number| [low(number), high(number)]).collect(),
     }
 }
 

@@ -145,6 +145,12 @@ pub fn start_words(band: &Band) -> u64 {
     2 + u64::from(band.rows) + 1 + band.pixels + 1 + band.pixels
 }
 
+/// The words of that buffer that hold the start of each of `pixels` lists and the end of the last.
+pub fn pixel_starts(rows: u32, pixels: u64) -> std::ops::Range<u64> {
+    let first = 2 + u64::from(rows) + 1;
+    first..first + pixels + 1
+}
+
 /// The steps that compute where lists start, from the visibility pass's counts, and read how many
 /// fragments there are.
 pub fn starts(band: usize) -> [Step; 2] {

@@ -38,7 +38,7 @@ const LAST: u32 = (1 << BITS) - 1;
 /// Within a cell the surfels' values decide, so the device sees the same scene for any input order.
 /// Only surfels that are equal in every value are ordered by index.
 ///
-/// A `share` is several pieces of the curve, each of which lies together in space.
+/// A `share` is a part of that order.
 pub fn order(scene: &Scene, core: &Bounds, share: Option<Share>) -> Vec<u32> {
     let surfels = &scene.surfels;
     let low = core.min.as_vec3();
@@ -60,13 +60,16 @@ pub fn order(scene: &Scene, core: &Bounds, share: Option<Share>) -> Vec<u32> {
         (a >> 32).cmp(&(b >> 32)).then_with(by_content).then_with(|| a.cmp(b))
     });
     // The incomplete last run stays last, so that every other run is stored as whole batches.
-    if let Some(share) = share {
-        along = share.pieces(along.len()).flat_map(|piece| &along[piece]).copied().collect();
-    }
     let (runs, rest) = along.as_chunks::<RUN>();
     let stride = dealing(runs.len());
     let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
-    dealt.chain(rest).map(|place| *place as u32).collect()
+    let mut dealt: Vec<u32> = dealt.chain(rest).map(|place| *place as u32).collect();
+    if let Some(share) = share {
+        let own = share.range(dealt.len());
+        dealt.truncate(own.end);
+        dealt.drain(..own.start);
+    }
+    dealt
 }
 
 /// The bits of a surfel's geometry, colour and fade, as a sort key.
@@ -152,29 +155,23 @@ mod tests {
         assert_eq!(order(&scene(one), &Bounds { min: DVec3::ZERO, max: DVec3::ZERO }, None), [0, 1, 2]);
     }
 
-    /// Shares are the scene together. Their pieces are regions, and lie everywhere.
+    /// Shares follow each other in the order of the scene, and each lies everywhere.
     #[test]
-    fn pieces_of_shares_are_regions() {
+    fn shares_lie_everywhere() {
         let (scene, bounds) = sphere(100_000);
         let volume = |indices: &[u32]| {
             let places = indices.par_iter().map(|index| scene.center(*index as usize));
             Bounds::of(places).extent().element_product() / bounds.extent().element_product()
         };
-        // The curve, without its runs shuffled: one share is all pieces of it in their order.
-        let (mut all, mut volumes, mut pieces) = (Vec::new(), 1f64, 0f64);
+        let mut all = Vec::new();
         for number in 1..=8 {
-            let share = Share::new(number, 8).unwrap();
-            let own = order(&scene, &bounds, Some(share));
-            volumes = volumes.min(volume(&own));
-            // A share has fewer than RUN surfels in most pieces, and the rest of it is the end of
-            // its last piece.
-            let rest = &own[own.len() - own.len() % RUN..];
-            pieces = pieces.max(volume(rest));
+            let own = order(&scene, &bounds, Some(Share::new(number, 8).unwrap()));
+            assert!(volume(&own) > 0.9, "{number}");
+            // Control: its first run lies together.
+            assert!(volume(&own[..RUN]) < 0.3, "{number}");
             all.extend(own);
         }
-        assert!(volumes > 0.9 && pieces < 0.1, "{volumes} {pieces}");
-        all.sort_unstable();
-        assert!(all.into_iter().eq(0..100_000));
+        assert_eq!(all, order(&scene, &bounds, None));
     }
 
     #[test]

@@ -41,13 +41,17 @@ impl Source for ShareOfScene {
     fn facts(&self) -> Facts {
         let count = self.scene.surfels.len();
         match self.share {
-            Some(share) => Facts { share: Some(share.len(count) as u64), ..Facts::of(&self.scene) },
+            Some(share) => Facts { share: Some(share.range(count).len() as u64), ..Facts::of(&self.scene) },
             None => Facts { share: Some(count as u64), ..facts_of_all(&self.scene) },
         }
     }
 
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
         pages_of(&self.scene, needs, most, (ordered, self.share))
+    }
+
+    fn first(&self) -> u32 {
+        self.share.map_or(0, |share| share.range(self.scene.surfels.len()).start as u32)
     }
 
     fn textures(&self) -> &[Mipmap] {

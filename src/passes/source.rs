@@ -27,6 +27,11 @@ pub trait Source: Send + Sync {
     /// once, the other copies are left out.
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
+    /// The place of the first of these surfels in the stored order of the whole scene.
+    fn first(&self) -> u32 {
+        0
+    }
+
     /// The surfels' textures, by their numbers in an [`Atlas`](crate::scene::Atlas).
     fn textures(&self) -> &[Mipmap] {
         &[]
@@ -184,10 +189,7 @@ pub(super) fn pages_of<'a>(
     (ordered, share): (Option<&Facts>, Option<Share>),
 ) -> Vec<Box<dyn Page + 'a>> {
     let count = scene.surfels.len();
-    let given = || match share {
-        Some(share) => share.pieces(count).flatten().map(|index| index as u32).collect(),
-        None => (0..count as u32).collect(),
-    };
+    let given = || share.map_or(0..count, |share| share.range(count)).map(|index| index as u32).collect();
     let mut order = ordered.map_or_else(given, |facts| order(scene, &facts.core, share));
     let copies: Option<Arc<[u32]>> = needs.surface.copies().then(|| copies(scene).into());
     if let Some(copies) = &copies {

@@ -25,6 +25,8 @@ pub type Named = Vec<(&'static str, Buffer<u32>)>;
 pub struct Uploaded {
     /// Consecutive surfels; kernels see one page at a time.
     pub pages: Vec<Page>,
+    /// The place of the first surfel in the stored order of the whole scene.
+    pub first: u32,
     /// The branches of the levels of detail, if a cut is drawn. Then `pages` is empty: pages are
     /// made once the size of the cut is known.
     pub branches: Vec<BranchBuffers>,
@@ -68,13 +70,13 @@ pub fn upload(
     if needs.levels {
         let branches = branches(gpu, source, needs, progress)?;
         progress.end();
-        return Ok(Uploaded { pages: Vec::new(), branches, shared: shared(gpu, source, needs)? });
+        return Ok(Uploaded { pages: Vec::new(), first: 0, branches, shared: shared(gpu, source, needs)? });
     }
     let pages = source.pages(needs, page_surfels(&gpu.adapter, needs) as usize, ordered.then_some(facts));
     let pages = pages.into_iter().map(|of| page(gpu, &*of, needs, progress)).collect::<Result<_>>()?;
     let shared = shared(gpu, source, needs)?;
     progress.end();
-    Ok(Uploaded { pages, branches: Vec::new(), shared })
+    Ok(Uploaded { pages, first: source.first(), branches: Vec::new(), shared })
 }
 
 /// Uploads the branches of the levels of detail of `source`.

@@ -7,7 +7,7 @@ mod parts;
 mod table;
 
 pub use self::adapter::{on_adapter, sums};
-pub use self::parts::{files_of_parts, options_of_parts, options_of_ranks, parts};
+pub use self::parts::{files_of_parts, options_of_parts, options_of_ranks};
 use self::table::{FADES, LENSES, OPTIONS, SCENES, TEXTURES, TILES};
 use super::tuning::MOST_LARGE;
 use super::{Facts, Settings, composited};

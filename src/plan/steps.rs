@@ -226,8 +226,24 @@ pub enum Look {
 pub enum Exchanged {
     /// The triangles of each pixel, shaded. Every process draws all of them.
     Triangles,
-    /// The nearest depths, of which the nearest of all processes counts.
+    /// Numbers of each pixel, which are reduced over all processes.
+    Numbers(Reduced),
+    /// The fragments of each pixel's list.
+    Fragments,
+}
+
+/// Numbers of pixels that are reduced over the processes that draw a frame together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Reduced {
+    /// The nearest depths: the nearest one counts, and every process needs it.
     Nearest,
+    /// The colours of nearest fragments, with their depths if these are in the same number: the
+    /// greatest counts.
+    Winners,
+    /// The numbers of fragments of lists, which are added up.
+    Counts,
+    /// The moments of optical depths, which are added up, and every process needs the sums.
+    Moments,
     /// The sums, which are added up.
     Sums,
 }

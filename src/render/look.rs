@@ -1,6 +1,7 @@
 //! Reads counts from the device in the middle of a frame, where they determine the sizes of
 //! buffers.
 
+use super::exchange::Exchange;
 use super::run::Run;
 use crate::error::{Error, Result};
 use crate::gpu::layout::BATCH;
@@ -75,7 +76,10 @@ impl Run<'_> {
         self.timing.flush(self.gpu)?;
         let Some(starts) = self.store.buffer("starts") else { return Ok(true) };
         let rows = u64::from(self.plan.bands[band].rows);
-        let words = starts.read(self.gpu, 2 + rows + 1)?;
+        let mut words = starts.read(self.gpu, 2 + rows + 1)?;
+        if let Some(among) = self.among {
+            words = common(&words, among.exchange)?;
+        }
         let [total, longest] = [words[0], words[1]];
         let ends_loops = self.gpu.adapter.is_software() && longest > long_lists::most_at_once(self.plan.needs.samples);
         if ends_loops && self.veil() {
@@ -110,6 +114,24 @@ impl Run<'_> {
         })?);
         Ok(false)
     }
+}
+
+/// The number of all fragments, the greatest number at one pixel and the starts of rows, with which
+/// all processes that draw a frame together have room: from the most fragments of each row.
+fn common(words: &[u32], exchange: &dyn Exchange) -> Result<Vec<u32>> {
+    let mut counts: Vec<u64> = words[2..].windows(2).map(|row| u64::from(row[1].saturating_sub(row[0]))).collect();
+    counts.extend([u64::from(words[0]), u64::from(words[1])]);
+    exchange.greatest(&mut counts)?;
+    let (total, longest) = (counts[counts.len() - 2], counts[counts.len() - 1]);
+    let mut sum = 0;
+    let starts = counts[..counts.len() - 2].iter().map(|count| {
+        sum += count;
+        sum
+    });
+    let starts: Vec<u64> = std::iter::once(0).chain(starts).collect();
+    let most = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
+    let total = total.max(starts[starts.len() - 1]);
+    Ok([total, longest].into_iter().chain(starts).map(most).collect())
 }
 
 impl Run<'_> {

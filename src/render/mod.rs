@@ -171,7 +171,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// [`Error::Usage`] for a picture that processes cannot draw together.
     pub fn among(mut self) -> Result<Self> {
         let reference = matches!(self.backend.borrow(), Backend::Reference);
-        check::parts(&self.kept.facts, &self.settings, reference)?;
+        check::options_of_ranks(&self.settings, reference)?;
         for part in self.of_maps.iter_mut().chain([&mut self.kept]) {
             // Tiles that gather keep sums in registers, where nothing can be exchanged.
             part.options.without.push(Optimisation::Gathering);
@@ -216,8 +216,9 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let (frame, report) = together(network, drawn)?;
         let start = Instant::now();
         let frame = together(network, reduction.gathered(frame))?;
+        let tail = frame.as_ref().and_then(Tail::of).or(report.tail);
         let total_ms = report.total_ms + start.elapsed().as_secs_f64() * 1e3;
-        let report = Report { total_ms, ..report };
+        let report = Report { total_ms, tail, ..report };
         Ok((frame.map(|frame| self.filtered(frame, camera)), report, reduction.wire()))
     }
 

@@ -7,7 +7,7 @@ use crate::passes::{
     triangles, veils, visibility,
 };
 use crate::plan::known::Listed;
-use crate::plan::steps::{Exchanged, Look, Part, Stage, Step, Twin};
+use crate::plan::steps::{Exchanged, Look, Part, Reduced, Stage, Step, Twin};
 use crate::plan::{Oit, Plan, Rasterised, Surface, Winner};
 
 /// Returns the steps of a frame by `plan`.
@@ -32,7 +32,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     for band in 0..plan.bands.len() {
         if plan.needs.mesh.is_some() {
             steps.extend(triangles::steps(plan, band).into_iter().map(Step::Stage));
-            exchange(plan, Exchanged::Triangles, band, &mut steps);
+            steps.extend(exchange(plan, Exchanged::Triangles, band));
         }
         match plan.needs.surface {
             Surface::Raster { .. } => {}
@@ -82,16 +82,21 @@ fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>
     }
     let by_workgroups = on(plan, pages, visibility::large(band)).collect();
     large(plan, (tiles::visibility(plan, band, pages.clone()), by_workgroups), steps);
-    exchange(plan, Exchanged::Nearest, band, steps);
+    let found = match plan.needs.surface {
+        Surface::Nearest(Winner::Once) => Reduced::Winners,
+        _ => Reduced::Nearest,
+    };
+    steps.extend(exchange(plan, Exchanged::Numbers(found), band));
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
 }
 
-/// Appends the step at which processes that draw a frame together exchange values of a band. Only
-/// sums in storage can be exchanged, and those of one surface per pixel.
-fn exchange(plan: &Plan, what: Exchanged, band: usize, steps: &mut Vec<Step>) {
-    let stored =
-        matches!(plan.needs.surface, Surface::Blended { separate: false, .. }) && !plan.needs.surface.gathers();
-    steps.extend(stored.then_some(Step::Exchange(what, band)));
+/// The step at which processes that draw a frame together exchange values of a band. Values in
+/// registers cannot be exchanged, and of triangles only those beside one surface per pixel.
+fn exchange(plan: &Plan, what: Exchanged, band: usize) -> Option<Step> {
+    let surface = plan.needs.surface;
+    let is_kept = !surface.gathers() && !surface.separate();
+    let is_needed = what != Exchanged::Triangles || matches!(surface, Surface::Blended { .. });
+    (is_kept && is_needed).then_some(Step::Exchange(what, band))
 }
 
 /// Returns the stage over all pages or, if inputs are separate, one copy of the stage per page of
@@ -114,13 +119,15 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
     let small = visibility::steps(plan, band, Part::All).map(Stage::without_twin);
-    let count = small
-        .into_iter()
-        .chain([visibility::large(band)])
-        .chain(veils::steps(plan, band))
-        .chain([visibility::occlude(band, Part::All)]);
-    steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
-    steps.extend(fragments::steps(band).into_iter().chain(long_lists::sorts(plan, band)).map(Step::Stage));
+    let count = small.into_iter().chain([visibility::large(band)]).chain(veils::steps(plan, band));
+    steps.extend(count.map(Step::Stage));
+    steps.extend(exchange(plan, Exchanged::Numbers(Reduced::Counts), band));
+    steps.push(Step::Stage(visibility::occlude(band, Part::All)));
+    steps.extend(fragments::starts(band));
+    let [list, sort] = fragments::steps(band);
+    steps.push(Step::Stage(list));
+    steps.extend(exchange(plan, Exchanged::Fragments, band));
+    steps.extend([sort].into_iter().chain(long_lists::sorts(plan, band)).map(Step::Stage));
 }
 
 /// Appends the steps that sum all fragments of each pixel of a band, in any order.
@@ -130,11 +137,16 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     }
     let small = visibility::steps(plan, band, Part::All).map(Stage::without_twin);
     let of_all = small.into_iter().chain([visibility::large(band)]);
-    let before = of_all.filter(|_| plan.needs.surface.oit() == Some(Oit::Moments));
+    if plan.needs.surface.oit() == Some(Oit::Moments) {
+        steps.extend(of_all.map(Step::Stage));
+        let found = [Reduced::Nearest, Reduced::Moments].map(Exchanged::Numbers);
+        steps.extend(found.into_iter().filter_map(|found| exchange(plan, found, band)));
+    }
     let sums = [accumulate::steps(plan, band, true).as_twin(Twin::Oit), accumulate::large(band)];
+    steps.extend(sums.map(Step::Stage));
+    steps.extend(exchange(plan, Exchanged::Numbers(Reduced::Sums), band));
     let covered = oit::marks(&plan.needs).then(|| oit::mark(plan, band)).into_iter();
-    let covered = covered.chain([visibility::occlude(band, Part::All)]);
-    steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
+    steps.extend(covered.chain([visibility::occlude(band, Part::All)]).map(Step::Stage));
 }
 
 /// Appends the steps that sum the fragments of each pixel of a band. With separate inputs the steps
@@ -153,7 +165,11 @@ fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
         steps.extend(on(plan, pages, accumulate::steps(plan, band, first)).map(Step::Stage));
         let by_workgroups = on(plan, pages, accumulate::large(band)).collect();
         large(plan, (tiles::accumulate(plan, band, pages.clone()), by_workgroups), steps);
-        exchange(plan, Exchanged::Sums, band, steps);
+        let summed = match plan.needs.surface {
+            Surface::Nearest(_) => Reduced::Winners,
+            _ => Reduced::Sums,
+        };
+        steps.extend(exchange(plan, Exchanged::Numbers(summed), band));
         if plan.needs.surface.separate() {
             steps.push(Step::Stage(individuals::keep(plan, band, first)));
         }

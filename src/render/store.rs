@@ -142,7 +142,7 @@ pub struct Store {
 impl Store {
     /// Creates the store for a scene `uploaded` for `needs`, without buffers for pixels.
     pub fn new(gpu: &Gpu, uploaded: Uploaded, needs: &SceneNeeds) -> Result<Self> {
-        let (mut first, mut order) = (0, Vec::new());
+        let (mut first, mut order) = (uploaded.first, Vec::new());
         let pages = uploaded.pages.into_iter().map(|page| {
             let (before, surfels) = (first, page.numbers.len() as u32);
             first += surfels;

@@ -77,7 +77,7 @@ impl Sums {
         let kept = words("sums", pixels * u64::from(plan.sum_words))?;
         let first = self.sums.len();
         self.sums.resize(first + kept.len() / 2, 0);
-        accumulate::canonical(&plan.needs, &kept, &mut self.sums[first..]);
+        accumulate::canonical(Some(&plan.needs), &kept, &mut self.sums[first..]);
         Ok(())
     }
 
@@ -87,7 +87,7 @@ impl Sums {
         let pixels = first..first + plan.bands[band].pixels as usize;
         let channels = self.pixel.channels as usize;
         let sums = &self.sums[pixels.start * channels..pixels.end * channels];
-        let kept = accumulate::kept(&plan.needs, sums);
+        let kept = accumulate::kept(Some(&plan.needs), sums);
         for (name, words) in [("nearest", &self.nearest[pixels]), ("sums", &*kept)] {
             if let Some(buffer) = store.buffer(name) {
                 buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
@@ -197,7 +197,8 @@ pub fn resolve(
         return Err(Error::Usage("the sums belong to another scene, view or options: pass the same ones".into()));
     }
     let kernels = Kernels::new(sources, &plan, options, facts.surfels);
-    let scene_wide = Uploaded { pages: Vec::new(), branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
+    let scene_wide =
+        Uploaded { pages: Vec::new(), first: 0, branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     store.set_view(gpu, &view);

@@ -10,10 +10,10 @@ use crate::error::{Error, Result};
 
 /// Share number `number` of `of` equal shares of a scene's surfels.
 ///
-/// A share is [`PIECES`] pieces of the curve along which devices store surfels
-/// ([`order`](crate::passes::order)). Each piece lies together in space, and the pieces lie
-/// everywhere in the scene, so that all shares have a like part of what is near and far, visible
-/// and hidden. No bit of a picture depends on how surfels are shared.
+/// A share is a part of the order in which devices store surfels
+/// ([`order`](crate::passes::order)). That order consists of short runs that lie together in space,
+/// and neighbouring runs lie far apart. So all shares have a like part of what is near and far,
+/// visible and hidden. No bit of a picture depends on how surfels are shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Share {
     /// Number of shares.
@@ -22,8 +22,13 @@ pub struct Share {
     number: u32,
 }
 
-/// Pieces of a share.
+/// Pieces of a share of a file.
 pub const PIECES: u32 = 32;
+
+/// Large shares begin at multiples of this many surfels, so that batches are whole
+/// ([`BATCH`](crate::gpu::layout::BATCH)).
+const WHOLE: usize = 64;
+const _: () = assert!(WHOLE.is_multiple_of(crate::gpu::layout::BATCH as usize));
 
 /// The most shares of a scene.
 pub const MOST_SHARES: u32 = 65_536;
@@ -53,8 +58,19 @@ impl Share {
         self.of
     }
 
-    /// The places of this share among `count` surfels, in order. The shares cover all places
+    /// The places of this share among `count` surfels in stored order. The shares cover all places
     /// without overlap.
+    pub fn range(self, count: usize) -> Range<usize> {
+        let is_large = count / self.of as usize >= WHOLE * WHOLE;
+        let end = |number: u32| {
+            let end = (count as u128 * u128::from(number) / u128::from(self.of)) as usize;
+            if is_large && end < count { end / WHOLE * WHOLE } else { end }
+        };
+        end(self.number - 1)..end(self.number)
+    }
+
+    /// The places of this share among `count` surfels of a file whose neighbours are neighbours in
+    /// space: [`PIECES`] runs from everywhere. The shares cover all places without overlap.
     pub fn pieces(self, count: usize) -> impl Iterator<Item = Range<usize>> + Clone {
         let all = u128::from(self.of) * u128::from(PIECES);
         let end = move |piece: u128| (count as u128 * piece / all) as usize;
@@ -62,11 +78,6 @@ impl Share {
             let piece = u128::from(turn) * u128::from(self.of) + u128::from(self.number - 1);
             end(piece)..end(piece + 1)
         })
-    }
-
-    /// The number of surfels of this share among `count`.
-    pub fn len(self, count: usize) -> usize {
-        self.pieces(count).map(|piece| piece.len()).sum()
     }
 }
 
@@ -97,16 +108,24 @@ mod tests {
         for (count, of) in [(0, 3), (1, 1), (2, 5), (10, 3), (1_000_003, 64), (usize::MAX, 1000)] {
             let shares = (1..=of).map(|number| Share::new(number, of).unwrap());
             let least = count / of as usize;
-            assert!(shares.clone().all(|share| share.len(count).abs_diff(least) <= PIECES as usize + 1), "{of}");
-            let mut pieces: Vec<_> = shares.flat_map(|share| share.pieces(count)).collect();
-            pieces.sort_by_key(|piece| (piece.start, piece.end));
-            let mut end = 0;
-            for piece in pieces {
-                assert!(piece.start == end && piece.end >= end);
-                end = piece.end;
-            }
-            assert_eq!(end, count);
+            let pieces = shares.clone().flat_map(|share| share.pieces(count));
+            let ranges = shares.map(|share| share.range(count));
+            let covers = |mut all: Vec<Range<usize>>| {
+                all.sort_by_key(|own| (own.start, own.end));
+                let mut end = 0;
+                for own in all {
+                    assert!(own.start == end && own.end >= end);
+                    end = own.end;
+                }
+                assert_eq!(end, count);
+            };
+            assert!(ranges.clone().all(|range| range.len().abs_diff(least) <= WHOLE), "{of}");
+            covers(ranges.collect());
+            covers(pieces.collect());
         }
+        // Pieces of one share lie everywhere.
+        let pieces: Vec<_> = Share::new(2, 3).unwrap().pieces(960).collect();
+        assert_eq!((pieces.len(), pieces[0].clone(), pieces[31].clone()), (32, 10..20, 940..950));
     }
 
     #[test]

@@ -37,7 +37,8 @@ pub(super) fn whole(
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
     let shared = request.share.filter(|_| settings.detail.is_finest());
-    let shared = shared.map_or(Ok(None), |(share, view)| tree::share_of(request, (share, view), progress))?;
+    let shared =
+        shared.map_or(Ok(None), |(share, view)| tree::share_of(request, (share, view), &settings, progress))?;
     let mut whole = match shared {
         Some((scene, preparation)) => {
             Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })

@@ -10,7 +10,7 @@ use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::taken;
 use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Scene, Share, Surfel};
+use crate::scene::{Camera, Composite, Scene, Share, Surfel};
 use crate::stage::whole::Made;
 use crate::surfels::part::{Taken, nothing, surfels};
 use crate::surfels::{Limits, Preparation};
@@ -94,13 +94,16 @@ impl Tree {
 
 /// Reads the `share` of a file of `epsplat lod`, with the facts that the file states about all of
 /// its surfels. Returns None if the input is no such file, or if an option or the view needs all
-/// surfels.
+/// surfels. Where fragments are sorted, the place of each surfel in the order of all decides
+/// between fragments of one depth.
 pub(super) fn share_of(
     request: &Request<'_>,
     (share, view): (Share, &View),
+    settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Option<Made>> {
-    if asks_for_all(request).is_some() || request.surfels().radius_scale.is_some() {
+    let sorts = matches!(settings.composite, Composite::Sorted | Composite::Gaussians);
+    if sorts || asks_for_all(request).is_some() || request.surfels().radius_scale.is_some() {
         return Ok(None);
     }
     let Some(levels) = request.files().levels()? else { return Ok(None) };

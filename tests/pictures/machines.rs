@@ -19,8 +19,9 @@ use epsplat::low_level::gpu::Gpu;
 use epsplat::low_level::network::{Reduction, Wire};
 use epsplat::low_level::passes::share::ShareOfScene;
 use epsplat::low_level::passes::source::{Page, Source};
-use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Settings, check};
-use epsplat::low_level::render::exchange::{Exchange, Rows, Runs, Then};
+use epsplat::low_level::plan::steps::Reduced;
+use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Settings, check, composited};
+use epsplat::low_level::render::exchange::{Exchange, Lists, Numbers, Rows, Runs, Then};
 use epsplat::low_level::render::{Backend, Renderer, render};
 use epsplat::low_level::scene::{
     Blend, Camera, Colors, Composite, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Share, Triangles,
@@ -103,15 +104,18 @@ fn alone(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Frame
     render(scene, camera, options, &Backend::gpu(gpu.clone()), &()).unwrap().0
 }
 
-/// Random pictures in which parts can be summed: what cannot be is left out of the options.
-fn opaque(scene: &Scene, random: &mut Random) -> Settings {
+/// Random pictures that processes draw together: what they cannot draw is left out of the options.
+fn exchanged(scene: &Scene, random: &mut Random) -> Settings {
     let options = any_options::sampled(scene, random);
+    // Half of the pictures show one surface, as nearly all pictures of users do.
+    let opaque = !options.maps.has(Map::Surfaces) && random.one_in(2);
+    let no_tail = options.composite == Composite::Opaque || opaque;
+    let maps = options.maps.beside(Maps::of(&[Map::Index, Map::Decision]));
     Settings {
-        composite: Composite::Opaque,
-        blend: Blend::Weighted,
+        composite: if opaque { Composite::Opaque } else { options.composite },
         separate: false,
         accumulator: Accumulator::Fixed,
-        maps: options.maps.beside(Maps::of(&[Map::Index, Map::Surfaces, Map::Tail, Map::Decision])),
+        maps: if no_tail { maps.beside(Maps::of(&[Map::Tail])) } else { maps },
         organisation: any_options::pick(random, &[Organisation::Auto, Organisation::Auto, Organisation::Scatter]),
         without: any_options::without(random),
         ..options
@@ -122,13 +126,14 @@ fn opaque(scene: &Scene, random: &mut Random) -> Settings {
 fn any_shares_of_any_scene_make_the_bits_of_one_process() {
     let Some(gpu) = common::gpu() else { return };
     let (mut drawn, mut features) = (0, std::collections::BTreeSet::new());
+    let mut surfaces = std::collections::BTreeMap::<String, u32>::new();
     for seed in 0..if common::takes(1, 2) { 400 } else { 30 } {
         let random = &mut Random(7000 + seed);
         let any_scene::Sampled { scene, camera, about } = any_scene::sampled(random);
-        let options = opaque(&scene, random);
+        let options = exchanged(&scene, random);
         let facts = Facts::of(&scene);
         let refused = check::options(&options, false).and_then(|()| check::scene(&facts, &options, false));
-        if refused.and_then(|()| check::parts(&facts, &options, false)).is_err() {
+        if refused.and_then(|()| check::options_of_ranks(&options, false)).is_err() {
             continue;
         }
         // Small buffers cut the frame into bands and the surfels into pages.
@@ -136,14 +141,23 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
         let Ok((whole, _)) = render(&scene, &camera, &options, &Backend::gpu(gpu.clone()), &()) else { continue };
         let of = [1, 2, 3, 7][random.below(4)];
         // Places in an image are stored relative to the range of all, which a hand does not know.
-        let runs = random.one_in(2) || matches!(scene.colors, Colors::Textured(_));
+        // Where fragments are sorted, the order of all decides between those of one depth.
+        let sorts = matches!(composited(&facts, &options), Composite::Sorted | Composite::Gaussians);
+        let runs = random.one_in(2) || sorts || matches!(scene.colors, Colors::Textured(_));
         let sources = if runs { shares(&scene, of) } else { hands(&scene, of, random) };
         let (frame, _) = together(&sources, &camera, &options, &gpu);
         assert!(frame.hashes() == whole.hashes(), "seed {seed}: {about:?} of {of}, {options:?}");
         drawn += 1;
         features.extend(about);
+        let shown = match (options.blend, composited(&facts, &options)) {
+            (Blend::Nearest, _) => "nearest".into(),
+            (_, Composite::Layers(_)) => "layers".into(),
+            (_, composite) => format!("{composite:?}").to_lowercase(),
+        };
+        *surfaces.entry(shown).or_insert(0) += 1;
     }
-    println!("{drawn} pictures of {features:?}");
+    println!("{drawn} pictures of {features:?}, {surfaces:?}");
+    assert!(surfaces.len() > 4, "{surfaces:?}");
     assert!(drawn > 10 && features.contains("triangles") && features.contains("inputs"), "{drawn} {features:?}");
 }
 
@@ -154,13 +168,14 @@ struct Floats<'a> {
 }
 
 impl Exchange for Floats<'_> {
-    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
-        self.of_depths.nearest(rows, words, runs)
-    }
-
-    fn sums(&self, _: &Rows, sums: &mut [u64], _: &mut Runs) -> Result<Then> {
+    fn reduce(&self, what: Reduced, rows: &Rows, numbers: Numbers<'_>, runs: &mut Runs) -> Result<Then> {
+        let Numbers::Long(sums) = numbers else { return self.of_depths.reduce(what, rows, numbers, runs) };
         self.parts.lock().unwrap().push(sums.iter().map(|sum| *sum as f32).collect());
         Ok(Then::Stop)
+    }
+
+    fn fragments(&self, _: &Rows, _: &mut Lists) -> Result<()> {
+        Ok(())
     }
 }
 
@@ -245,13 +260,11 @@ fn what_is_sent_follows_from_the_covered_pixels() {
 }
 
 #[test]
-fn pictures_that_parts_cannot_sum_are_refused() {
+fn pictures_that_processes_cannot_draw_together_are_refused() {
     let Some(gpu) = common::gpu() else { return };
     let scene = sphere(100, 1.5);
     let backend = Backend::gpu(gpu);
-    let refusals: [(Settings, &str); 5] = [
-        (Settings { composite: Composite::Layers(2), ..Settings::default() }, "--composite"),
-        (Settings { composite: Composite::Sorted, ..Settings::default() }, "--composite"),
+    let refusals: [(Settings, &str); 3] = [
         (Settings { accumulator: Accumulator::Fixed64, ..Settings::default() }, "--accumulator"),
         (Settings { maps: Maps::of(&[Map::Index]), ..Settings::default() }, "index"),
         (Settings { separate: true, ..Settings::default() }, "--separate"),

@@ -6,7 +6,7 @@ use crate::plan::{Accumulator, ColorNeed, Facts, Settings, composited};
 use crate::scene::{Blend, Composite, Map};
 
 /// Combinations of options that processes cannot draw together, for every scene.
-const OPTIONS: [Clash; 9] = [
+const OPTIONS: [Clash; 6] = [
     Clash {
         applies: |_, device| !device,
         sentence: "parts of a picture are integer sums of compute kernels: leave --backend reference out",
@@ -20,15 +20,6 @@ const OPTIONS: [Clash; 9] = [
         sentence: "parts are added by the accumulator fixed: leave --accumulator out",
     },
     Clash {
-        applies: |options, _| !matches!(options.composite, Composite::Opaque | Composite::Gaussians),
-        sentence: "surfaces behind the nearest one need all fragments of a pixel in one process, and a part has some: \
-                   leave --composite out",
-    },
-    Clash {
-        applies: |options, _| options.blend == Blend::Nearest,
-        sentence: "--blend nearest adds nothing that parts could sum: leave it out, or take --epsilon abs:0",
-    },
-    Clash {
         applies: |options, _| options.separate,
         sentence: "parts blend the surfels of all inputs: leave --separate out",
     },
@@ -40,30 +31,41 @@ const OPTIONS: [Clash; 9] = [
         applies: |options, _| options.maps.iter().any(|map| map.row().numbers),
         sentence: "the map index names one surfel of all parts, which no sum tells: leave it out",
     },
+];
+
+/// Combinations of options that processes cannot draw together through files.
+const OPTIONS_OF_FILES: [Clash; 4] = [
+    Clash {
+        applies: |options, _| !options.sources.is_empty(),
+        sentence: "files of parts carry no kernels, and a picture needs the same in all of them: leave --source out",
+    },
+    Clash {
+        applies: |options, _| !matches!(options.composite, Composite::Opaque | Composite::Gaussians),
+        sentence: "surfaces behind the nearest one need all fragments of a pixel in one process, and a part has some: \
+                   leave --composite out",
+    },
+    Clash {
+        applies: |options, _| options.blend == Blend::Nearest,
+        sentence: "--blend nearest adds nothing that parts could sum: leave it out, or take --epsilon abs:0",
+    },
     Clash {
         applies: |options, _| options.maps.has(Map::Surfaces),
         sentence: "the map surfaces needs all fragments of a pixel in one process: leave it out",
     },
 ];
 
-/// Combinations of scenes and options that processes cannot draw together.
-const SCENES: [SceneClash; 1] = [SceneClash {
-    applies: |facts, options, _| composited(facts, options) != Composite::Opaque,
-    sentence: "Gaussians are sorted in one process, and a part has some of them: take --flatten and --composite opaque",
-}];
-
-/// Combinations of options that processes cannot draw together through files.
-const OPTIONS_OF_FILES: [Clash; 1] = [Clash {
-    applies: |options, _| !options.sources.is_empty(),
-    sentence: "files of parts carry no kernels, and a picture needs the same in all of them: leave --source out",
-}];
-
 /// Combinations of scenes and options that processes cannot draw together through files.
-const SCENES_OF_FILES: [SceneClash; 1] = [SceneClash {
-    applies: |facts, _, _| facts.colors == ColorNeed::Textured,
-    sentence: "painted surfels take their colours from an image, which files of parts do not carry: leave --texture out, or \
+const SCENES_OF_FILES: [SceneClash; 2] = [
+    SceneClash {
+        applies: |facts, options, _| composited(facts, options) != Composite::Opaque,
+        sentence: "Gaussians are sorted in one process, and a part has some of them: take --flatten and --composite opaque",
+    },
+    SceneClash {
+        applies: |facts, _, _| facts.colors == ColorNeed::Textured,
+        sentence: "painted surfels take their colours from an image, which files of parts do not carry: leave --texture out, or \
                draw meshes as triangles",
-}];
+    },
+];
 
 /// Fails with the sentence of the first row that applies.
 fn first_scene(clashes: &[SceneClash], facts: &Facts, options: &Settings) -> Result<()> {
@@ -90,21 +92,11 @@ pub fn options_of_parts(options: &Settings, reference: bool) -> Result<()> {
     first(&OPTIONS_OF_FILES, options, !reference)
 }
 
-/// Rejects pictures that several processes cannot draw together.
-///
-/// # Errors
-/// [`Error::Usage`](crate::Error::Usage).
-pub fn parts(facts: &Facts, options: &Settings, reference: bool) -> Result<()> {
-    first(&OPTIONS, options, !reference)?;
-    first_scene(&SCENES, facts, options)
-}
-
 /// Rejects pictures that several processes cannot draw together through files.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage).
 pub fn files_of_parts(facts: &Facts, options: &Settings) -> Result<()> {
     options_of_parts(options, false)?;
-    parts(facts, options, false)?;
     first_scene(&SCENES_OF_FILES, facts, options)
 }

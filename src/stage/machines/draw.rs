@@ -128,7 +128,7 @@ pub(super) fn digest_of(scene: &Scene) -> u64 {
 /// The digest of the surfels of `share`, and of the triangles in the first share.
 fn own_digest(scene: &Scene, share: Share, subject: &Subject, settings: &Settings) -> u64 {
     let ordered = settings.has(crate::plan::Optimisation::Order);
-    let given = || share.pieces(scene.surfels.len()).flatten().map(|index| index as u32).collect();
+    let given = || share.range(scene.surfels.len()).map(|index| index as u32).collect();
     let indices = if ordered { order(scene, &subject.facts.core, Some(share)) } else { given() };
     let of_triangles = if share.number() == 1 { digest::of_triangles(&scene.triangles) } else { 0 };
     digest::of_surfels(scene, &indices).wrapping_add(of_triangles)

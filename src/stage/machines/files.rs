@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::Part;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::part::{Section, Values};
 use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
-use crate::render::exchange::{Exchange, Rows, Runs, Then};
+use crate::plan::steps::Reduced;
+use crate::render::exchange::{Exchange, Lists, Numbers, Rows, Runs, Then};
 
 /// The sections that a process leaves. A frame that is tried again replaces them.
 #[derive(Default)]
@@ -59,6 +60,11 @@ impl Part {
     }
 }
 
+/// The error that files do not carry such numbers, which the options of parts exclude.
+fn not_in_files<T>() -> Result<T> {
+    Err(Error::Usage("files of parts carry nearest depths and sums, and this picture has others".into()))
+}
+
 /// Leaves the nearest depths of a share.
 pub(super) struct Depths<'a>(pub &'a Kept);
 
@@ -67,13 +73,16 @@ impl Exchange for Depths<'_> {
         false
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut [u32], _: &mut Runs) -> Result<Then> {
-        self.0.keep(Values::Nearest, rows, words);
+    fn reduce(&self, what: Reduced, rows: &Rows, numbers: Numbers<'_>, _: &mut Runs) -> Result<Then> {
+        match (what, numbers) {
+            (Reduced::Nearest, Numbers::Short(words)) => self.0.keep(Values::Nearest, rows, words),
+            _ => return not_in_files(),
+        }
         Ok(Then::Stop)
     }
 
-    fn sums(&self, _: &Rows, _: &mut [u64], _: &mut Runs) -> Result<Then> {
-        Ok(Then::Stop)
+    fn fragments(&self, _: &Rows, _: &mut Lists) -> Result<()> {
+        not_in_files()
     }
 }
 
@@ -98,17 +107,25 @@ impl Exchange for Sums<'_> {
         Ok(None)
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
-        nearest(self.within, rows, words, runs)?;
-        if self.common {
-            self.kept.keep(Values::Nearest, rows, words);
+    fn reduce(&self, what: Reduced, rows: &Rows, numbers: Numbers<'_>, runs: &mut Runs) -> Result<Then> {
+        match (what, numbers) {
+            (Reduced::Nearest, Numbers::Short(words)) => {
+                nearest(self.within, rows, words, runs)?;
+                if self.common {
+                    self.kept.keep(Values::Nearest, rows, words);
+                }
+                Ok(Then::Go)
+            }
+            (Reduced::Sums, Numbers::Long(sums)) => {
+                self.kept.keep(Values::Sums, rows, sums);
+                Ok(Then::Stop)
+            }
+            _ => not_in_files(),
         }
-        Ok(Then::Go)
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut [u64], _: &mut Runs) -> Result<Then> {
-        self.kept.keep(Values::Sums, rows, sums);
-        Ok(Then::Stop)
+    fn fragments(&self, _: &Rows, _: &mut Lists) -> Result<()> {
+        not_in_files()
     }
 }
 
@@ -125,15 +142,20 @@ impl Exchange for All<'_> {
         Ok(Some(words.into_iter().map(|word| word as u32).collect()))
     }
 
-    fn nearest(&self, rows: &Rows, words: &mut [u32], runs: &mut Runs) -> Result<Then> {
-        nearest(self.0, rows, words, runs)?;
+    fn reduce(&self, what: Reduced, rows: &Rows, numbers: Numbers<'_>, runs: &mut Runs) -> Result<Then> {
+        match (what, numbers) {
+            (Reduced::Nearest, Numbers::Short(words)) => nearest(self.0, rows, words, runs)?,
+            (Reduced::Sums, Numbers::Long(sums)) => {
+                let each = sums.len().checked_div(rows.samples().len()).unwrap_or(0);
+                replaced(sums, self.0.values(Values::Sums, rows, each)?, rows, runs);
+            }
+            _ => return not_in_files(),
+        }
         Ok(Then::Go)
     }
 
-    fn sums(&self, rows: &Rows, sums: &mut [u64], runs: &mut Runs) -> Result<Then> {
-        let each = sums.len().checked_div(rows.samples().len()).unwrap_or(0);
-        replaced(sums, self.0.values(Values::Sums, rows, each)?, rows, runs);
-        Ok(Then::Go)
+    fn fragments(&self, _: &Rows, _: &mut Lists) -> Result<()> {
+        not_in_files()
     }
 }
 

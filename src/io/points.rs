@@ -107,7 +107,7 @@ pub struct Points {
 }
 
 /// Ellipsoids that became surfels without their shortest half-axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Flattened {
     /// The number of ellipsoids.
     pub count: u64,

@@ -6,6 +6,7 @@
 //! process that fails says so there, so that all of them end instead of waiting for it.
 
 mod blocks;
+mod carried;
 mod listed;
 mod packed;
 mod reduction;
@@ -13,6 +14,7 @@ mod reduction;
 #[cfg(feature = "mpi")]
 pub mod mpi;
 
+pub use self::carried::{Carried, joined};
 pub use self::reduction::{Reduction, Wire};
 
 use crate::error::{Error, Result};

@@ -8,6 +8,7 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
+use serde::{Deserialize, Serialize};
 
 use super::Bounds;
 use super::body::Places;
@@ -24,7 +25,7 @@ const SHARE: u64 = 1000;
 
 /// The points in one cell of the grid: their number, their box, and whether a disk among them has
 /// at least the cell's edge as radius.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct Cell {
     count: u64,
     bounds: Bounds,

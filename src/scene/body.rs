@@ -6,9 +6,11 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::Bounds;
 use super::apart::without_apart;
+use crate::network::Carried;
 use crate::random;
 
 /// The approximate number of positions in the sample that determines the core.
@@ -34,8 +36,8 @@ pub(crate) trait Places: Sync {
     fn count(&self) -> usize;
 
     /// Folds all positions and radii in parallel: `add` starts from `nothing`, `join` merges two
-    /// partial results, in any order.
-    fn fold<T: Send>(
+    /// partial results, in any order. Other processes may hold some of the positions.
+    fn fold<T: Carried>(
         &self,
         nothing: impl Fn() -> T + Sync + Send,
         add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
@@ -51,7 +53,7 @@ impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
         self.0
     }
 
-    fn fold<T: Send>(
+    fn fold<T: Carried>(
         &self,
         nothing: impl Fn() -> T + Sync + Send,
         add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
@@ -137,7 +139,7 @@ pub(crate) fn core_and_box(places: &impl Places) -> (Option<Bounds>, Bounds) {
 
 /// A sample of the positions, chosen by a hash of their coordinates, so that it does not depend on
 /// their order.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct Sample {
     most: u64,
     chosen: Vec<DVec3>,

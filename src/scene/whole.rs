@@ -89,7 +89,7 @@ impl LevelFacts {
 }
 
 /// Whether each optional list of a scene has entries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Has {
     /// [`Scene::low`].
     pub low: bool,

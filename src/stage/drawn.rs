@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::in_part::Parts;
 use super::whole::Whole;
-use super::{Request, View, ahead, levels, tree};
+use super::{Request, View, ahead, levels, shares};
 use crate::error::Result;
 use crate::plan::Settings;
 use crate::progress::Progress;
@@ -36,9 +36,8 @@ pub(super) fn whole(
     (backend, first): (&Arc<Backend>, Option<&View>),
     progress: &dyn Progress,
 ) -> Result<(Settings, Drawn)> {
-    let shared = request.share.filter(|_| settings.detail.is_finest());
-    let shared =
-        shared.map_or(Ok(None), |(share, view)| tree::share_of(request, (share, view), &settings, progress))?;
+    let among = request.among.filter(|_| settings.detail.is_finest());
+    let shared = among.map_or(Ok(None), |among| shares::own(request, among, &settings, progress))?;
     let mut whole = match shared {
         Some((scene, preparation)) => {
             Arc::new(Whole { scene: Arc::new(scene), preparation, notes: Vec::new(), key: None })

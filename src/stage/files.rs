@@ -215,6 +215,22 @@ impl Files {
         Ok(files)
     }
 
+    /// Opens the files for reading shares of their points: None unless all are binary PLY files on
+    /// this machine whose points are surfels.
+    #[cfg(feature = "parts")]
+    pub(super) fn surfels(&self) -> Result<Option<Vec<Rows>>> {
+        if self.paths.iter().any(|path| address::is_remote(path)) {
+            return Ok(None);
+        }
+        let open = |path: &PathBuf| {
+            self.seekable(path)?.map_or(Ok(None), |input| Rows::open(input, self.options.file.ignore_alpha))
+        };
+        let files: Option<Vec<Rows>> = self.paths.iter().map(open).collect::<Result<_>>()?;
+        let mut files = files.filter(|files| !files.is_empty());
+        files.iter_mut().try_for_each(|files| Rows::settle_colors(files))?;
+        Ok(files)
+    }
+
     /// Reads the points of the given nodes of each octree, none where there is no octree.
     ///
     /// The first points read with `rules` decide how colours are interpreted, so that later calls

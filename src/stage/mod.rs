@@ -28,6 +28,7 @@ mod picture;
 mod refined;
 mod renderer;
 mod settings;
+mod shares;
 mod tiles;
 mod tree;
 mod turntable;
@@ -56,10 +57,11 @@ use self::whole::{Making, Whole};
 use crate::address;
 use crate::error::{Error, Result};
 use crate::io::Points;
+use crate::network::Network;
 use crate::options::{DeviceOptions, RenderOptions, SceneOptions, SurfelOptions, TriangleOptions};
 use crate::plan::BackendName;
 use crate::progress::Progress;
-use crate::scene::{ColorKey, Share};
+use crate::scene::ColorKey;
 
 /// Files, or points in memory, that [`Renderer`]s draw.
 ///
@@ -168,8 +170,8 @@ struct Request<'a> {
     views: bool,
     /// Gets the points of the inputs once they are read.
     read: Option<&'a ahead::Read<'a>>,
-    /// The share of the scene that the picture needs here, and the view; None for all of it.
-    share: Option<(Share, &'a View)>,
+    /// The processes that draw the picture together, and the view; None if this one draws alone.
+    among: Option<(&'a dyn Network, &'a View)>,
 }
 
 impl Inputs {

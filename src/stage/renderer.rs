@@ -13,11 +13,12 @@ use super::{ReadReport, machines::Drawing};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Replacement};
+use crate::network::Network;
 use crate::options::{Chosen, DeviceOptions, RenderOptions, SceneOptions};
 use crate::plan::{BackendName, Settings};
 use crate::progress::Progress;
 use crate::render::{self, Backend, render};
-use crate::scene::{self, Bounds, Camera, KernelFaults, Maps, Share};
+use crate::scene::{self, Bounds, Camera, KernelFaults, Maps};
 #[cfg(feature = "parts")]
 use crate::{
     plan::check,
@@ -53,8 +54,8 @@ struct How<'a> {
     views: bool,
     /// The first view, if its kernels are to be compiled early.
     first: Option<&'a View>,
-    /// The share that it draws together with other processes, and the view.
-    share: Option<(Share, &'a View)>,
+    /// The processes with which it draws together, and the view.
+    among: Option<(&'a dyn Network, &'a View)>,
 }
 
 /// The scene that a view shows, and how it is drawn.
@@ -88,23 +89,27 @@ impl Renderer {
         Self::with(scene, options, (device, None), How::default(), progress)
     }
 
-    /// Makes a renderer for [`Renderer::frame_over`] in the process that draws `share`.
+    /// Makes a renderer for [`Renderer::frame_over`], together with the other processes of a
+    /// network, all of which call this.
     ///
-    /// It reads only the share if the input is one file of `epsplat lod`. Else it reads everything,
-    /// because the surfels of a share may depend on points around it.
+    /// It reads only the share of this process if the inputs are one file of `epsplat lod`, or
+    /// binary PLY files of surfels. Else it reads everything, because the surfels of a share may
+    /// depend on points around it.
     ///
     /// # Errors
     ///
-    /// The same as those of [`Renderer::new`].
+    /// The same as those of [`Renderer::new`], and [`Error::OtherProcess`] if another process could
+    /// not read its share. After an error the caller tells the others
+    /// ([`together`](crate::low_level::network::together)).
     #[cfg(feature = "parts")]
     pub fn of_share(
         scene: &Scene,
         options: &RenderOptions,
         device: &DeviceOptions,
-        (share, view): (Share, &View),
+        (network, view): (&dyn Network, &View),
         progress: &dyn Progress,
     ) -> Result<Self> {
-        Self::with(scene, options, (device, None), How { share: Some((share, view)), ..How::default() }, progress)
+        Self::with(scene, options, (device, None), How { among: Some((network, view)), ..How::default() }, progress)
     }
 
     /// Makes a renderer as [`Renderer::new`] does, and meanwhile compiles the kernels that `first`,
@@ -153,16 +158,16 @@ impl Renderer {
         scene: &Scene,
         options: &RenderOptions,
         (device, open): (&DeviceOptions, Option<&Gpu>),
-        How { views, first, share }: How<'_>,
+        How { views, first, among }: How<'_>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (inputs, mut options, device) = (scene.0.clone(), options.clone(), device.clone());
         let sources = options.research.sources.iter().map(Replacement::loaded).collect::<Result<_>>()?;
         options.research.sources = sources;
-        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None, share };
+        let request = Request { scene: &inputs, options: &options, device: &device, views, read: None, among };
         let settings = request.settings()?;
         #[cfg(feature = "parts")]
-        if request.share.is_some() {
+        if request.among.is_some() {
             // Files may turn out to need no levels of detail.
             check::options_of_ranks(&Settings { detail: Detail::FINEST, ..settings.clone() }, request.is_reference())?;
         }
@@ -205,7 +210,7 @@ impl Renderer {
     /// [`Error::Usage`], as [`Renderer::new`].
     pub fn check(files: &Files, scene: &SceneOptions, options: &RenderOptions, device: &DeviceOptions) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        Request { scene: &inputs, options, device, views: false, read: None, share: None }.settings().map(drop)
+        Request { scene: &inputs, options, device, views: false, read: None, among: None }.settings().map(drop)
     }
 
     /// Sets how many frames the caller has in memory at once (1 by default). They count against the
@@ -310,7 +315,7 @@ impl Renderer {
         let others = if self.has_share { others } else { &() };
         let (camera, seen) = view.camera(self.scene(), &self.extent, others)?;
         let Self { inputs, options, device, views, settings, drawn, frames, .. } = self;
-        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
+        let request = Request { scene: inputs, options, device, views: *views, read: None, among: None };
         match drawn {
             Drawn::Whole { scene, guessed_up, key, renderer } => {
                 renderer.check_lens(&camera, view.as_pinhole())?;
@@ -350,7 +355,7 @@ impl Renderer {
         let (camera, seen) = view.camera(self.scene(), &self.extent, &())?;
         let other = view.as_pinhole();
         let Self { inputs, options, device, views, settings, backend, drawn, frames, .. } = self;
-        let request = Request { scene: inputs, options, device, views: *views, read: None, share: None };
+        let request = Request { scene: inputs, options, device, views: *views, read: None, among: None };
         let maps = Maps::of(&options.maps.aov);
         let tell = |view: &ViewReport| {
             if is_told {

@@ -1,18 +1,17 @@
 //! A file that `epsplat lod` wrote: a picture reads only the nodes and surfels that its cut may
 //! reach.
 
+use super::Request;
 use super::in_part::{Part, ReadReport};
 use super::memory::Memory;
-use super::{Request, View};
 use crate::error::{Error, Result};
 use crate::io::ply::Levels;
 use crate::plan::Settings;
 use crate::progress::Progress;
 use crate::render::taken;
 use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Composite, Scene, Share, Surfel};
-use crate::stage::whole::Made;
-use crate::surfels::part::{Taken, nothing, surfels};
+use crate::scene::{Camera, Scene, Surfel};
+use crate::surfels::part::{Taken, nothing};
 use crate::surfels::{Limits, Preparation};
 
 /// Files with fewer surfels are read whole, as that takes little time.
@@ -92,32 +91,8 @@ impl Tree {
     }
 }
 
-/// Reads the `share` of a file of `epsplat lod`, with the facts that the file states about all of
-/// its surfels. Returns None if the input is no such file, or if an option or the view needs all
-/// surfels. Where fragments are sorted, the place of each surfel in the order of all decides
-/// between fragments of one depth.
-pub(super) fn share_of(
-    request: &Request<'_>,
-    (share, view): (Share, &View),
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<Option<Made>> {
-    let sorts = matches!(settings.composite, Composite::Sorted | Composite::Gaussians);
-    if sorts || asks_for_all(request).is_some() || request.surfels().radius_scale.is_some() {
-        return Ok(None);
-    }
-    let Some(levels) = request.files().levels()? else { return Ok(None) };
-    if view.is_framed() && levels.whole.is_framed_by_radii() {
-        return Ok(None);
-    }
-    let own = share.pieces(levels.whole.surfels as usize).map(|piece| piece.start as u32..piece.end as u32);
-    let scene = surfels(&levels, &own.collect::<Vec<_>>(), progress)?;
-    let count = scene.surfels.len() as u64;
-    Ok(Some((scene, Preparation { points: count, surfels: count, ..Preparation::default() })))
-}
-
 /// Returns the first given option that needs all surfels of a file, other inputs or triangles.
-fn asks_for_all(request: &Request<'_>) -> Option<&'static str> {
+pub(super) fn asks_for_all(request: &Request<'_>) -> Option<&'static str> {
     let (limits, read) = (request.surfels().limits.limits(), request.files().options());
     let all = [
         (limits.outliers.is_some(), "--outliers"),

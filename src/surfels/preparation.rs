@@ -7,7 +7,8 @@ use crate::io::points::Flattened;
 use crate::scene::Scene;
 
 /// The preparation of a scene's points.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Preparation {
     /// The number of points in all inputs.
     pub points: u64,

@@ -97,9 +97,10 @@ fn any_number_of_processes_makes_the_bytes_of_one() {
     }
 }
 
-/// From a file of `epsplat lod` each process reads only its share, and the bytes are those of one.
+/// From a file of `epsplat lod`, and from surfels in binary PLY, each process reads only its share,
+/// and the bytes are those of one.
 #[test]
-fn processes_read_their_shares_of_a_file_with_levels() {
+fn processes_read_their_shares() {
     let folder = Folder::new();
     let [surfels, tree, alone] = ["surfels.ply", "tree.ply", "alone.exr"].map(|name| folder.path(name));
     succeeds(&["generate", "sphere", "--count", "300000", "-o", text(&surfels)]);
@@ -107,14 +108,17 @@ fn processes_read_their_shares_of_a_file_with_levels() {
     let json = folder.path("json");
     let report = |path: &Path| serde_json::from_slice::<serde_json::Value>(&std::fs::read(path).unwrap()).unwrap();
     // A view with a position, the default view, and others that are framed.
-    let views: [&[&str]; 4] = [
-        &["--eye", "2,1,3", "--target", "0,0,0", "--aov", "depth,normal,count"],
-        &[],
-        &["--from", "left", "--ortho", "fit"],
-        &["--composite", "layers:2", "--opacity", "0.7"],
+    let placed: &[&str] = &["--eye", "2,1,3", "--target", "0,0,0", "--aov", "depth,normal,count"];
+    let pictures: [(&Path, usize, &[&str]); 6] = [
+        (&tree, 3, placed),
+        (&tree, 2, &[]),
+        (&tree, 3, &["--from", "left", "--ortho", "fit"]),
+        (&tree, 2, &["--composite", "layers:2", "--opacity", "0.7"]),
+        (&surfels, 2, placed),
+        (&surfels, 3, &[]),
     ];
-    for (of, view) in [3, 2, 3, 2].into_iter().zip(views) {
-        let arguments = [&["render", text(&tree), "--size", "100x80"], view].concat();
+    for (input, of, view) in pictures {
+        let arguments = [&["render", text(input), "--size", "100x80"], view].concat();
         succeeds(&[&arguments[..], &["-o", text(&alone)]].concat());
         for launcher in launchers() {
             let together = folder.path("together.exr");

@@ -24,7 +24,8 @@ use epsplat::low_level::plan::{Accumulator, Facts, Organisation, SceneNeeds, Set
 use epsplat::low_level::render::exchange::{Exchange, Lists, Numbers, Rows, Runs, Then};
 use epsplat::low_level::render::{Backend, Renderer, render, sums};
 use epsplat::low_level::scene::{
-    Blend, Camera, Colors, Composite, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Share, Triangles,
+    Blend, Camera, Colors, Composite, LowPass, Map, Maps, Mipmap, Projection, Provenance, Samples, Scene, Shading,
+    Share, Tail, Triangles,
 };
 use epsplat::options::{Cull, Epsilon};
 use epsplat::{DeviceOptions, Error, Part, RenderOptions, Result, SceneOptions, View, merge};
@@ -104,21 +105,35 @@ fn alone(scene: &Scene, camera: &Camera, options: &Settings, gpu: &Gpu) -> Frame
     render(scene, camera, options, &Backend::gpu(gpu.clone()), &()).unwrap().0
 }
 
-/// Random pictures that processes draw together: what they cannot draw is left out of the options.
-fn exchanged(scene: &Scene, random: &mut Random) -> Settings {
+/// Random pictures that processes draw together: what they cannot draw is left out of the options,
+/// and surfaces take turns.
+fn exchanged(scene: &Scene, turn: u64, random: &mut Random) -> Settings {
     let options = any_options::sampled(scene, random);
-    // Half of the pictures show one surface, as nearly all pictures of users do.
-    let opaque = !options.maps.has(Map::Surfaces) && random.one_in(2);
-    let no_tail = options.composite == Composite::Opaque || opaque;
     let maps = options.maps.beside(Maps::of(&[Map::Index, Map::Decision]));
-    Settings {
-        composite: if opaque { Composite::Opaque } else { options.composite },
+    let of_several = Maps::of(&[Map::Surfaces, Map::Tail, Map::Layers, Map::Transmittance]);
+    let options = Settings {
         separate: false,
         accumulator: Accumulator::Fixed,
-        maps: if no_tail { maps.beside(Maps::of(&[Map::Tail])) } else { maps },
+        maps: maps.beside(of_several),
         organisation: any_options::pick(random, &[Organisation::Auto, Organisation::Auto, Organisation::Scatter]),
         without: any_options::without(random),
         ..options
+    };
+    let blended = |composite| Settings { composite, blend: Blend::Weighted, ..options.clone() };
+    let behind = maps.among(Maps::of(&[Map::Layers, Map::Transmittance])).and_all(options.maps);
+    match turn % 8 {
+        0 | 1 => blended(Composite::Opaque),
+        2 | 3 => Settings { maps: behind, tail: Tail::None, ..blended(Composite::Layers(1 + turn as u32 % 5)) },
+        4 => Settings { maps: behind, ..blended(Composite::Sorted) },
+        5 => blended(Composite::Moments),
+        6 => blended(Composite::Weighted),
+        _ => Settings {
+            blend: Blend::Nearest,
+            shading: Shading::Unlit,
+            low_pass: LowPass::None,
+            maps: maps.among(Maps::of(&[Map::Depth])),
+            ..blended(Composite::Opaque)
+        },
     }
 }
 
@@ -130,7 +145,7 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
     for seed in 0..if common::takes(1, 2) { 400 } else { 30 } {
         let random = &mut Random(7000 + seed);
         let any_scene::Sampled { scene, camera, about } = any_scene::sampled(random);
-        let options = exchanged(&scene, random);
+        let options = exchanged(&scene, seed, random);
         let facts = Facts::of(&scene);
         let refused = check::options(&options, false).and_then(|()| check::scene(&facts, &options, false));
         if refused.and_then(|()| check::options_of_ranks(&options, false)).is_err() {
@@ -157,7 +172,11 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
         *surfaces.entry(shown).or_insert(0) += 1;
     }
     println!("{drawn} pictures of {features:?}, {surfaces:?}");
-    assert!(surfaces.len() > 4, "{surfaces:?}");
+    assert!(
+        ["opaque", "layers", "sorted", "moments", "weighted", "nearest"].map(|shown| surfaces.contains_key(shown))
+            == [true; 6],
+        "{surfaces:?}"
+    );
     assert!(drawn > 10 && features.contains("triangles") && features.contains("inputs"), "{drawn} {features:?}");
 }
 

@@ -8,6 +8,7 @@ mod hybrid;
 mod inputs;
 mod sampling;
 mod scans;
+mod shares;
 mod simplify;
 mod strays;
 mod truth;

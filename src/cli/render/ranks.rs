@@ -7,7 +7,7 @@ use std::time::Instant;
 use epsplat::low_level::network::mpi::{Job, Mpi};
 use epsplat::low_level::network::{Network, Wire, exchanged, together};
 use epsplat::options::DeviceOptions;
-use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, Share, View};
+use epsplat::{Error, Files, Picture, Progress, Ranked, Renderer, Report, Result, Scene, View};
 use serde::Serialize;
 
 use super::super::progress::Bars;
@@ -119,8 +119,7 @@ fn prepared(arguments: &Arguments, mpi: &Mpi, progress: &dyn Progress) -> Result
     }
     let view = View::new(&arguments.camera)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
-    let share = Share::new(mpi.rank() as u32 + 1, mpi.size() as u32)?;
-    let renderer = Renderer::of_share(&scene, &arguments.options, &device, (share, &view), progress)?;
+    let renderer = Renderer::of_share(&scene, &arguments.options, &device, (mpi, &view), progress)?;
     Ok((target, view, renderer))
 }
 

@@ -76,7 +76,7 @@ impl Renderer {
         device: &DeviceOptions,
     ) -> Result<()> {
         let inputs = Inputs { files: files.clone(), options: scene.clone(), ..Inputs::default() };
-        let request = Request { scene: &inputs, options, device, views: false, read: None, share: None };
+        let request = Request { scene: &inputs, options, device, views: false, read: None, among: None };
         check_marks(options)?;
         check::options_of_parts(&request.settings()?, request.is_reference())
     }

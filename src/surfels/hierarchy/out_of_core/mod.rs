@@ -10,11 +10,14 @@
 mod kept;
 mod pages;
 mod runs;
+mod share;
 mod sources;
 mod survey;
 #[cfg(test)]
 mod tests;
 mod write;
+
+pub use self::share::share;
 
 use std::ops::Range;
 use std::path::Path;
@@ -88,7 +91,7 @@ pub fn write_levels(
         // The points have not been read yet, so ask for memory that suffices for any kind.
         return Err(too_little(fixed + FEWEST * (LARGEST_SURFEL + OF_SURFEL)));
     }
-    let sources = Sources { files, progress };
+    let sources = Sources { files, progress, among: None };
     let survey = Survey::of(&sources)?;
     let of_surfel = survey.surfel_bytes() + OF_SURFEL;
     let fits = memory.saturating_sub(fixed) / of_surfel;
@@ -219,21 +222,31 @@ impl Divider<'_> {
     /// Reads `count` surfels from pieces of files, and joins the parts that `made` makes of their
     /// points to one scene.
     fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)], made: MadeOf) -> Result<Scene> {
-        let survey = self.runs.survey;
-        let mut scene = survey.empty.clone();
-        survey.reserve(&mut scene, count as usize);
-        let read = |(rows, piece): &(&Rows, Range<u64>)| {
-            let points = rows.points(&rows.bytes(piece.clone())?)?;
-            self.runs.progress.advance(points.positions.len() as u64);
-            made(survey, points).ok_or_else(|| rows.malformed("it changed while it was read"))
-        };
-        self.runs.progress.begin("reading points", count);
-        let loaded = pieces.chunks(rayon::current_num_threads()).try_for_each(|pieces| {
-            let parts: Vec<Scene> = pieces.par_iter().map(read).collect::<Result<_>>()?;
-            parts.into_iter().for_each(|part| complete::append(&mut scene, part));
-            Ok(())
-        });
-        self.runs.progress.end();
-        loaded.map(|()| scene)
+        loaded(self.runs.survey, (count, pieces), made, self.runs.progress)
     }
+}
+
+/// Reads `count` surfels from pieces of files, and joins the parts that `made` makes of their
+/// points to one scene.
+fn loaded(
+    survey: &Survey,
+    (count, pieces): (u64, &[(&Rows, Range<u64>)]),
+    made: MadeOf,
+    progress: &dyn Progress,
+) -> Result<Scene> {
+    let mut scene = survey.empty.clone();
+    survey.reserve(&mut scene, count as usize);
+    let read = |(rows, piece): &(&Rows, Range<u64>)| {
+        let points = rows.points(&rows.bytes(piece.clone())?)?;
+        progress.advance(points.positions.len() as u64);
+        made(survey, points).ok_or_else(|| rows.malformed("it changed while it was read"))
+    };
+    progress.begin("reading points", count);
+    let loaded = pieces.chunks(rayon::current_num_threads()).try_for_each(|pieces| {
+        let parts: Vec<Scene> = pieces.par_iter().map(read).collect::<Result<_>>()?;
+        parts.into_iter().for_each(|part| complete::append(&mut scene, part));
+        Ok(())
+    });
+    progress.end();
+    loaded.map(|()| scene)
 }

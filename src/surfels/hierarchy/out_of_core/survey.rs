@@ -1,15 +1,18 @@
 //! Facts about all points, which are needed to build any part of the scene.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use super::super::below::Known;
 use super::super::sums::Scales;
 use super::super::{NodeBounds, as_in_a_file, split};
 use super::sources::{Read, Sources, usable};
 use crate::io::Points;
+use crate::io::ply::Rows;
 use crate::scene::scene::shows;
 use crate::scene::whole::Has;
 use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Sample, Scene, Surfel, Up, body_within};
@@ -62,10 +65,11 @@ impl Survey {
         // Sampling depends on the number of usable points: if some are unusable, sample again.
         let sample =
             if looks.preparation.dropped_non_finite == 0 { looks.sample.clone() } else { sampled(sources, count)? };
-        let places = Read::new(count as usize, sources.pieces(), |(file, piece)| {
+        let positions = |(file, piece): (&Rows, Range<u64>)| {
             let points = file.points(&file.bytes(piece)?)?;
             Ok(usable(&points).map(|position| (position, 0.0)).collect())
-        });
+        };
+        let places = Read::new(count as usize, sources.pieces(), positions, sources.among);
         let (body, _) = places.made(|places| body_within(sample.core(), looks.all, places))?;
         look.empty.origin = origin_for(&body);
         look.empty.up = look.up.unwrap_or_else(|| guess_up(&body));
@@ -151,7 +155,7 @@ struct Look {
 }
 
 /// Facts about points that do not depend on the scene's origin.
-#[derive(Clone)]
+#[derive(Clone, Serialize, Deserialize)]
 struct Looks {
     preparation: Preparation,
     has: Has,
@@ -170,7 +174,7 @@ struct Looks {
 }
 
 /// Whether colours are all the same.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum One {
     Nothing,
     Color([f32; 4]),
@@ -253,7 +257,7 @@ impl Looks {
 }
 
 /// Facts about centres as a file gives them back, with their parts beyond f32 or without.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 struct Placed {
     bounds: Bounds,
     /// Whether an f32 would lose digits of a coordinate.

@@ -75,7 +75,7 @@ fn rows(paths: &[PathBuf]) -> Vec<Rows> {
 
 /// The report of writing levels if `fits` points fit in memory.
 fn made_of(files: &[Rows], fits: u64, path: &Path) -> Result<Report> {
-    let sources = Sources { files, progress: &() };
+    let sources = Sources { files, progress: &(), among: None };
     let survey = Survey::of(&sources)?;
     let folder = path.parent().unwrap();
     made(&sources, Runs { survey: &survey, folder, path, progress: &() }, (fits, 100))

@@ -90,7 +90,7 @@ fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) 
         Ok((0..scene.surfels.len()).map(|k| (scene.center(k), f64::from(scene.surfels[k].radius()))).collect())
     };
     progress.begin("measuring the scene", count);
-    let read = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
+    let read = Read::new(count as usize, kept.surfels.pieces(PIECE), places, None);
     let boxes = read.made(|places| framed_within(kept.sample.clone().core(), survey.bounds, places));
     progress.end();
     let (body, framed, strays) = boxes?;

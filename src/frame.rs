@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
+use crate::hash;
 use crate::scene::Camera;
 use crate::scene::maps::{Map, Maps};
 
@@ -58,8 +59,8 @@ impl Frame {
         frame
     }
 
-    /// Creates a frame of zeros without rows, whose pixels the caller overwrites. Pixels that stay
-    /// zeros take no memory.
+    /// Creates a frame of zeros without rows, whose pixels the caller overwrites. The system gives
+    /// memory to pixels when they are first written.
     pub(crate) fn sparse(camera: &Camera, maps: Maps) -> Self {
         Self { height: 0, ..Self::new(camera, maps) }
     }
@@ -107,11 +108,7 @@ impl Frame {
     /// names the exceptions. The hash is FNV-1a of 64 bits (Fowler, Noll, Vo) over the words of the
     /// values.
     pub fn hashes(&self) -> BTreeMap<&'static str, String> {
-        let hash = |values: &[f32]| {
-            values.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, value| {
-                (hash ^ u64::from(value.to_bits())).wrapping_mul(0x0000_0100_0000_01b3)
-            })
-        };
+        let hash = |values: &[f32]| hash::of(values.iter().map(|value| value.to_bits()));
         let maps = self.maps.iter().map(|(map, values)| (map.row().name, values.as_slice()));
         let named = maps.chain([("color", bytemuck::cast_slice(&self.color))]);
         named.map(|(name, values)| (name, format!("{:016x}", hash(values)))).collect()

@@ -47,6 +47,7 @@
 mod address;
 mod error;
 pub mod guide;
+mod hash;
 pub mod io;
 pub mod lod;
 pub mod low_level;
@@ -71,7 +72,7 @@ pub use options::{CameraOptions, DeviceOptions, RenderOptions, SceneOptions};
 pub use progress::Progress;
 pub use stage::{Files, Given, Picture, ReadReport, Renderer, Scene, Survey, View, ViewReport, Visible};
 #[cfg(feature = "parts")]
-pub use stage::{Merged, Part, Ranked, merge};
+pub use stage::{Merged, Part, Ranked, merge, merge_files};
 
 // Modules inside the library import these as `crate::...`, without `low_level`.
 use low_level::{annotate, frame, gpu, network, passes, plan, render, scene, surfels, truth};

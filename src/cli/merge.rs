@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::options::{BackendName, Chosen, DeviceOptions};
-use epsplat::{Error, Merged, Part, Report, Result, merge};
+use epsplat::{Error, Merged, Part, Report, Result, merge_files};
 use serde::Serialize;
 
 use super::outputs::{self, Source};
@@ -53,17 +53,17 @@ struct Outcome<'a> {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let Arguments { parts, output, adapter, file } = arguments;
     outputs::check(parts.iter().map(Source::other), [output].into_iter().chain(&file.json))?;
-    let read = parts.iter().map(|path| Part::read(path)).collect::<Result<Vec<_>>>()?;
-    let part = merge(&read)?;
+    let is_part = output.extension().is_some_and(|extension| extension == "part");
+    if is_part && (file.format.is_some() || file.depth_scale.is_some() || file.json.is_some()) {
+        let what = "a file of parts is no picture: leave --format, --depth-scale and --json out, or name an image";
+        return Err(Error::Usage(what.into()));
+    }
+    let part = merge_files(parts)?;
     if part.adapters().len() > 1 {
         let adapters = part.adapters().join(", ");
         note(&format!("several adapters drew the parts, and their bits may differ: {adapters}"));
     }
-    if output.extension().is_some_and(|extension| extension == "part") {
-        if file.format.is_some() || file.depth_scale.is_some() || file.json.is_some() {
-            let what = "a file of parts is no picture: leave --format, --depth-scale and --json out, or name an image";
-            return Err(Error::Usage(what.into()));
-        }
+    if is_part {
         part.write(output)?;
         let ((shares, of), kind) = (part.shares(), if part.holds_depths() { "nearest depths" } else { "sums" });
         note(&format!("{}: {kind} of {} of {of} parts", output.display(), shares.len()));

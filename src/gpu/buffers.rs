@@ -54,7 +54,9 @@ impl<T: Pod> Buffer<T> {
     /// Creates a storage buffer of these `others` usages, which also has the usages `maps` if the
     /// device can map storage buffers.
     fn open(gpu: &Gpu, what: &str, len: u64, (maps, others): (wgpu::BufferUsages, wgpu::BufferUsages)) -> Result<Self> {
-        let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
+        // On a card, memory that the host maps is slow for kernels.
+        let can_lie_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
+        let lies_open = can_lie_open && gpu.adapter.is_software();
         let maps = if lies_open { maps } else { wgpu::BufferUsages::empty() };
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | others | maps, gpu.buffer_limit())
     }

@@ -16,7 +16,7 @@ mod module;
 pub mod program;
 mod recent;
 mod replacement;
-mod runs;
+pub(crate) mod runs;
 pub mod sources;
 mod spare;
 mod spirv;

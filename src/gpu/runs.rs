@@ -13,8 +13,19 @@ use crate::error::Result;
 /// Bytes of a word.
 const WORD: u64 = 4;
 
+/// Cuts runs of records, `record` words each, so that each piece fits a staging buffer.
+pub(crate) fn cut(runs: impl IntoIterator<Item = Range<u64>>, record: u64) -> Vec<Range<u64>> {
+    let most = (PIECE / WORD / record.max(1)).max(1) * record.max(1);
+    let pieces = |run: Range<u64>| {
+        let (first, end) = (run.start, run.end);
+        (first..end).step_by(most as usize).map(move |start| start..end.min(start + most))
+    };
+    runs.into_iter().flat_map(pieces).collect()
+}
+
 impl Buffer<u32> {
-    /// Calls `each` with the words of every run, in order. `runs` ascend and lie apart.
+    /// Calls `each` with the words of every run, in order. `runs` ascend and lie apart, and each
+    /// fits a staging buffer ([`cut`]).
     pub(crate) fn visit_runs(
         &self,
         gpu: &Gpu,
@@ -61,7 +72,8 @@ impl Buffer<u32> {
         Ok(())
     }
 
-    /// Overwrites every run with the words that `each` returns for it. `runs` ascend and lie apart.
+    /// Overwrites every run with the words that `each` returns for it. `runs` are those of
+    /// [`Buffer::visit_runs`].
     pub(crate) fn write_runs<'a>(
         &self,
         gpu: &Gpu,
@@ -169,6 +181,11 @@ mod tests {
         let of = |at_once| batches(&runs, at_once).map(<[_]>::len).collect::<Vec<_>>();
         assert_eq!((of(true), of(false)), (vec![5], vec![2, 1, 1, 1]));
         assert_eq!(batches(&[], false).count(), 0);
+        // Pieces are whole records.
+        let pieces = cut([6..6 + 3 * (most - most % 6), 4 * most..4 * most + 6], 6);
+        let whole = pieces.iter().all(|piece| piece.end - piece.start <= most && (piece.end - piece.start) % 6 == 0);
+        let starts: Vec<u64> = pieces.iter().map(|piece| piece.start).collect();
+        assert!(whole && starts[1..3] == [pieces[0].end, pieces[1].end], "{pieces:?}");
         let placed: Vec<_> = placed(&runs[..3]).map(|(at, _)| at).collect();
         assert_eq!(placed, [0, most / 2, most]);
     }

@@ -1,8 +1,8 @@
 //! Blocks of pixels, each of which one process owns: it reduces their values and resolves them.
 //!
 //! A block is a run of pixels in a row of samples, at most 64 of these, so that a word tells which
-//! of them have values. The blocks of an image are dealt to the processes in turn, row by row, so
-//! that each owns a like number anywhere in the image. All samples of a pixel have one owner, in
+//! of them have values. The blocks of an image are dealt to the processes in turn, from row to row
+//! one process later, so that each owns a like number anywhere in the image. All samples of a pixel have one owner, in
 //! every render of the image.
 
 use std::ops::Range;
@@ -49,7 +49,7 @@ impl Blocks {
         let (across, first) = (self.across(), rows.first as usize);
         (0..rows.rows as usize * across).map(move |block| {
             let pixel_row = (first + block / across) / self.down;
-            (block as u32, (pixel_row * across + block % across) % self.owners)
+            (block as u32, (pixel_row + block % across) % self.owners)
         })
     }
 

@@ -41,8 +41,8 @@ impl Listed {
     /// The bytes of the lists.
     pub fn bytes(&self) -> Vec<u8> {
         let head = [self.samples.len() as u32, self.record];
-        let all = [&head[..], &self.samples, &self.counts, &self.words];
-        all.iter().flat_map(|words| bytemuck::cast_slice::<u32, u8>(words)).copied().collect()
+        let all = [&head[..], &self.samples, &self.counts, &self.words].map(bytemuck::cast_slice::<u32, u8>);
+        all.concat()
     }
 }
 

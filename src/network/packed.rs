@@ -59,7 +59,12 @@ impl Packed {
         let of_sample = |sample: usize| &all[sample * channels..(sample + 1) * channels];
         let has = |sample: usize| of_sample(sample).iter().any(|number| *number != T::default());
         let masks = blocks.iter().map(|block| (*block, mask(layout.samples(*block), has)));
-        let blocks: Vec<(u32, u64)> = masks.filter(|(_, mask)| *mask != 0).collect();
+        Self::of_samples(layout, masks.filter(|(_, mask)| *mask != 0).collect(), all, channels)
+    }
+
+    /// Packs the values of the samples that these bits of blocks mark.
+    pub fn of_samples<T: Number>(layout: Blocks, blocks: Vec<(u32, u64)>, all: &[T], channels: usize) -> Self {
+        let of_sample = |sample: usize| &all[sample * channels..(sample + 1) * channels];
         let count: usize = blocks.iter().map(|(_, mask)| mask.count_ones() as usize).sum();
         let mut values = Vec::with_capacity(count * channels);
         for (block, mask) in &blocks {
@@ -129,9 +134,9 @@ impl Packed {
         self.blocks.iter().flat_map(move |(block, mask)| marked(layout.samples(*block), *mask))
     }
 
-    /// The numbers of the blocks with values.
-    pub fn blocks(&self) -> impl Iterator<Item = u32> {
-        self.blocks.iter().map(|(block, _)| *block)
+    /// The numbers of the blocks with values, and the bits of their samples.
+    pub fn blocks(&self) -> &[(u32, u64)] {
+        &self.blocks
     }
 
     /// Adds the values to `all` by `reduce`.

@@ -24,7 +24,7 @@ use super::packed::{Number, Packed};
 use super::{Network, exchanged, gathered};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::plan::steps::Reduced;
+use crate::plan::steps::{Exchanged, Reduced};
 use crate::render::exchange::{Exchange, Lists, Numbers, Rows, Runs, Then, push};
 use crate::scene::Samples;
 
@@ -68,6 +68,9 @@ pub struct Reduction<'a> {
 struct State {
     /// The pixels of this process that have values, as bits.
     covered: Vec<u64>,
+    /// The bits of the samples whose nearest depths were sent to each owner, for moments of the
+    /// same rows.
+    asked: Vec<Vec<(u32, u64)>>,
     wire: Wire,
 }
 
@@ -134,8 +137,11 @@ impl<'a> Reduction<'a> {
     ) -> Result<()> {
         let blocks = self.blocks(rows);
         for packed in received {
+            for (block, _) in packed.blocks() {
+                *used.get_mut(*block as usize).ok_or_else(|| Error::Usage("a process sent damaged blocks".into()))? =
+                    true;
+            }
             packed.reduce(blocks, (&mut *all, channels), reduce).map_err(|what| Error::Usage(what.into()))?;
-            packed.blocks().for_each(|block| used[block as usize] = true);
         }
         let (width, samples) = (rows.width as usize, self.samples(rows));
         let [across, down] = [samples.across, samples.down].map(|of| of.max(1) as usize);
@@ -176,7 +182,17 @@ impl<'a> Reduction<'a> {
         }
         let blocks = self.blocks(rows);
         let mut used = blocks.used(rows, runs);
-        let asked = self.packed(rows, &used, (&*all, channels));
+        let asked = match what {
+            // Moments may round to zeros where a process has fragments, which need the sums.
+            Reduced::Moments => {
+                let asked = std::mem::take(&mut self.state().asked);
+                asked.into_iter().map(|asked| Packed::of_samples(blocks, asked, all, channels)).collect()
+            }
+            _ => self.packed(rows, &used, (&*all, channels)),
+        };
+        if what == Reduced::Nearest {
+            self.state().asked = asked.iter().map(|asked| asked.blocks().to_vec()).collect();
+        }
         let received = self.sent(asked.iter().map(Packed::bytes).collect(), |wire| wire.bytes_of(what))?;
         let received = read(&received)?;
         self.reduced(rows, (&received, &mut used), (&mut *all, channels), combine)?;
@@ -191,6 +207,9 @@ impl<'a> Reduction<'a> {
                 let answers = self.sent(received.iter().map(answer).collect(), |wire| wire.bytes_of(what))?;
                 for (asked, answer) in asked.iter().zip(&answers) {
                     let answer = bytemuck::pod_collect_to_vec::<u8, T>(answer);
+                    if answer.len() != asked.samples() * channels {
+                        return Err(Error::Usage("a process sent a damaged answer".into()));
+                    }
                     for (sample, numbers) in asked.places(blocks).zip(answer.chunks_exact(channels)) {
                         all[sample * channels..][..channels].copy_from_slice(numbers);
                     }
@@ -258,13 +277,19 @@ fn read(received: &[Vec<u8>]) -> Result<Vec<Packed>> {
 }
 
 impl Exchange for Reduction<'_> {
-    fn agree(&self, rows: &Rows, complete: bool) -> Result<bool> {
-        let words = [rows.render as u32, rows.first, rows.rows, rows.width, u32::from(complete)];
+    fn agree(&self, rows: &Rows, what: Option<Exchanged>, complete: bool) -> Result<bool> {
+        let next = match what {
+            None => 0,
+            Some(Exchanged::Triangles) => 1,
+            Some(Exchanged::Fragments) => 2,
+            Some(Exchanged::Numbers(what)) => 3 + what as u32,
+        };
+        let words = [rows.render as u32, rows.first, rows.rows, rows.width, next, u32::from(complete)];
         let all = self.timed(|| gathered(self.network, bytemuck::cast_slice(&words)))?;
         let of = |bytes: &Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(bytes);
         let others: Vec<Vec<u32>> = all.iter().map(of).collect();
-        match others.iter().all(|other| other.len() == words.len() && other[..4] == words[..4]) {
-            true => Ok(others.iter().all(|other| other[4] == 1)),
+        match others.iter().all(|other| other.len() == words.len() && other[..5] == words[..5]) {
+            true => Ok(others.iter().all(|other| other[5] == 1)),
             false => Err(Error::Usage(
                 "the processes draw different rows at once: give all of them the same inputs, options and kind of adapter"
                     .into(),

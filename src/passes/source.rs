@@ -97,6 +97,10 @@ macro_rules! leads_to_source {
                 (**self).pages(needs, most, ordered)
             }
 
+            fn first(&self) -> u32 {
+                (**self).first()
+            }
+
             fn textures(&self) -> &[Mipmap] {
                 (**self).textures()
             }

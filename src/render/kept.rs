@@ -94,7 +94,7 @@ impl Kept {
             traffic = traffic + (Traffic::so_far() - before);
             let complete = tally.as_ref().is_some_and(|tally| tally.complete);
             let complete = match among.filter(|_| all) {
-                Some(among) => among.exchange.agree(&Rows::none(among.render), complete)?,
+                Some(among) => among.exchange.agree(&Rows::none(among.render), None, complete)?,
                 None => complete,
             };
             if let Some(tally) = tally.filter(|_| complete) {

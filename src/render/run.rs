@@ -2,6 +2,7 @@
 //! device counted.
 
 use super::count::{Capacities, lacks};
+use super::exchange::numbers::of_words;
 use super::exchange::{Among, Exchange, Onward, Runs, is_of_triangles};
 use super::kernels::Kernels;
 use super::record::Recording;
@@ -53,7 +54,8 @@ pub struct Run<'a> {
     pub(super) recording: Option<Recording<'a>>,
     /// The exchange with other processes that draw the frame.
     pub(super) among: Option<Among<'a>>,
-    /// The samples of the present band in which this process has nearest depths, for an exchange.
+    /// The samples of the present band in which this process has depths, counts or colours of
+    /// nearest fragments, for an exchange.
     pub(super) covered: Runs,
     /// Whether an exchange ended the present band, so that it has no image.
     ended: bool,
@@ -290,8 +292,7 @@ impl<'a> Run<'a> {
         let (layout, words) = (&self.plan.pixel, u64::from(self.plan.pixel.image_words));
         let first = self.first_pixel(band);
         let shown = exchange.shown(first..first + self.plan.image_pixels(band) as usize);
-        let runs: Vec<_> = shown.iter().map(|run| run.start as u64 * words..run.end as u64 * words).collect();
-        image.visit_runs(self.gpu, &runs, |run, pixels| {
+        image.visit_runs(self.gpu, &of_words(&shown, words), |run, pixels| {
             resolve::put(layout, bytemuck::cast_slice(pixels), frame, first + (run.start / words) as usize);
         })?;
         frame.height += self.plan.bands[band].rows / self.plan.needs.samples.down;

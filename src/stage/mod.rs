@@ -45,7 +45,7 @@ pub use self::files::Files;
 pub use self::given::Given;
 pub use self::in_part::ReadReport;
 #[cfg(feature = "parts")]
-pub use self::machines::{Merged, Part, Ranked, merge};
+pub use self::machines::{Merged, Part, Ranked, merge, merge_files};
 pub use self::map::Survey;
 pub use self::picture::Picture;
 pub use self::renderer::Renderer;

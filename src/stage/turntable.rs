@@ -14,7 +14,8 @@ impl Renderer {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] for options that place the camera, or that give no camera.
+    /// [`Error::Usage`] for options that place the camera, or that give no camera, and if this
+    /// renderer has a share of the scene.
     pub fn turntable(&self, options: &CameraOptions, count: NonZeroU32) -> Result<Vec<View>> {
         if options.file.is_some() || options.eye.is_some() || options.intrinsics.is_some() {
             return Err(Error::Usage("a turntable frames the scene: leave eye, intrinsics and camera file out".into()));
@@ -22,6 +23,7 @@ impl Renderer {
         if options.ortho == Some(Ortho::Fit) {
             return Err(Error::Usage("a turntable has one scale: give --ortho its HEIGHT".into()));
         }
+        self.check_whole()?;
         // Checks size, lens and near depth.
         View::new(options)?;
         let scene = self.scene();

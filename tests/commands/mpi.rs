@@ -162,6 +162,32 @@ fn the_report_tells_of_each_process() {
     }
 }
 
+/// A process draws the next view when it is done with the last, however long each takes.
+#[test]
+fn views_are_dealt_as_processes_ask_for_them() {
+    let scene = format!("{DATA}/bunny.obj");
+    for launcher in launchers() {
+        let folder = Folder::new();
+        let (cameras, dealt, json) = (folder.path("cameras.json"), folder.path("dealt"), folder.path("dealt.json"));
+        // The first view takes as long as many others.
+        let camera = |number: usize| {
+            let size = if number == 0 { 3000 } else { 16 };
+            let look = r#""eye": [0.1, 0.2, 0.4], "target": [0.0, 0.1, 0.0], "fov": 40"#;
+            format!(r#"{{ "width": {size}, "height": {size}, {look} }}"#)
+        };
+        std::fs::write(&cameras, format!("[{}]", [0, 1, 2, 3, 4, 5, 6, 7, 8].map(camera).join(","))).unwrap();
+        let arguments = ["render", &scene, "--cameras", text(&cameras), "-o", text(&dealt), "--json", text(&json)];
+        let output = run(launcher, 2, &arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+        let views = report["views"].as_array().unwrap();
+        let busy = views[0]["rank"].as_u64().unwrap();
+        let others = views[1..].iter().filter(|view| view["rank"].as_u64() != Some(busy)).count();
+        // Views that are dealt in turn would be four and five.
+        assert!(views.len() == 9 && others >= 6, "{others} of 8 by the process that was free");
+    }
+}
+
 #[test]
 fn views_are_dealt_to_processes() {
     let scene = format!("{DATA}/bunny.obj");
@@ -179,9 +205,11 @@ fn views_are_dealt_to_processes() {
             assert!(one == other, "step {step}");
         }
         let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
-        let ranks: Vec<_> =
-            report["views"].as_array().unwrap().iter().map(|view| view["rank"].as_u64().unwrap()).collect();
-        assert_eq!(ranks, [0, 1, 2, 0, 1]);
+        let views = report["views"].as_array().unwrap();
+        let files: Vec<_> = views.iter().map(|view| view["file"].as_str().unwrap().to_owned()).collect();
+        let expected: Vec<_> = (0..5).map(|step| text(&dealt.join(format!("{step:04}.png"))).to_owned()).collect();
+        assert_eq!(files, expected);
+        assert!(views.iter().all(|view| view["rank"].as_u64().unwrap() < 3));
     }
 }
 
@@ -210,7 +238,7 @@ fn a_process_that_fails_ends_the_job_with_one_sentence() {
         assert!(start.elapsed() < Duration::from_secs(10) && !image.exists());
 
         let cases: [(&[&str], i32, &str); 5] = [
-            (&[&autzen, "--aov", "index"], 2, "index"),
+            (&[&autzen, &autzen, "--separate"], 2, "--separate"),
             (&[&autzen, "--lod", "4px"], 2, "--lod"),
             (&[&autzen, "--lod", "4"], 2, "--lod"),
             (&[&autzen, "--pixel-size", "5"], 2, "--pixel-size"),

@@ -28,7 +28,7 @@ use epsplat::low_level::scene::{
     Share, Tail, Triangles,
 };
 use epsplat::options::{Cull, Epsilon};
-use epsplat::{DeviceOptions, Error, Part, RenderOptions, Result, SceneOptions, View, merge};
+use epsplat::{DeviceOptions, Error, Part, RenderOptions, Result, SceneOptions, View, merge, merge_files};
 
 /// Some surfels of a scene, with the facts of the whole scene.
 struct Hand {
@@ -142,7 +142,7 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
     let Some(gpu) = common::gpu() else { return };
     let (mut drawn, mut features) = (0, std::collections::BTreeSet::new());
     let mut surfaces = std::collections::BTreeMap::<String, u32>::new();
-    for seed in 0..if common::takes(1, 2) { 400 } else { 30 } {
+    for seed in 0..if common::takes(1, 2) { 400 } else { 48 } {
         let random = &mut Random(7000 + seed);
         let any_scene::Sampled { scene, camera, about } = any_scene::sampled(random);
         let options = exchanged(&scene, seed, random);
@@ -152,7 +152,12 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
             continue;
         }
         // Small buffers cut the frame into bands and the surfels into pages.
-        let gpu = if random.one_in(3) { gpu.clone().with_buffer_limit(90_000) } else { gpu.clone() };
+        let gpu = match seed % 5 {
+            // The host maps none of its buffers, and there are no 64-bit atomics.
+            0 => common::core_gpu().unwrap(),
+            1 => gpu.clone().with_buffer_limit(90_000),
+            _ => gpu.clone(),
+        };
         let Ok((whole, _)) = render(&scene, &camera, &options, &Backend::gpu(gpu.clone()), &()) else { continue };
         let of = [1, 2, 3, 7][random.below(4)];
         // Places in an image are stored relative to the range of all, which a hand does not know.
@@ -178,6 +183,19 @@ fn any_shares_of_any_scene_make_the_bits_of_one_process() {
         "{surfaces:?}"
     );
     assert!(drawn > 10 && features.contains("triangles") && features.contains("inputs"), "{drawn} {features:?}");
+}
+
+/// The interpreted kernels draw together, too.
+#[test]
+fn the_twin_of_the_kernels_draws_together() {
+    let twin = Gpu::open(Some("twin")).unwrap();
+    let (scene, camera) = (sphere(300, 3.0), sphere_camera(24, Projection::Pinhole));
+    for composite in [Composite::Opaque, Composite::Sorted] {
+        let options = Settings { composite, opacity: 0.5, ..Settings::default() };
+        let (frame, _) = together(&shares(&scene, 3), &camera, &options, &twin);
+        assert!(frame.hashes() == alone(&scene, &camera, &options, &twin).hashes(), "{composite:?}");
+        assert!(frame.color.iter().any(|color| color[3] > 0.0));
+    }
 }
 
 /// Sums in f32, in the order of the parts.
@@ -270,13 +288,13 @@ fn what_is_sent_follows_from_the_covered_pixels() {
     let of_share = |source: &Box<dyn Source>| {
         covered(&Renderer::new(Box::as_ref(source), &options, &backend).unwrap().frame(&camera, &()).unwrap().0)
     };
-    // Three quarters of it belong to other processes.
+    // Three quarters of it belong to other processes, within a few percent.
     let sent = 0.75 * sources.iter().map(of_share).sum::<f64>();
     let of = |bytes: fn(&Wire) -> u64| wires.iter().map(bytes).sum::<u64>() as f64;
     let [nearest, sums, picture] = [of(|w| w.nearest_bytes), of(|w| w.sums_bytes), of(|w| w.picture_bytes)];
     // Four bytes and as many in answer; the numbers and masks of blocks take 12 for 64 pixels, or
     // for fewer at the border of a share.
-    assert!((8.0..9.0).contains(&(nearest / sent)), "{}", nearest / sent);
+    assert!((7.6..9.0).contains(&(nearest / sent)), "{}", nearest / sent);
     let channels = sums::sums(&scene, &camera, &options, &gpu, &Sources::default()).unwrap().pixel.channels;
     assert!((1.0..8.0 * f64::from(channels)).contains(&(sums / sent)), "{} {channels}", sums / sent);
     // Three quarters of the pixels come from others, with four values and their number.
@@ -457,6 +475,25 @@ fn parts_of_files_make_the_bits_of_one_process() {
         for of in all {
             let merged = by_parts(&renderer, &view, *of).frame;
             assert!(merged.hashes() == whole.hashes(), "case {number} in {of} parts");
+        }
+        if number == 0 {
+            // More files than are in memory at once.
+            let folder = tempfile::tempdir().unwrap();
+            let written = |name: String, part: &Part| {
+                let path = folder.path().join(name);
+                part.write(&path).unwrap();
+                path
+            };
+            let draw = |number, within| renderer.part(&view, Share::new(number, 18).unwrap(), within, &()).unwrap();
+            let depths = (1..=18).map(|number| written(format!("{number}.part"), &draw(number, None)));
+            let depths = merge_files(&depths.collect::<Vec<_>>()).unwrap();
+            let sums = (1..=18).map(|number| written(format!("{number}-sums.part"), &draw(number, Some(&depths))));
+            let mut sums: Vec<_> = sums.collect();
+            let merged = merge_files(&sums).unwrap().picture(&DeviceOptions::default(), &()).unwrap().frame;
+            assert!(merged.hashes() == whole.hashes());
+            sums[17] = sums[3].clone();
+            let twice = merge_files(&sums).err().unwrap().to_string();
+            assert!(twice.contains("4-sums.part") && twice.contains("part 4/18"), "{twice}");
         }
         assert!(whole.color.iter().any(|pixel| pixel[3] > 0.0), "case {number} shows nothing");
     }

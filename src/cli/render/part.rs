@@ -4,7 +4,7 @@ use std::path::Path;
 
 use epsplat::io::images::ImageFormat;
 
-use epsplat::{Error, Files, Part, Renderer, Result, Scene, Share, View, merge};
+use epsplat::{Error, Files, Part, Renderer, Result, Scene, Share, View, merge_files};
 
 use super::super::outputs::Source;
 use super::super::progress::Bars;
@@ -21,8 +21,7 @@ pub(super) fn run(arguments: &Arguments, share: Share) -> Result<()> {
     outputs::check(arguments.files(&files).chain(within.iter().map(Source::other)), [&arguments.output])?;
     let view = View::new(&arguments.camera)?;
     // Depths are read first, so that a missing one ends the run before anything is drawn.
-    let parts = within.iter().map(|path| Part::read(path)).collect::<Result<Vec<_>>>()?;
-    let within = if parts.is_empty() { None } else { Some(merge(&parts)?) };
+    let within = if within.is_empty() { None } else { Some(merge_files(within)?) };
     within.as_ref().map_or(Ok(()), Part::check_whole)?;
     let scene = Scene::of_files(files, &arguments.scene)?;
 

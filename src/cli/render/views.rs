@@ -29,6 +29,9 @@ const MOST_WAITING: u64 = 1 << 30;
 /// The JSON report of a view's picture.
 #[derive(Serialize)]
 pub(super) struct Written {
+    /// The number of the view, from 0.
+    #[serde(skip)]
+    pub(super) number: usize,
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
@@ -97,7 +100,8 @@ pub(super) fn run(arguments: &Arguments, target: &Target) -> Result<()> {
     let bars = Bars::new();
     let ready = ready(arguments, target, (&arguments.device, true), &bars)?;
     let (writers, start) = (ready.writers, Instant::now());
-    let pictures = draw(arguments, target, ready, (&bars, true))?;
+    let numbers = (0..ready.files.len()).map(Ok);
+    let pictures = draw(arguments, target, ready, numbers, (&bars, true))?;
     tell(arguments, pictures, writers, start)
 }
 
@@ -128,22 +132,12 @@ pub(super) fn ready(
     Ok(Ready { files: shots.files, views, renderer, writers })
 }
 
-impl Ready {
-    /// Leaves only the views out of every `of` that are number `turn` of them.
-    pub(super) fn dealt(self, turn: usize, of: usize) -> Self {
-        let own = |index: &usize| index % of == turn;
-        let files = self.files.iter().enumerate().filter(|(index, _)| own(index)).map(|(_, file)| file.clone());
-        let (files, views) = (files.collect(), self.views.into_iter().enumerate());
-        let views = views.filter(|(index, _)| own(index)).map(|(_, view)| view).collect();
-        Self { files, views, ..self }
-    }
-}
-
-/// Draws and writes the pictures. Notes are printed if it `speaks`.
+/// Draws and writes the pictures of these `numbers`. Notes are printed if it `speaks`.
 pub(super) fn draw(
     arguments: &Arguments,
     target: &Target,
     ready: Ready,
+    numbers: impl Iterator<Item = Result<usize>>,
     (bars, speaks): (&dyn Progress, bool),
 ) -> Result<Vec<Written>> {
     let Ready { files, views, mut renderer, writers } = ready;
@@ -152,16 +146,19 @@ pub(super) fn draw(
     let notes: &dyn Progress = if speaks { &Notes } else { &() };
     // The first empty picture with the reason, and the number of empty pictures.
     let empty = RefCell::new((None, 0));
-    let frames = files.iter().zip(&views).map(|(file, view)| {
+    let frames = numbers.map(|number| {
+        let number = number?;
+        let (file, view) = (&files[number], &views[number]);
         let picture = renderer.frame(view, notes).map_err(|error| error.of_view(file))?;
         if let Some(unseen) = &picture.unseen {
             let (first, count) = &mut *empty.borrow_mut();
             first.get_or_insert_with(|| (file, unseen.sentence()));
             *count += 1;
         }
-        Ok((file, picture))
+        Ok((number, picture))
     });
-    let pictures = write_behind(writers, frames, |(file, picture)| {
+    let pictures = write_behind(writers, frames, |(number, picture)| {
+        let file = &files[number];
         let start = Instant::now();
         if let Some(folder) = file.parent().filter(|_| !target.is_standard) {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(file, error))?;
@@ -171,7 +168,7 @@ pub(super) fn draw(
         bars.advance(1);
         let write_ms = start.elapsed().as_secs_f64() * 1e3;
         let bits = arguments.file.json.as_ref().map(|_| frame.hashes());
-        Ok(Written { file: file.clone(), report, read, bits, write_ms })
+        Ok(Written { number, file: file.clone(), report, read, bits, write_ms })
     });
     bars.end();
     let pictures = pictures?;

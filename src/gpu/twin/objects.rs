@@ -37,8 +37,9 @@ impl api::BufferInterface for Buffer {
 
     fn get_mapped_range(&self, range: Range<u64>) -> Result<api::DispatchBufferMappedRange, wgpu::MapRangeError> {
         let words = self.words(range.start as usize / 4..(range.end as usize).div_ceil(4));
-        let bytes = &bytemuck::cast_slice(&words)[..(range.end - range.start) as usize];
-        Ok(api::DispatchBufferMappedRange::custom(Bytes(bytes.to_vec())))
+        let bytes = bytemuck::cast_slice(&words)[..(range.end - range.start) as usize].to_vec();
+        let (buffer, first) = (self.clone(), range.start as usize / 4);
+        Ok(api::DispatchBufferMappedRange::custom(Bytes { bytes, buffer, first, written: false }))
     }
 
     fn unmap(&self) {}
@@ -46,23 +47,38 @@ impl api::BufferInterface for Buffer {
     fn destroy(&self) {}
 }
 
-/// A copy of a buffer's bytes.
+/// A copy of a buffer's bytes, which go back to the buffer once they were written.
 #[derive(Debug)]
-struct Bytes(Vec<u8>);
+struct Bytes {
+    bytes: Vec<u8>,
+    buffer: Buffer,
+    /// The first of their words in the buffer.
+    first: usize,
+    written: bool,
+}
+
+impl Drop for Bytes {
+    fn drop(&mut self) {
+        if self.written {
+            self.buffer.write(self.first, bytemuck::pod_collect_to_vec::<u8, u32>(&self.bytes));
+        }
+    }
+}
 
 impl api::BufferMappedRangeInterface for Bytes {
     fn len(&self) -> usize {
-        self.0.len()
+        self.bytes.len()
     }
 
     #[allow(unsafe_code)]
     unsafe fn read_slice(&self) -> &[u8] {
-        &self.0
+        &self.bytes
     }
 
     #[allow(unsafe_code)]
     unsafe fn write_slice(&mut self) -> wgpu::WriteOnly<'_, [u8]> {
-        (&mut self.0[..]).into()
+        self.written = true;
+        (&mut self.bytes[..]).into()
     }
 }
 

@@ -23,9 +23,9 @@ const MPICH: [&str; 4] = ["libmpich.so.12", "libmpi.so.12", "libmpi_cray.so.12",
 const MPICH_WORLD: c_int = 0x4400_0000;
 const MPICH_BYTE: c_int = 0x4c00_010d;
 
-/// `MPI_STATUS_IGNORE` of both families, as an address.
-const OPEN_STATUS: usize = 0;
-const MPICH_STATUS: usize = 1;
+/// `MPI_STATUS_IGNORE`, as an address, and `MPI_ANY_SOURCE` of both families.
+const OPEN: (usize, c_int) = (0, -1);
+const MPICH_OWN: (usize, c_int) = (1, -2);
 
 /// The longest time between two looks at whether all processes have come.
 const LONGEST_WAIT: Duration = Duration::from_millis(1);
@@ -51,6 +51,22 @@ type AllToAllV<H> = unsafe extern "C" fn(
     H,
 ) -> c_int;
 
+type Send<H> = unsafe extern "C" fn(*const c_void, c_int, H, c_int, c_int, H) -> c_int;
+type Receive<H> = unsafe extern "C" fn(*mut c_void, c_int, H, c_int, c_int, H, *mut c_void) -> c_int;
+type Probe<H> = unsafe extern "C" fn(c_int, c_int, H, *mut c_int, *mut c_void) -> c_int;
+
+/// The tag of messages between two processes.
+const TAG: c_int = 1;
+
+/// A process in [`Library::receive`].
+#[derive(Clone, Copy)]
+pub enum From {
+    /// The process of this number.
+    Rank(c_int),
+    /// Any process.
+    Any,
+}
+
 /// The functions with handles of the type `H`.
 struct Functions<H> {
     world: H,
@@ -61,9 +77,14 @@ struct Functions<H> {
     all_to_all_v: AllToAllV<H>,
     barrier: unsafe extern "C" fn(H, *mut H) -> c_int,
     test: unsafe extern "C" fn(*mut H, *mut c_int, *mut c_void) -> c_int,
+    send: Send<H>,
+    receive: Receive<H>,
+    probe: Probe<H>,
     abort: unsafe extern "C" fn(H, c_int) -> c_int,
     /// `MPI_STATUS_IGNORE`.
     no_status: usize,
+    /// `MPI_ANY_SOURCE`.
+    any: c_int,
 }
 
 /// The functions of either family. Addresses are passed as integers of their size.
@@ -128,8 +149,8 @@ impl Library {
         let handles =
             unsafe { (symbol::<usize>(library, "ompi_mpi_comm_world"), symbol::<usize>(library, "ompi_mpi_byte")) };
         let functions = match handles {
-            (Ok(world), Ok(byte)) => Either::Open(Functions::of(library, [world, byte], OPEN_STATUS)?),
-            _ => Either::Mpich(Functions::of(library, [MPICH_WORLD, MPICH_BYTE], MPICH_STATUS)?),
+            (Ok(world), Ok(byte)) => Either::Open(Functions::of(library, [world, byte], OPEN)?),
+            _ => Either::Mpich(Functions::of(library, [MPICH_WORLD, MPICH_BYTE], MPICH_OWN)?),
         };
         let mut text = vec![0u8; MOST_VERSION];
         let mut length = 0;
@@ -227,6 +248,26 @@ impl Library {
         checked("MPI_Alltoallv", code)
     }
 
+    /// Sends a number to a process, which receives it by [`Library::receive`].
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the library's code.
+    pub fn send(&self, number: u64, to: c_int) -> Result<()> {
+        let bytes = number.to_le_bytes();
+        let count = bytes.len() as c_int;
+        // SAFETY: the buffer has `count` bytes.
+        let code = unsafe { call!(self, |own| (own.send)(bytes.as_ptr().cast(), count, own.byte, to, TAG, own.world)) };
+        checked("MPI_Send", code)
+    }
+
+    /// The number that a process has sent, if it has arrived.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the library's code.
+    pub fn receive(&self, from: From) -> Result<Option<u64>> {
+        call!(self, |own| own.received(from))
+    }
+
     /// Ends all processes of the job with this exit code.
     pub fn abort(&self, code: u8) {
         // SAFETY: the library is initialised.
@@ -241,6 +282,25 @@ impl Library {
 }
 
 impl<H: Copy> Functions<H> {
+    /// As [`Library::receive`].
+    fn received(&self, from: From) -> Result<Option<u64>> {
+        let source = if let From::Rank(rank) = from { rank } else { self.any };
+        let (mut arrived, no_status) = (0, self.no_status as *mut c_void);
+        // SAFETY: the pointer is that of an integer, and a status is not asked for.
+        let code = unsafe { (self.probe)(source, TAG, self.world, &raw mut arrived, no_status) };
+        checked("MPI_Iprobe", code)?;
+        if arrived == 0 {
+            return Ok(None);
+        }
+        let mut bytes = [0u8; 8];
+        let count = bytes.len() as c_int;
+        // SAFETY: the buffer has `count` bytes, as many as each message of this tag.
+        let code =
+            unsafe { (self.receive)(bytes.as_mut_ptr().cast(), count, self.byte, source, TAG, self.world, no_status) };
+        checked("MPI_Recv", code)?;
+        Ok(Some(u64::from_le_bytes(bytes)))
+    }
+
     /// As [`Library::meet`].
     fn meet(&self) -> Result<()> {
         let mut request = self.world;
@@ -260,7 +320,11 @@ impl<H: Copy> Functions<H> {
         }
     }
 
-    fn of(library: &'static libloading::Library, [world, byte]: [H; 2], no_status: usize) -> Result<Self> {
+    fn of(
+        library: &'static libloading::Library,
+        [world, byte]: [H; 2],
+        (no_status, any): (usize, c_int),
+    ) -> Result<Self> {
         // SAFETY: the types are those of the MPI standard's C functions, with the handles of the
         // library's family.
         unsafe {
@@ -273,8 +337,12 @@ impl<H: Copy> Functions<H> {
                 all_to_all_v: symbol(library, "MPI_Alltoallv")?,
                 barrier: symbol(library, "MPI_Ibarrier")?,
                 test: symbol(library, "MPI_Test")?,
+                send: symbol(library, "MPI_Send")?,
+                receive: symbol(library, "MPI_Recv")?,
+                probe: symbol(library, "MPI_Iprobe")?,
                 abort: symbol(library, "MPI_Abort")?,
                 no_status,
+                any,
             })
         }
     }

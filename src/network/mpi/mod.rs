@@ -2,11 +2,13 @@
 //! program runs under Open MPI and under MPICH and what descends from it (Intel MPI, Cray MPICH,
 //! MVAPICH), and nothing of them is needed to build it or to run it alone.
 
+mod deal;
 mod job;
 mod library;
 
 use std::ffi::c_int;
 
+pub use self::deal::Deal;
 pub use self::job::Job;
 use self::library::Library;
 use super::Network;

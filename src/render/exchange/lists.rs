@@ -12,14 +12,18 @@ use crate::error::Result;
 use crate::passes::fragments::pixel_starts;
 use crate::plan::{FragmentLayout, KEY_WORDS};
 
+/// Places between those that are written which are written too: few long runs cost less than many
+/// short ones.
+const GAP: usize = 256;
+
 /// The lists of the fragments of each sample of some rows.
 pub struct Lists {
     /// The first place of each sample's list, and the end of the last list.
     starts: Vec<u32>,
     /// The number of free places of each sample's list, which come first.
     free: Vec<u32>,
-    /// The depth of the fragment at each place, as bits, and the place.
-    keys: Vec<[u32; KEY_WORDS as usize]>,
+    /// The depth of the fragment at each place, as bits, and the place ([`KEY_WORDS`]).
+    keys: Vec<u32>,
     /// The record of the fragment at each place ([`FragmentLayout`]).
     records: Vec<u32>,
     /// Words of a record.
@@ -47,7 +51,7 @@ impl Lists {
 
     /// The fragment at a place.
     pub fn at(&self, place: usize) -> Sent<'_> {
-        (self.keys[place][0], &self.records[place * self.words..(place + 1) * self.words])
+        (self.keys[place * KEY_WORDS as usize], &self.records[place * self.words..(place + 1) * self.words])
     }
 
     /// Adds a fragment of another process to the list of a sample. As on the device, a fragment
@@ -63,7 +67,7 @@ impl Lists {
             return Some(());
         }
         let place = place - 1;
-        self.keys[place as usize] = [depth, place];
+        self.keys[place as usize * KEY_WORDS as usize..][..2].copy_from_slice(&[depth, place]);
         self.records[place as usize * self.words..][..self.words].copy_from_slice(record);
         self.free[sample] -= 1;
         match self.taken.last_mut() {
@@ -78,11 +82,15 @@ impl Lists {
         self.free[sample] = self.starts[sample + 1] - self.starts[sample];
     }
 
-    /// The places that fragments of other processes took, ascending.
+    /// The places that fragments of other processes took, ascending, with few others between them.
     fn runs(&mut self) -> Runs {
         self.taken.sort_by_key(|taken| taken.start);
         let mut runs = Runs::new();
-        self.taken.iter().for_each(|taken| push(&mut runs, taken.start as usize..taken.end as usize));
+        for taken in &self.taken {
+            let (start, end) = (taken.start as usize, taken.end as usize);
+            let last = runs.last().map_or(start, |last| last.end);
+            push(&mut runs, if start - last <= GAP { last..end } else { start..end });
+        }
         runs
     }
 }
@@ -98,10 +106,9 @@ impl Run<'_> {
         let starts = self.read_words(of_starts, pixel_starts(rows.rows, samples))?;
         let total = u64::from(starts.last().copied().unwrap_or(0));
         let words = FragmentLayout::of(&self.plan.needs).words;
-        let keys = self.read_words(of_keys, 0..total * KEY_WORDS)?;
         let mut lists = Lists {
             free: self.read_words(of_free, 0..samples)?,
-            keys: bytemuck::cast_slice(&keys).to_vec(),
+            keys: self.read_words(of_keys, 0..total * KEY_WORDS)?,
             records: self.read_words(of_records, 0..total * u64::from(words))?,
             words: words as usize,
             taken: Vec::new(),
@@ -109,7 +116,7 @@ impl Run<'_> {
         };
         exchange.fragments(rows, &mut lists)?;
         let runs = lists.runs();
-        let keys: &[u32] = lists.keys.as_flattened();
+        let keys = &lists.keys;
         of_keys.write_runs(gpu, &of_words(&runs, KEY_WORDS), |run| keys[places(&run)].into())?;
         let records = &lists.records;
         of_records.write_runs(gpu, &of_words(&runs, words.into()), |run| records[places(&run)].into())?;

@@ -12,6 +12,8 @@
 //! triangles   a process draws all of them, gets those of another, or needs none
 //! nearest     nearest(x, y) = min over processes, before accumulate compares depths with it
 //! sums        sums(x, y)    = sum over processes, before resolve divides
+//! moments     moment(x, y)  = sum over processes, before accumulate weights by them
+//! winners     winner(x, y)  = max over processes, where only the nearest fragment shows
 //! counts      count(x, y)   = sum over processes, before places in lists are given out
 //! fragments   list(x, y)    = union over processes, before it is sorted
 //! ```
@@ -20,7 +22,7 @@
 //! values of complete bands: a try whose buffers were too small is repeated before it is called.
 
 mod lists;
-mod numbers;
+pub(super) mod numbers;
 mod triangles;
 
 use std::ops::Range;
@@ -80,11 +82,12 @@ pub trait Exchange: Sync {
     }
 
     /// Whether all processes have values of complete buffers for `rows`, so that none exchanges
-    /// values of a try that others repeat. A frame ends with a call for no rows.
+    /// values of a try that others repeat. `what` is exchanged next; a frame ends with a call for
+    /// nothing and no rows.
     ///
     /// # Errors
     /// Any error of the exchange.
-    fn agree(&self, _rows: &Rows, complete: bool) -> Result<bool> {
+    fn agree(&self, _rows: &Rows, _what: Option<Exchanged>, complete: bool) -> Result<bool> {
         Ok(complete)
     }
 
@@ -179,7 +182,7 @@ impl Run<'_> {
         let of = &self.plan.bands[band];
         let rows = Rows { render, first: of.first, rows: of.rows, width: self.plan.width };
         self.timing.flush(self.gpu)?;
-        if what != Exchanged::Triangles && !exchange.agree(&rows, self.is_complete(band)?)? {
+        if what != Exchanged::Triangles && !exchange.agree(&rows, Some(what), self.is_complete(band)?)? {
             return Ok(Onward::Retry);
         }
         let then = match what {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::{Exchange, Numbers, Rows, Run, Runs, Then, places, push};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
+use crate::gpu::runs::cut;
 use crate::passes::accumulate;
 use crate::plan::extra::words_of;
 use crate::plan::steps::Reduced;
@@ -70,10 +71,12 @@ impl Run<'_> {
         Ok(then)
     }
 
-    /// All words of a buffer up to `len`.
+    /// These words of a buffer.
     pub(super) fn read_words(&self, buffer: &Buffer<u32>, words: Range<u64>) -> Result<Vec<u32>> {
         let mut all = vec![0; places(&words).len()];
-        buffer.visit_runs(self.gpu, std::slice::from_ref(&words), |_, stored| all.copy_from_slice(stored))?;
+        buffer.visit_runs(self.gpu, &cut([words.clone()], 1), |run, stored| {
+            all[places(&(run.start - words.start..run.end - words.start))].copy_from_slice(stored);
+        })?;
         Ok(all)
     }
 }
@@ -91,6 +94,6 @@ fn covered<T: Copy + Default + PartialEq>(numbers: &[T], each: usize) -> Runs {
 }
 
 /// The words of runs of samples, `each` for each sample.
-pub(super) fn of_words(runs: &Runs, each: u64) -> Vec<Range<u64>> {
-    runs.iter().map(|run| run.start as u64 * each..run.end as u64 * each).collect()
+pub(in super::super) fn of_words(runs: &Runs, each: u64) -> Vec<Range<u64>> {
+    cut(runs.iter().map(|run| run.start as u64 * each..run.end as u64 * each), each)
 }

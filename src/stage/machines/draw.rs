@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Part;
 use super::files::{Depths, Kept, Sums};
-use super::header::{Header, Holds, Subject, VERSION};
+use super::header::{Header, Holds, Subject, version};
 use super::merge::merge;
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
@@ -109,7 +109,7 @@ fn check_marks(options: &RenderOptions) -> Result<()> {
 /// The picture that a part belongs to.
 pub(super) fn subject(scene: &Scene, (facts, digest): (Facts, u64), camera: &Camera, settings: &Settings) -> Subject {
     Subject {
-        version: VERSION.to_owned(),
+        version: version().to_owned(),
         facts,
         digest,
         camera: camera.clone(),

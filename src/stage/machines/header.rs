@@ -2,7 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use std::sync::LazyLock;
+
 use crate::error::Result as Outcome;
+use crate::gpu::sources::FILES;
+use crate::hash;
 use crate::io::part::{Section, Values};
 use crate::plan::extra::TRIANGLE_PIXEL_WORDS;
 use crate::plan::{Facts, Settings, check};
@@ -83,8 +87,15 @@ impl Subject {
 const MOST_CHANNELS: u16 = 64;
 const MOST_RENDERS: u32 = 8;
 
-/// The version of epsplat, which a header names.
-pub(super) const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// The version of epsplat, which a header names, with a hash of its kernels: other kernels may
+/// store values in another form.
+pub(super) fn version() -> &'static str {
+    static VERSION: LazyLock<String> = LazyLock::new(|| {
+        let kernels = hash::of(FILES.iter().flat_map(|(name, text)| name.bytes().chain(text.bytes())));
+        format!("{} (kernels {:08x})", env!("CARGO_PKG_VERSION"), kernels as u32)
+    });
+    &VERSION
+}
 
 impl Header {
     pub fn encoded(&self) -> Vec<u8> {
@@ -106,10 +117,11 @@ impl Header {
             version: String,
         }
         let other = |version: &str| {
-            format!("epsplat {version} drew it, and this is {VERSION}: draw and merge all parts by one version")
+            let this = self::version();
+            format!("epsplat {version} drew it, and this is {this}: draw and merge all parts by one version")
         };
         if let Ok(Known { subject: Version { version } }) = ciborium::from_reader::<Known, _>(bytes)
-            && version != VERSION
+            && version != self::version()
         {
             return Err(other(&version));
         }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -11,6 +11,7 @@ use super::files::All;
 use super::header::{Header, Holds};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::hash;
 use crate::io::part::{Content, Section, Values};
 use crate::options::DeviceOptions;
 use crate::passes::share::NoneOfScene;
@@ -59,10 +60,54 @@ pub struct Merged {
 /// another scene, camera, options or number of shares, with a share that is there already, or with
 /// damaged values.
 pub fn merge(parts: &[Part]) -> Result<Part> {
-    let [first, others @ ..] = parts else {
-        return Err(Error::Usage("there is nothing to merge: name the parts".into()));
-    };
-    others.iter().try_for_each(|other| check(first, other))?;
+    let first = first(parts)?;
+    let owners = owners(parts)?;
+    let own = parts.iter().fold(0u64, |own, part| own.wrapping_add(part.header.own));
+    let adapters: BTreeSet<&String> = parts.iter().flat_map(|part| &part.header.adapters).collect();
+    let adapters = adapters.into_iter().cloned().collect();
+    let header = Header { shares: owners.into_keys().collect(), own, adapters, ..first.header.clone() };
+    let merged = Part { name: first.name.clone(), header, sections: sections(parts)? };
+    merged.check_cover()?;
+    Ok(merged)
+}
+
+/// Files whose values are in memory at once.
+const AT_ONCE: usize = 16;
+
+/// Joins the parts of files as [`merge`] does, with the values of few of them in memory at once.
+///
+/// # Errors
+/// Those of [`Part::read`] and of [`merge`].
+pub fn merge_files(paths: &[PathBuf]) -> Result<Part> {
+    let read = |paths: &[PathBuf]| paths.iter().map(|path| Part::read(path)).collect::<Result<Vec<_>>>();
+    if paths.len() <= AT_ONCE {
+        return merge(&read(paths)?);
+    }
+    // All are checked first, so that errors name the files.
+    let heads = paths.iter().map(|path| Ok(Part { sections: Vec::new(), ..Part::read(path)? }));
+    owners(&heads.collect::<Result<Vec<_>>>()?)?;
+    let mut merged: Option<Part> = None;
+    for paths in paths.chunks(AT_ONCE) {
+        let mut parts = read(paths)?;
+        parts.extend(merged.take());
+        merged = Some(merge(&parts)?);
+    }
+    merged.ok_or_else(nothing)
+}
+
+fn nothing() -> Error {
+    Error::Usage("there is nothing to merge: name the parts".into())
+}
+
+/// The first of the parts.
+fn first(parts: &[Part]) -> Result<&Part> {
+    parts.first().ok_or_else(nothing)
+}
+
+/// The name of the part that has each share. Fails unless all are different parts of one picture.
+fn owners(parts: &[Part]) -> Result<BTreeMap<u32, &Path>> {
+    let first = first(parts)?;
+    parts.iter().skip(1).try_for_each(|other| check(first, other))?;
     let mut owners: BTreeMap<u32, &Path> = BTreeMap::new();
     for part in parts {
         for share in &part.header.shares {
@@ -75,13 +120,7 @@ pub fn merge(parts: &[Part]) -> Result<Part> {
             }
         }
     }
-    let own = parts.iter().fold(0u64, |own, part| own.wrapping_add(part.header.own));
-    let adapters: BTreeSet<&String> = parts.iter().flat_map(|part| &part.header.adapters).collect();
-    let adapters = adapters.into_iter().cloned().collect();
-    let header = Header { shares: owners.into_keys().collect(), own, adapters, ..first.header.clone() };
-    let merged = Part { name: first.name.clone(), header, sections: sections(parts)? };
-    merged.check_cover()?;
-    Ok(merged)
+    Ok(owners)
 }
 
 /// Fails unless `other` can be merged with `first`.
@@ -215,10 +254,7 @@ impl Part {
     /// A hash of the values of a part that was merged.
     pub(super) fn digest(&self) -> u64 {
         let bytes = Content { header: Vec::new(), sections: self.sections.clone() }.encoded();
-        // FNV-1a of 64 bits.
-        bytes
-            .iter()
-            .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3))
+        hash::of(bytes)
     }
 
     /// Makes the picture of all parts on a device, without the scene. Its bits are those of a

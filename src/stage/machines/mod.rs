@@ -18,7 +18,7 @@ mod ranks;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-pub use self::merge::{Merged, merge};
+pub use self::merge::{Merged, merge, merge_files};
 pub(super) use self::ranks::Drawing;
 pub use self::ranks::Ranked;
 

@@ -7,6 +7,7 @@ use super::header::{Subject, encoded};
 use crate::annotate::Marks;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::hash;
 use crate::network::{Network, Wire, gathered, together};
 use crate::passes::share::{ShareOfScene, facts_of_all};
 use crate::plan::{Facts, Settings, check};
@@ -32,6 +33,10 @@ pub struct Ranked {
 pub(in crate::stage) struct Drawing {
     scene: Arc<Scene>,
     settings: Settings,
+    /// Number of this process, and of all.
+    place: (usize, usize),
+    /// The least limit of buffers of all processes, bytes.
+    limit: u64,
     facts: Facts,
     digest: u64,
     renderer: render::Renderer<ShareOfScene, Backend>,
@@ -41,17 +46,16 @@ impl Drawing {
     fn new(
         of_view: &SceneOfView,
         (facts, digest): (Facts, u64),
-        network: &dyn Network,
-        backend: Backend,
+        place: (usize, usize),
+        (backend, limit): (&Backend, u64),
     ) -> Result<Self> {
         let SceneOfView { scene, settings, is_share, .. } = of_view;
-        let share = Share::new(network.rank() as u32 + 1, network.size() as u32)?;
         let source = match is_share {
             true => ShareOfScene::whole(scene.clone()),
-            false => ShareOfScene::new(scene.clone(), share),
+            false => ShareOfScene::new(scene.clone(), Share::new(place.0 as u32 + 1, place.1 as u32)?),
         };
-        let renderer = render::Renderer::new(source, settings, backend)?.among()?;
-        Ok(Self { scene: scene.clone(), settings: settings.clone(), facts, digest, renderer })
+        let renderer = render::Renderer::new(source, settings, limited(backend, limit))?.among()?;
+        Ok(Self { scene: scene.clone(), settings: settings.clone(), place, limit, facts, digest, renderer })
     }
 }
 
@@ -68,7 +72,10 @@ impl Renderer {
         let shared = self.shared(view, &others, progress);
         let of_view = together(network, others.failed().map_or(shared, Err))?;
         let SceneOfView { scene, camera, settings, is_share, .. } = &of_view;
-        let kept = self.ranked.take().filter(|kept| Arc::ptr_eq(&kept.scene, scene) && kept.settings == *settings);
+        let place = (network.rank(), network.size());
+        let is_kept =
+            |kept: &Drawing| Arc::ptr_eq(&kept.scene, scene) && kept.settings == *settings && kept.place == place;
+        let kept = self.ranked.take().filter(is_kept);
         let (facts, digest) = match (&kept, is_share) {
             (Some(kept), _) => (kept.facts.clone(), kept.digest),
             (None, true) => (facts_of_all(scene), 0),
@@ -76,10 +83,10 @@ impl Renderer {
         };
         let subject = subject(scene, (facts.clone(), digest), camera, settings);
         together(network, check_same(network, &Subject { maps: self.maps(), ..subject }))?;
-        let backend = together(network, common_backend(self.backend(), network))?;
+        let limit = together(network, common_limit(self.backend(), network))?;
         let made = match kept {
-            Some(kept) => Ok(kept),
-            None => Drawing::new(&of_view, (facts, digest), network, backend),
+            Some(kept) if kept.limit == limit => Ok(kept),
+            _ => Drawing::new(&of_view, (facts, digest), place, (self.backend(), limit)),
         };
         let mut kept = together(network, made)?;
         let (frame, report, wire) = kept.renderer.frame_over(camera, network, progress)?;
@@ -96,6 +103,11 @@ impl Renderer {
         }
         let of_view = self.scene_of(view, others, progress)?;
         check::options_of_ranks(&of_view.settings, false)?;
+        let whole = of_view.scene.part_of.as_ref();
+        if of_view.is_share && view.is_framed() && whole.is_some_and(|whole| whole.is_framed_by_radii()) {
+            let what = "the whole of these large disks is framed from all of them: give --eye and --target";
+            return Err(Error::Usage(what.into()));
+        }
         let marks = self.options.marks.marks();
         if marks != Marks::default() {
             marks.check(&of_view.camera)?;
@@ -136,7 +148,7 @@ impl Others for OverNetwork<'_> {
         match gathered(self.network, bytemuck::cast_slice(own)) {
             Ok(all) => {
                 let all: Vec<Vec<f64>> = all.iter().map(|bytes| bytemuck::pod_collect_to_vec(bytes)).collect();
-                match all.iter().position(|other| other.len() != own.len()) {
+                match all.iter().position(|other| other.len() != all[0].len()) {
                     Some(other) => *failed = Some(differs(other)),
                     None => {
                         all.iter().for_each(|all| own.iter_mut().zip(all).for_each(|(own, of)| *own = own.max(*of)))
@@ -161,27 +173,28 @@ fn check_same(network: &dyn Network, subject: &Subject) -> Result<()> {
     let Settings { sources, own_kernel, accumulator, .. } = &subject.settings;
     let kernels = format!("{sources:?} {own_kernel:?} {accumulator:?}");
     let own = encoded(subject).into_iter().chain(kernels.into_bytes());
-    // FNV-1a of 64 bits.
-    let hash =
-        own.fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-    let all = gathered(network, &hash.to_le_bytes())?;
+    let all = gathered(network, &hash::of(own).to_le_bytes())?;
     match all.iter().position(|other| *other != all[0]) {
         None => Ok(()),
         Some(other) => Err(differs(other)),
     }
 }
 
-/// The device of this process, with the least limit of buffers of all: bands follow from it.
-fn common_backend(own: &Backend, network: &dyn Network) -> Result<Backend> {
+/// The least limit of buffers of all processes, bytes: bands follow from it.
+fn common_limit(own: &Backend, network: &dyn Network) -> Result<u64> {
     let limit = if let Backend::Gpu { gpu, .. } = own { gpu.buffer_limit() } else { 0 };
     let all = gathered(network, &limit.to_le_bytes())?;
     let of = |bytes: &Vec<u8>| bytes.as_slice().try_into().map_or(0, u64::from_le_bytes);
-    let least = all.iter().map(of).min().unwrap_or(0);
-    match own {
+    Ok(all.iter().map(of).min().unwrap_or(0))
+}
+
+/// A device with this limit of buffers.
+fn limited(backend: &Backend, limit: u64) -> Backend {
+    match backend {
         Backend::Gpu { gpu, sources } => {
-            let gpu = Box::new((**gpu).clone().with_buffer_limit(least));
-            Ok(Backend::Gpu { gpu, sources: sources.clone() })
+            let gpu = Box::new((**gpu).clone().with_buffer_limit(limit));
+            Backend::Gpu { gpu, sources: sources.clone() }
         }
-        Backend::Reference => Ok(Backend::Reference),
+        Backend::Reference => Backend::Reference,
     }
 }

@@ -327,6 +327,34 @@ fn the_job_of_the_guide_makes_the_bytes_of_one_process() {
     assert!(folder.path("together.exr").exists());
 }
 
+/// The job of Slurm of the guide, with a launcher in place of srun.
+#[test]
+fn the_job_of_slurm_of_the_guide_draws() {
+    use std::os::unix::fs::PermissionsExt;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = std::fs::read_to_string(root.join("src/guide/machines.md")).unwrap();
+    let mut blocks = guide.split("```text\n").skip(1).map(|block| block.split("```").next().unwrap());
+    let script = blocks.find(|block| block.contains("srun")).unwrap();
+    for launcher in launchers() {
+        let folder = Folder::new();
+        succeeds(&["generate", "torus", "--count", "3000", "-o", text(&folder.path("scan.ply"))]);
+        let shim = folder.path("srun");
+        let skipped = "while [ \"${1#--}\" != \"$1\" ]; do shift; done";
+        std::fs::write(&shim, format!("#!/bin/sh\n{skipped}\nexec {launcher} -n 2 \"$@\"\n")).unwrap();
+        std::fs::set_permissions(&shim, std::fs::Permissions::from_mode(0o755)).unwrap();
+        std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_epsplat"), folder.path("epsplat")).unwrap();
+        let own = shim.parent().unwrap();
+        let path = format!("{}:{}", own.display(), std::env::var("PATH").unwrap());
+        let mut shell = Command::new("sh");
+        let output = shell.args(["-e", "-c", script]).current_dir(own).envs(ENVIRONMENT).env("PATH", path).output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.path("scan.json")).unwrap()).unwrap();
+        assert!(report["ranks"].as_array().unwrap().len() == 2 && folder.path("scan.png").exists());
+    }
+}
+
 /// Without a library, a job says so; without a job, none is needed.
 #[test]
 fn a_job_needs_a_library_and_a_lone_process_none() {

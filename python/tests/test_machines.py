@@ -1,9 +1,10 @@
 """Pictures that several processes draw, by parts as bytes."""
 
+import concurrent.futures
 import subprocess
 
 import pytest
-from conftest import DATA, same
+from conftest import DATA, ROOT, same
 
 import epsplat
 
@@ -60,3 +61,27 @@ def test_wrong_parts_are_one_exception(renderer):
         with pytest.raises(epsplat.Error) as error:
             call()
         assert "\n" not in str(error.value)
+
+
+class Client:
+    """A client of Dask, as far as the lines of the guide use it."""
+
+    def __init__(self, pool):
+        self.pool = pool
+
+    def map(self, function, values, **others):
+        return [self.pool.submit(function, value, **others) for value in values]
+
+    def gather(self, futures):
+        return [future.result() for future in futures]
+
+
+def test_the_lines_of_the_guide_draw(tmp_path, monkeypatch):
+    guide = (ROOT / "src/guide/machines.md").read_text()
+    lines = guide.split("```python\n")[1].split("```")[0].replace("1920, 1080", "160, 120")
+    assert "client.map" in lines and "160, 120" in lines
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scan.laz").write_bytes((DATA / "autzen.laz").read_bytes())
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        exec(lines, {"epsplat": epsplat, "client": Client(pool)})
+    assert (tmp_path / "scan.png").stat().st_size > 1000

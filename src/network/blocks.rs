@@ -2,8 +2,8 @@
 //!
 //! A block is a run of pixels in a row of samples, at most 64 of these, so that a word tells which
 //! of them have values. The blocks of an image are dealt to the processes in turn, from row to row
-//! one process later, so that each owns a like number anywhere in the image. All samples of a pixel have one owner, in
-//! every render of the image.
+//! one process later, so that each owns a like number anywhere in the image. All samples of a pixel
+//! have one owner, in every render of the image.
 
 use std::ops::Range;
 

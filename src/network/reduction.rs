@@ -173,7 +173,7 @@ impl<'a> Reduction<'a> {
         &self,
         what: Reduced,
         rows: &Rows,
-        (all, combine): (&mut [T], fn(T, T) -> T),
+        (all, combine): (&mut [T], Combine<T>),
         runs: &mut Runs,
     ) -> Result<Then> {
         let channels = all.len() / rows.samples().len().max(1);
@@ -253,8 +253,11 @@ impl<'a> Reduction<'a> {
     }
 }
 
+/// How two numbers reduce to one.
+type Combine<T> = fn(T, T) -> T;
+
 /// How two numbers of 32 bits reduce to one.
-fn short_of(what: Reduced) -> fn(u32, u32) -> u32 {
+fn short_of(what: Reduced) -> Combine<u32> {
     match what {
         Reduced::Nearest | Reduced::Winners => u32::max,
         // Numbers of fragments saturate (`wgsl/lists/fragments.wgsl`).
@@ -264,7 +267,7 @@ fn short_of(what: Reduced) -> fn(u32, u32) -> u32 {
 }
 
 /// How two numbers of 64 bits reduce to one.
-fn long_of(what: Reduced) -> fn(u64, u64) -> u64 {
+fn long_of(what: Reduced) -> Combine<u64> {
     match what {
         Reduced::Nearest | Reduced::Winners => u64::max,
         Reduced::Counts | Reduced::Moments | Reduced::Sums => u64::wrapping_add,

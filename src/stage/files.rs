@@ -1,6 +1,7 @@
 //! The files of a scene. A folder stands for the files in it, and parts that cannot be read are
 //! left out with a note.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -50,7 +51,7 @@ impl Files {
             if vpc::is_one(&path) && !path.is_dir() {
                 for tile in vpc::read(&path)? {
                     files.paths.push(tile.path.clone());
-                    files.tiles.insert(tile.path.clone(), tile);
+                    files.add_tile(tile);
                 }
                 continue;
             }
@@ -67,6 +68,17 @@ impl Files {
             files.paths.append(&mut found);
         }
         Ok(files)
+    }
+
+    /// Adds a tile. If several clouds name it, its points lie in the boxes of all of them together.
+    fn add_tile(&mut self, tile: Tile) {
+        match self.tiles.entry(tile.path.clone()) {
+            Entry::Vacant(place) => drop(place.insert(tile)),
+            Entry::Occupied(mut known) => {
+                let both = known.get().bounds.zip(tile.bounds);
+                known.get_mut().bounds = both.map(|(one, other)| one.union(other));
+            }
+        }
     }
 
     /// The paths of all files, including those found in folders.
@@ -217,7 +229,6 @@ impl Files {
 
     /// Opens the files for reading shares of their points: None unless all are binary PLY files on
     /// this machine whose points are surfels.
-    #[cfg(feature = "parts")]
     pub(super) fn surfels(&self) -> Result<Option<Vec<Rows>>> {
         if self.paths.iter().any(|path| address::is_remote(path)) {
             return Ok(None);

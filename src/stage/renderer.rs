@@ -42,7 +42,7 @@ pub struct Renderer {
     pub(super) extent: Extent,
     /// Whether only a share of the scene was read, for [`Renderer::frame_over`].
     has_share: bool,
-    /// What this process draws together with others, from the last such view.
+    /// The share that this process draws together with others, from the last such view.
     #[cfg(feature = "parts")]
     pub(super) ranked: Option<Drawing>,
 }

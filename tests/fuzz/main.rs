@@ -43,6 +43,7 @@ mod random;
 mod render;
 mod session;
 mod tables;
+mod vpc;
 
 use mutate::Grammar;
 use random::Random;
@@ -137,6 +138,11 @@ fn camera() {
 #[test]
 fn cameras() {
     session::run(&cameras::TARGET);
+}
+
+#[test]
+fn vpc() {
+    session::run(&vpc::TARGET);
 }
 
 #[test]

@@ -283,13 +283,13 @@ fn what_is_sent_follows_from_the_covered_pixels() {
     let sources = shares(&scene, 4);
     let (frame, wires) = together(&sources, &camera, &options, &gpu);
     let covered = |frame: &Frame| frame.color.iter().filter(|color| color[3] > 0.0).count() as f64;
-    // What a process covers is what its share alone shows, less than the pixel at the rim.
+    // A process covers what its share alone shows.
     let backend = Backend::gpu(gpu.clone());
-    let of_share = |source: &Box<dyn Source>| {
-        covered(&Renderer::new(Box::as_ref(source), &options, &backend).unwrap().frame(&camera, &()).unwrap().0)
+    let of_share = |source: &dyn Source| {
+        covered(&Renderer::new(source, &options, &backend).unwrap().frame(&camera, &()).unwrap().0)
     };
     // Three quarters of it belong to other processes, within a few percent.
-    let sent = 0.75 * sources.iter().map(of_share).sum::<f64>();
+    let sent = 0.75 * sources.iter().map(|source| of_share(&**source)).sum::<f64>();
     let of = |bytes: fn(&Wire) -> u64| wires.iter().map(bytes).sum::<u64>() as f64;
     let [nearest, sums, picture] = [of(|w| w.nearest_bytes), of(|w| w.sums_bytes), of(|w| w.picture_bytes)];
     // Four bytes and as many in answer; the numbers and masks of blocks take 12 for 64 pixels, or

@@ -32,7 +32,7 @@ fn sphere(count: usize, center: [f64; 3], radius: f64) -> Points {
     }
 }
 
-/// What each of `of` processes makes of the files.
+/// The shares that `of` processes make of the files.
 fn shared(paths: &[std::path::PathBuf], of: usize) -> Vec<Shared> {
     let threads = Threads::new(of);
     let members: Vec<_> = (0..of).map(|rank| threads.member(rank)).collect();

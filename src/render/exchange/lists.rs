@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::numbers::of_words;
 use super::{Exchange, Rows, Run, Runs, places, push};
 use crate::error::Result;
+use crate::gpu::runs::cut;
 use crate::passes::fragments::pixel_starts;
 use crate::plan::{FragmentLayout, KEY_WORDS};
 
@@ -120,6 +121,7 @@ impl Run<'_> {
         of_keys.write_runs(gpu, &of_words(&runs, KEY_WORDS), |run| keys[places(&run)].into())?;
         let records = &lists.records;
         of_records.write_runs(gpu, &of_words(&runs, words.into()), |run| records[places(&run)].into())?;
-        of_free.write_runs(gpu, &[0..samples], |run| lists.free[places(&run)].into())
+        let all = std::iter::once(0..samples);
+        of_free.write_runs(gpu, &cut(all, 1), |run| lists.free[places(&run)].into())
     }
 }

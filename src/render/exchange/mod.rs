@@ -102,8 +102,8 @@ pub trait Exchange: Sync {
     }
 
     /// Replaces numbers of `rows` by those that the numbers of all processes reduce to. Each sample
-    /// has an equal number of them. `runs` are the samples that may have other values than 0, before
-    /// and after; runs of zeros that it had before are kept.
+    /// has an equal number of them. `runs` are the samples that may have other values than 0, both
+    /// before and after; runs of zeros that it had before are kept.
     ///
     /// A nearest depth is stored as bits(+inf) - bits(depth), so the nearest is the greatest, and 0
     /// is nothing. There are [`PixelLayout::channels`](crate::plan::PixelLayout::channels) sums.

@@ -54,7 +54,7 @@ fn made(sources: &Sources<'_>) -> Result<(Scene, Preparation)> {
     }
     let place = |k: usize| (scene.center(k), f64::from(scene.surfels[k].radius()));
     let read = |surfels: std::ops::Range<usize>| Ok(surfels.map(place).collect());
-    let places = Read::new(count as usize, vec![0..scene.surfels.len()], read, sources.among);
+    let places = Read::new(count as usize, std::iter::once(0..scene.surfels.len()).collect(), read, sources.among);
     let (bounds, (body, framed, strays)) = places.made(|places| {
         let (core, bounds) = core_and_box(places);
         (bounds, framed_within(core, bounds, places))

@@ -9,6 +9,7 @@ mod blocks;
 mod carried;
 mod listed;
 mod packed;
+mod pixels;
 mod reduction;
 
 #[cfg(feature = "mpi")]

@@ -26,6 +26,7 @@ mod matrix;
 mod nearest;
 mod oit;
 mod on_device;
+mod parts;
 mod pictures;
 mod points;
 mod programs;

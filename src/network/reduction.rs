@@ -34,7 +34,7 @@ use crate::scene::Samples;
 pub struct Wire {
     /// Bytes of nearest depths, and of answers about them.
     pub nearest_bytes: u64,
-    /// Bytes of sums, of moments and of colours of nearest fragments.
+    /// Bytes of all sums, and of colours of nearest fragments.
     pub sums_bytes: u64,
     /// Bytes of fragments and of their numbers, where surfaces show through each other.
     pub fragments_bytes: u64,
@@ -50,7 +50,7 @@ impl Wire {
         match what {
             Reduced::Nearest => &mut self.nearest_bytes,
             Reduced::Counts => &mut self.fragments_bytes,
-            Reduced::Winners | Reduced::Moments | Reduced::Sums => &mut self.sums_bytes,
+            Reduced::Winners | Reduced::Common(_) | Reduced::Sums => &mut self.sums_bytes,
         }
     }
 }
@@ -69,7 +69,7 @@ pub struct Reduction<'a> {
 struct State {
     /// The pixels of this process that have values, as bits.
     covered: Vec<u64>,
-    /// The bits of the samples whose nearest depths were sent to each owner, for moments of the
+    /// The bits of the samples whose nearest depths were sent to each owner, for common sums of the
     /// same rows.
     asked: Vec<Vec<(u32, u64)>>,
     wire: Wire,
@@ -184,8 +184,8 @@ impl<'a> Reduction<'a> {
         let blocks = self.blocks(rows);
         let mut used = blocks.used(rows, runs);
         let asked = match what {
-            // Moments may round to zeros where a process has fragments, which need the sums.
-            Reduced::Moments => {
+            // Sums may round to zeros where a process has fragments, which need the results.
+            Reduced::Common(_) => {
                 let asked = std::mem::take(&mut self.state().asked);
                 asked.into_iter().map(|asked| Packed::of_samples(blocks, asked, all, channels)).collect()
             }
@@ -198,7 +198,7 @@ impl<'a> Reduction<'a> {
         let received = read(&received)?;
         self.reduced(rows, (&received, &mut used), (&mut *all, channels), combine)?;
         match what {
-            Reduced::Nearest | Reduced::Moments => {
+            Reduced::Nearest | Reduced::Common(_) => {
                 let answer = |packed: &Packed| {
                     let mut answer = Vec::with_capacity(packed.samples() * channels);
                     let places = packed.places(blocks);
@@ -263,7 +263,7 @@ fn short_of(what: Reduced) -> Combine<u32> {
         Reduced::Nearest | Reduced::Winners => u32::max,
         // Numbers of fragments saturate (`wgsl/lists/fragments.wgsl`).
         Reduced::Counts => u32::saturating_add,
-        Reduced::Moments | Reduced::Sums => u32::wrapping_add,
+        Reduced::Common(_) | Reduced::Sums => u32::wrapping_add,
     }
 }
 
@@ -271,7 +271,7 @@ fn short_of(what: Reduced) -> Combine<u32> {
 fn long_of(what: Reduced) -> Combine<u64> {
     match what {
         Reduced::Nearest | Reduced::Winners => u64::max,
-        Reduced::Counts | Reduced::Moments | Reduced::Sums => u64::wrapping_add,
+        Reduced::Counts | Reduced::Common(_) | Reduced::Sums => u64::wrapping_add,
     }
 }
 
@@ -286,7 +286,11 @@ impl Exchange for Reduction<'_> {
             None => 0,
             Some(Exchanged::Triangles) => 1,
             Some(Exchanged::Fragments) => 2,
-            Some(Exchanged::Numbers(what)) => 3 + what as u32,
+            Some(Exchanged::Numbers(Reduced::Nearest)) => 3,
+            Some(Exchanged::Numbers(Reduced::Winners)) => 4,
+            Some(Exchanged::Numbers(Reduced::Counts)) => 5,
+            Some(Exchanged::Numbers(Reduced::Common(_))) => 6,
+            Some(Exchanged::Numbers(Reduced::Sums)) => 7,
         };
         let words = [rows.render as u32, rows.first, rows.rows, rows.width, next, u32::from(complete)];
         let all = self.timed(|| gathered(self.network, bytemuck::cast_slice(&words)))?;

@@ -242,8 +242,9 @@ pub enum Reduced {
     Winners,
     /// The numbers of fragments of lists, which are added up.
     Counts,
-    /// The moments of optical depths, which are added up, and every process needs the sums.
-    Moments,
+    /// Sums in the buffer of this name ([`EXTRA`](super::extra::EXTRA)), which are added up, and
+    /// every process needs the results.
+    Common(&'static str),
     /// The sums, which are added up.
     Sums,
 }

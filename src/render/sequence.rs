@@ -139,7 +139,7 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     let of_all = small.into_iter().chain([visibility::large(band)]);
     if plan.needs.surface.oit() == Some(Oit::Moments) {
         steps.extend(of_all.map(Step::Stage));
-        let found = [Reduced::Nearest, Reduced::Moments].map(Exchanged::Numbers);
+        let found = [Reduced::Nearest, Reduced::Common("moments")].map(Exchanged::Numbers);
         steps.extend(found.into_iter().filter_map(|found| exchange(plan, found, band)));
     }
     let sums = [accumulate::steps(plan, band, true).as_twin(Twin::Oit), accumulate::large(band)];

@@ -21,7 +21,7 @@ impl Run<'_> {
         let Self { gpu, plan, .. } = *self;
         let (name, words) = match what {
             Reduced::Nearest | Reduced::Counts => ("nearest", 1),
-            Reduced::Moments => ("moments", words_of("moments", &plan.needs)),
+            Reduced::Common(name) => (name, words_of(name, &plan.needs)),
             Reduced::Winners | Reduced::Sums => ("sums", plan.sum_words),
         };
         let samples = rows.samples().len();
@@ -30,7 +30,7 @@ impl Run<'_> {
         let is_first = match what {
             Reduced::Nearest | Reduced::Counts => true,
             Reduced::Winners => plan.needs.surface == Surface::Nearest(Winner::Once),
-            Reduced::Moments => false,
+            Reduced::Common(_) => false,
             Reduced::Sums => plan.needs.surface.oit() == Some(Oit::Weighted),
         };
         let mut runs: Runs = if is_first { all } else { self.covered.clone() };

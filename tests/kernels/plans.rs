@@ -131,29 +131,40 @@ fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
 
 /// Nearest depths are exchanged before anything depends on them, and sums when all are there.
 #[test]
-fn processes_exchange_depths_and_sums_of_one_surface() {
+fn processes_exchange_what_each_surface_needs() {
     let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
     let scatter = Settings { organisation: Organisation::Scatter, ..Settings::default() };
     let [project, large, occlude, accumulate, accumulate_large, resolve, end] = scattered();
-    let (nearest, sums) = ("exchange Nearest of 0", "exchange Sums of 0");
+    let (nearest, sums) = ("exchange Numbers(Nearest) of 0", "exchange Numbers(Sums) of 0");
     assert_eq!(
         lines_with_exchanges(&planned(&scene, 256, &core, &scatter, &Known::default())),
         [project, large, nearest, occlude, accumulate, accumulate_large, sums, resolve, end]
     );
-    // Sums in registers, of several surfaces or of separate inputs are not exchanged.
+    // Sums in registers, or of separate inputs, are not exchanged.
     let mut inputs = scene.clone();
     [0, 500].into_iter().for_each(|first| inputs.provenance.push(first, Vec::new(), None));
     let gathering = Known { touched_tiles: 3.0, ..Known::default() };
-    let others = [
-        (Settings::default(), gathering),
-        (Settings { separate: true, ..Settings::default() }, Known::default()),
-        (Settings { blend: Blend::Nearest, shading: Shading::Unlit, ..Settings::default() }, Known::default()),
-        (Settings { composite: "layers".parse().unwrap(), opacity: 0.5, ..Settings::default() }, Known::default()),
-        (Settings { composite: "moments".parse().unwrap(), ..Settings::default() }, Known::default()),
-    ];
+    let others =
+        [(Settings::default(), gathering), (Settings { separate: true, ..Settings::default() }, Known::default())];
     for (options, known) in others {
         let plan = planned(&inputs, 256, &software(), &options, &known);
         assert_eq!(lines_with_exchanges(&plan), lines(&plan), "{options:?}");
+    }
+    // Other surfaces exchange other numbers. There are no 64-bit atomics.
+    let nearest_alone = Settings { blend: Blend::Nearest, shading: Shading::Unlit, ..Settings::default() };
+    let layers = Settings { composite: "layers".parse().unwrap(), opacity: 0.5, ..Settings::default() };
+    let moments = Settings { composite: "moments".parse().unwrap(), ..Settings::default() };
+    let common = "exchange Numbers(Common(\"moments\")) of 0";
+    let surfaces: [(Settings, &[&str]); 3] = [
+        (nearest_alone, &[nearest, "exchange Numbers(Winners) of 0"]),
+        (layers, &["exchange Numbers(Counts) of 0", "exchange Fragments of 0"]),
+        (moments, &[nearest, common, sums]),
+    ];
+    for (options, expected) in surfaces {
+        let plan = planned(&scene, 256, &core, &options, &Known::default());
+        let all = lines_with_exchanges(&plan);
+        let exchanges: Vec<_> = all.iter().filter(|line| line.starts_with("exchange")).collect();
+        assert_eq!(exchanges, expected, "{options:?}");
     }
 }
 

@@ -77,7 +77,7 @@ const AT_ONCE: usize = 16;
 /// Joins the parts of files as [`merge`] does, with the values of few of them in memory at once.
 ///
 /// # Errors
-/// Those of [`Part::read`] and of [`merge`].
+/// The errors of [`Part::read`] and of [`merge`].
 pub fn merge_files(paths: &[PathBuf]) -> Result<Part> {
     let read = |paths: &[PathBuf]| paths.iter().map(|path| Part::read(path)).collect::<Result<Vec<_>>>();
     if paths.len() <= AT_ONCE {
